@@ -1,0 +1,86 @@
+# Everything runs from a virtual environment in .venv, which the first target that needs it makes.
+# A stamp records each installation, so that it is repeated only when the requirements change.
+
+PYTHON ?= python3
+VENV ?= .venv
+JOBS ?= 2
+PIP_FLAGS ?= -qq
+PYTEST_ARGS ?=
+BENCH_ARGS ?=
+
+EXTRAS = rl,discovery,mpc,view,files,symbolic,docs,dev
+BIN = $(VENV)/bin
+CORE = $(VENV)/.core-installed
+FULL = $(VENV)/.all-installed
+REQUIREMENTS = pyproject.toml constraints.txt
+INSTALL = $(BIN)/python -m pip install --disable-pip-version-check $(PIP_FLAGS) -c constraints.txt
+EXPLAIN = { echo "make: the installation failed; 'make $(MAKECMDGOALS) PIP_FLAGS=' shows every step of it" >&2; exit 1; }
+
+# Its notice about MkDocs 2 is no fault of this project's pages.
+export NO_MKDOCS_2_WARNING = 1
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help bench test lint style types layers pages docs clean distclean
+
+help: ## Show this list.
+	@echo "Targets:"
+	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s%s\n", $$1, $$2 }'
+	@echo "Variables: PYTHON=python3.12, BENCH_ARGS='...', PYTEST_ARGS='-k name', JOBS=2 (tests at once)"
+
+bench: $(CORE) ## Run the benchmark (python -m benchmarks); its report goes to results/.
+	$(BIN)/python -m benchmarks $(BENCH_ARGS)
+
+test: $(FULL) ## Run the tests and the examples in the docstrings.
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+
+lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
+
+style: $(FULL)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: $(FULL)
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+layers: $(FULL)
+	$(BIN)/lint-imports
+
+pages: $(FULL)
+	$(BIN)/mkdocs build --strict --quiet
+
+docs: $(FULL) ## Build the documentation into site/.
+	$(BIN)/mkdocs build --strict
+
+clean: ## Remove what the tools generated, but neither .venv nor results/.
+	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
+	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
+
+distclean: clean ## Remove .venv too.
+	rm -rf $(VENV)
+
+# pip is the last thing that venv writes, so an interrupted attempt is made again.
+$(BIN)/pip:
+	@command -v "$(PYTHON)" >/dev/null || { \
+	    echo "make: '$(PYTHON)' not found; install Python 3.11 or newer," \
+	         "or name it: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	    echo "make: pma-gym needs Python 3.11 or newer, '$(PYTHON)' is $$("$(PYTHON)" -V 2>&1);" \
+	         "name a newer one: make PYTHON=python3.12" >&2; exit 1; }
+	@"$(PYTHON)" -c 'import ensurepip, venv' 2>/dev/null || { \
+	    echo "make: '$(PYTHON)' cannot make virtual environments;" \
+	         "on Debian or Ubuntu: apt-get install python3-venv" >&2; exit 1; }
+	@echo "Making $(VENV) with $$("$(PYTHON)" -V)"
+	@"$(PYTHON)" -m venv "$(VENV)"
+
+$(CORE): $(REQUIREMENTS) | $(BIN)/pip
+	@echo "Installing the core into $(VENV) (about a minute)"
+	@$(INSTALL) -e . || $(EXPLAIN)
+	@touch $@
+
+$(FULL): $(REQUIREMENTS) | $(CORE)
+	@echo "Installing PyTorch into $(VENV)"
+	@$(INSTALL) torch || $(EXPLAIN)
+	@echo "Installing the other extras and the tools of development into $(VENV) (some minutes)"
+	@$(INSTALL) -e '.[$(EXTRAS)]' || $(EXPLAIN)
+	@touch $@
