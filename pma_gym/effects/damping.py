@@ -1,0 +1,52 @@
+"""Viscous damping of the muscle, by direction of motion and pressure."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.arithmetic import where
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+_TABLE_2 = "Serres 2008, table 2"
+
+
+class Damping(NamedTuple):
+    """Parameters of `damping`."""
+
+    contracting: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 2.90", 0.0)]
+    relaxing: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 1.57", 0.0)]
+    high_intercept: Annotated[float, Quantity("N s/mm", -20, 20, f"{_TABLE_2}: 0.311", 0.0)]
+    high_slope: Annotated[float, Quantity("N s/mm/kPa", -0.1, 0.1, f"{_TABLE_2}: 0.00338", 0.0)]
+    breakpoint: Annotated[float, Quantity("kPa", 0, 1000, f"{_TABLE_2}: 372")]
+
+
+def damping(pressure, velocity, p):
+    """Damping coefficient B; the force is -B x'.
+
+        B = contracting                         x' > 0
+        B = relaxing                            x' < 0, up to the breakpoint
+        B = high_intercept + high_slope P       x' < 0, above it
+
+    The force is continuous at x' = 0 although B is not.
+
+    Args:
+        pressure: gauge pressure P (Pa).
+        velocity: rate of contraction x' (m/s), positive when the muscle shortens.
+        p: Damping: coefficients (N s/m), slope (N s/m/Pa), breakpoint (Pa).
+    Returns:
+        Coefficient (N s/m), not negative.
+    Source:
+        Serres 2008, table 2. Fitted to pressure steps as if the pressure stepped at once, so the
+        printed values hold part of the regulator's lag.
+    """
+    high = p.high_intercept + p.high_slope * pressure
+    relaxing = where(pressure <= p.breakpoint, p.relaxing, high)
+    return where(velocity > 0.0, p.contracting, relaxing)
+
+
+DAMPING = Effect(
+    name="damping",
+    port="muscle_damping",
+    parameters=Damping,
+    law=damping,
+    signature="force proportional to speed, another factor in each direction",
+)

@@ -1,0 +1,57 @@
+"""Rate-independent hysteresis of bladder and braid (Bouc-Wen)."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+
+class Hysteresis(NamedTuple):
+    """Parameters of `hysteresis_force`."""
+
+    force: Annotated[
+        float, Quantity("N", 0, 200, "literature on braided muscles: 15-40 N", 0.0)
+    ]
+    distance: Annotated[
+        float, Quantity("mm", 0.05, 20, "literature on braided muscles: 1-2.5 mm")
+    ]
+
+
+def hysteresis_force(memory, p):
+    """Force that opposes the recent direction of motion.
+
+        F = -force * z
+
+    Args:
+        memory: hysteretic state z, between -1 and 1.
+        p: Hysteresis: force (N), distance (m).
+    Returns:
+        Force (N); positive shortens the muscle.
+    Source:
+        Bouc-Wen model with n = 1 and beta = gamma = 1/2 (Wen 1976), scaled to a force and a
+        distance.
+    """
+    return -p.force * memory
+
+
+def hysteresis_rate(velocity, memory, p):
+    """Rate of the hysteretic state: z' = (x' - |x'| z) / distance.
+
+    Args:
+        velocity: rate of contraction x' (m/s).
+        memory: z.
+        p: Hysteresis.
+    Returns:
+        (source, decay) with z' = source - decay * z (1/s).
+    """
+    return velocity / p.distance, abs(velocity) / p.distance
+
+
+HYSTERESIS = Effect(
+    name="hysteresis",
+    port="muscle_force",
+    parameters=Hysteresis,
+    law=hysteresis_force,
+    rate=hysteresis_rate,
+    signature="loops whose area does not depend on rate, with nested minor loops",
+)

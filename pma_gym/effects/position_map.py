@@ -1,0 +1,46 @@
+"""Static map from motor voltage to displacement of the dissertation's linear model."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.arithmetic import interpolate, positive
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+_TABLE_18 = "Serres 2008, table 18 (275 and 575 kPa: recovered from tables I13 and I20)"
+
+
+class PositionMap(NamedTuple):
+    """Rows of the map, one a pressure."""
+
+    pressure: Annotated[tuple[float, ...], Quantity("kPa", 0, 1000, _TABLE_18)]
+    square: Annotated[tuple[float, ...], Quantity("m/V^2", -0.1, 0.1, _TABLE_18)]
+    linear: Annotated[tuple[float, ...], Quantity("m/V", -1, 1, _TABLE_18)]
+    constant: Annotated[tuple[float, ...], Quantity("m", -0.1, 0.1, _TABLE_18)]
+
+
+def mapped_displacement(motor_voltage, pressure, p):
+    """Displacement that a motor voltage leads to at rest, never below zero.
+
+        x_in = max(0, square V^2 + linear V + constant)
+
+    The coefficients are linear in pressure between rows and constant beyond them. Past its peak
+    the parabola is held at the peak: more voltage never pulls less.
+
+    Args:
+        motor_voltage: command V (V).
+        pressure: gauge pressure (Pa).
+        p: PositionMap.
+    Returns:
+        Displacement (m).
+    Source:
+        Serres 2008, table 18.
+    """
+    square = interpolate(pressure, p.pressure, p.square)
+    linear = interpolate(pressure, p.pressure, p.linear)
+    constant = interpolate(pressure, p.pressure, p.constant)
+    peak = linear / (-2.0 * square)
+    voltage = motor_voltage - positive(motor_voltage - peak)
+    return positive((square * voltage + linear) * voltage + constant)
+
+
+POSITION_MAP = Effect("position_map", "position_map", PositionMap, mapped_displacement)

@@ -1,0 +1,58 @@
+"""The four sensors: first-order lag, calibration line, noise; one law, four sets of parameters."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+_ASSUMED = "assumption"
+_TABLE_1 = "Serres 2008, table 1"
+
+
+class Lvdt(NamedTuple):
+    """Displacement of the muscle (contraction)."""
+
+    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 100")]
+    noise: Annotated[float, Quantity("mm", 0, 10, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0)]
+
+
+class LoadCell(NamedTuple):
+    """Tension of the cable."""
+
+    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 500")]
+    noise: Annotated[float, Quantity("N", 0, 100, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0)]
+
+
+class PressureTransducer(NamedTuple):
+    """Gauge pressure in the muscle."""
+
+    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 50")]
+    noise: Annotated[float, Quantity("kPa", 0, 100, f"{_ASSUMED}: 0.3 (standard deviation)", 0.0)]
+
+
+class Potentiometer(NamedTuple):
+    """Angle of the pulley."""
+
+    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 200")]
+    noise: Annotated[float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.1 (standard deviation)", 0.0)]
+
+
+def sensor_rate(signal, p):
+    """Rate of a sensor's output before noise: s' = (signal - s) / tau, tau = 1 / (2 pi f).
+
+    Args:
+        signal: what the sensor stands on (SI).
+        p: the sensor's parameters; bandwidth f (Hz, -3 dB).
+    Returns:
+        (source, decay) with s' = source - decay * s.
+    """
+    decay = 6.283185307179586 * p.bandwidth
+    return decay * signal, decay
+
+
+LVDT = Effect("lvdt", "sensor:contraction", Lvdt, rate=sensor_rate)
+LOAD_CELL = Effect("load_cell", "sensor:load", LoadCell, rate=sensor_rate)
+PRESSURE_TRANSDUCER = Effect(
+    "pressure_transducer", "sensor:pressure", PressureTransducer, rate=sensor_rate
+)
+POTENTIOMETER = Effect("potentiometer", "sensor:rotation", Potentiometer, rate=sensor_rate)

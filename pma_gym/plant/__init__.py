@@ -1,0 +1,1 @@
+"""Plants: a model's equations of motion, settled, stepped, simulated and linearised."""

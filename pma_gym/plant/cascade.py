@@ -1,0 +1,65 @@
+"""The cascade: the dissertation's own linear model of motor, then muscle (Serres 2008, 3.2).
+
+    x_in = map(V, P)                                   static map of table 18
+    u' = (K_M / B_M) (x_in - u)                        servo, or with inertia Eq. 10
+    y' = (u - y) K / B                                 muscle, tau = B / K at the pressure
+    x = F_ce / K - y                                   contraction
+
+One-way: the muscle does not load the motor. With J = 0 and one pressure this is Eq. 22. The load
+cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
+"""
+
+from pma_gym.effects.stiffness import spring_stiffness
+from pma_gym.plant.compose import Equations
+
+PORTS: dict[str, str] = {
+    "muscle_force": "contractile_force and stiffness, both needed",
+    "muscle_damping": "one: damping coefficient of the muscle (N s/m)",
+    "position_map": "one: displacement that a voltage leads to (m)",
+    "servo": "one: rate of the motor's displacement",
+    "servo_inertia": "none or one: acceleration of the motor's displacement",
+    "regulator_line": "one: pressure that the regulator settles at (Pa)",
+    "regulator_lag": "one: rate of the pressure",
+}
+"""Ports of the cascade: how many effects each takes, and what becomes of their results."""
+
+PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
+"""Effects that the cascade reads itself and cannot do without."""
+
+OUTPUTS: dict[str, str] = {
+    "contraction": "contraction",
+    "rotation": "servo / p_servo.radius",
+    "load": "muscle_stiffness * extension",
+    "pressure": "pressure",
+}
+"""True outputs by name: the text of each, in terms of the equations' variables."""
+
+
+def write_equations(equations: Equations) -> None:
+    """Write the dissertation's cascade, with the model's effects at its ports."""
+    let = equations.let
+    equations.functions.append(spring_stiffness)
+    let("pressure_command", equations.one("regulator_line"))
+    let("displacement_input", equations.one("position_map"))
+    let("muscle_stiffness", "spring_stiffness(pressure, p_stiffness)")
+    let("no_load", "contractile_force(pressure, p_contractile_force) / muscle_stiffness")
+    let("contraction", "no_load - extension")
+    # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
+    let("velocity", "extension - servo")
+    let("resistance", equations.total("muscle_damping"))
+    let("muscle_rate", "muscle_stiffness / resistance")
+    equations.add_state("extension", "muscle_rate * (servo - extension)")
+    _write_servo(equations)
+    equations.add_rate("pressure", equations.one("regulator_lag"))
+    equations.add_sensors(OUTPUTS)
+
+
+def _write_servo(equations: Equations) -> None:
+    if not equations.at("servo_inertia"):
+        equations.add_rate("servo", equations.one("servo"))
+        return
+    call = equations.one(
+        "servo_inertia", displacement="servo", displacement_rate="servo_rate", servo="p_servo"
+    )
+    equations.add_state("servo", "servo_rate")
+    equations.add_state("servo_rate", call)

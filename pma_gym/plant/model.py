@@ -1,0 +1,256 @@
+"""Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
+
+import difflib
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from importlib import resources
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from pma_gym.effects import CATALOGUE, Effect
+from pma_gym.effects.effect import Value
+from pma_gym.plant import cascade, station
+
+SCHEMA = 1
+PLANTS = {"station": station, "cascade": cascade}
+_HEAD = ("schema", "name", "title", "plant")
+
+
+class ModelError(ValueError):
+    """A model that cannot be used; says what is wrong, where, and how to mend it."""
+
+
+@dataclass(frozen=True)
+class Note:
+    """What is known about a parameter's value, in its unit at the door.
+
+    Attributes:
+        source: where the value comes from.
+        low: lower end of its 95 % interval, or None.
+        high: upper end, or None.
+    """
+
+    source: str = ""
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True)
+class Model:
+    """A plant's effects and their parameters.
+
+    Attributes:
+        name: short name.
+        title: one line for people.
+        plant: `station` or `cascade`.
+        parameters: NamedTuple of parameters (SI) by effect name, in catalogue order.
+        notes: source and interval by `effect.parameter_unit`.
+    """
+
+    name: str
+    title: str
+    plant: str
+    parameters: Mapping[str, Any]
+    notes: Mapping[str, Note] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Freeze the parameters and check that the plant's ports are filled."""
+        ordered = {name: self.parameters[name] for name in CATALOGUE if name in self.parameters}
+        object.__setattr__(self, "parameters", MappingProxyType(ordered))
+        object.__setattr__(self, "notes", MappingProxyType(dict(self.notes)))
+        _check_ports(self)
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """The model's effects by name, in catalogue order."""
+        return {name: CATALOGUE[name] for name in self.parameters}
+
+    def vector(self) -> np.ndarray:
+        """All parameters in SI as one flat array, in the order the compiled plant reads them."""
+        flat: list[float] = []
+        for values in self.parameters.values():
+            for value in values:
+                flat.extend(value if isinstance(value, tuple) else (value,))
+        return np.array(flat, dtype=np.float64)
+
+    def lengths(self) -> dict[str, list[int]]:
+        """By effect: 0 for a number, the length for a tuple, one entry a parameter."""
+        return {
+            name: [len(v) if isinstance(v, tuple) else 0 for v in values]
+            for name, values in self.parameters.items()
+        }
+
+    def replace(self, values: Mapping[str, Value], name: str | None = None) -> "Model":
+        """A model with other values, given by `effect.parameter_unit` in the unit at the door.
+
+        Raises:
+            ModelError: an unknown parameter (with the nearest known) or one out of bounds.
+        """
+        door = {effect: self.at_the_door(effect) for effect in self.parameters}
+        for path, value in values.items():
+            effect, _, parameter = path.partition(".")
+            if parameter not in door.get(effect, {}):
+                raise ModelError(f"model {self.name} has no parameter {path}{self._nearest(path)}")
+            door[effect][parameter] = value
+        notes = {path: note for path, note in self.notes.items() if path not in values}
+        parsed = {effect: _parse(effect, given) for effect, given in door.items()}
+        return replace(self, name=name or self.name, parameters=parsed, notes=notes)
+
+    def at_the_door(self, effect: str) -> dict[str, Value]:
+        """One effect's values by their names at the door."""
+        return CATALOGUE[effect].at_the_door(self.parameters[effect])
+
+    def paths(self) -> Iterator[str]:
+        """Every parameter as `effect.parameter_unit`."""
+        for effect in self.parameters:
+            yield from (f"{effect}.{name}" for name in self.at_the_door(effect))
+
+    def _nearest(self, path: str) -> str:
+        near = difflib.get_close_matches(path, list(self.paths()), 1)
+        return f"; did you mean {near[0]}?" if near else f"; it has {', '.join(self.paths())}"
+
+
+def shipped_models() -> dict[str, Path]:
+    """Paths of the models that come with the package, by name."""
+    folder = Path(str(resources.files("pma_gym") / "models"))
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def load_model(source: "str | Path | Model") -> Model:
+    """A model by its shipped name, by the path of a TOML file, or as it is.
+
+    Raises:
+        ModelError: no such model, broken TOML, another schema, an unknown or missing effect or
+            parameter, a value out of bounds or not a number; names the file and the mend.
+    """
+    if isinstance(source, Model):
+        return source
+    shipped = shipped_models()
+    if str(source) in shipped:
+        return _read(shipped[str(source)])
+    path = Path(source)
+    if path.suffix == ".toml" and path.is_file():
+        return _read(path)
+    near = difflib.get_close_matches(str(source), list(shipped), 1)
+    hint = f"; did you mean {near[0]!r}?" if near else ""
+    raise ModelError(
+        f"no model {str(source)!r}: give a shipped name ({', '.join(shipped)}) "
+        f"or the path of a .toml file{hint}"
+    )
+
+
+def _read(path: Path) -> Model:
+    try:
+        document = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path} is not valid TOML: {error}") from error
+    try:
+        return parse_model(document)
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from error
+
+
+def parse_model(document: Mapping[str, Any]) -> Model:
+    """A model from a parsed TOML document.
+
+    Raises:
+        ModelError: as `load_model`.
+    """
+    if document.get("schema") != SCHEMA:
+        raise ModelError(f"schema must be {SCHEMA}, got {document.get('schema')!r}")
+    missing = [key for key in _HEAD if key not in document]
+    if missing:
+        raise ModelError(f"a model needs {', '.join(_HEAD)}; missing: {', '.join(missing)}")
+    tables = {key: value for key, value in document.items() if key not in _HEAD}
+    parameters, notes = {}, {}
+    for effect, table in tables.items():
+        values, found = _split(effect, table)
+        parameters[effect] = _parse(effect, values)
+        notes |= found
+    head = {key: str(document[key]) for key in ("name", "title", "plant")}
+    return Model(**head, parameters=parameters, notes=notes)
+
+
+def _split(effect: str, table: Any) -> tuple[dict[str, Value], dict[str, Note]]:
+    if not isinstance(table, dict):
+        raise ModelError(f"{effect} = {table!r} is no table; parameters stand under [effect]")
+    values, notes = {}, {}
+    for name, given in table.items():
+        entry = given if isinstance(given, dict) else {"value": given}
+        unknown = set(entry) - {"value", "low", "high", "source"}
+        if unknown or "value" not in entry:
+            raise ModelError(
+                f"{effect}.{name} must be a number or a table of value, low, high, source; "
+                f"got {given!r}"
+            )
+        values[name] = entry["value"]
+        notes[f"{effect}.{name}"] = Note(
+            str(entry.get("source", "")), entry.get("low"), entry.get("high")
+        )
+    return values, notes
+
+
+def _parse(effect: str, values: Mapping[str, Value]) -> Any:
+    if effect not in CATALOGUE:
+        near = difflib.get_close_matches(effect, list(CATALOGUE), 1)
+        hint = f"did you mean [{near[0]}]?" if near else f"known: {', '.join(CATALOGUE)}"
+        raise ModelError(f"unknown effect [{effect}]; {hint}")
+    try:
+        return CATALOGUE[effect].parse(values)
+    except ValueError as error:
+        raise ModelError(str(error)) from error
+
+
+def _check_ports(model: Model) -> None:
+    if model.plant not in PLANTS:
+        raise ModelError(f"plant must be one of {', '.join(PLANTS)}, got {model.plant!r}")
+    plant = PLANTS[model.plant]
+    for part in plant.PARTS:
+        if part not in model.parameters:
+            raise ModelError(f"a {model.plant} needs [{part}]; add it (see models/serres2008.toml)")
+    for port, rule in plant.PORTS.items():
+        at = [name for name, effect in model.effects.items() if effect.port == port]
+        if rule.startswith("one") and len(at) != 1:
+            raise ModelError(
+                f"port {port} of a {model.plant} takes {rule}; got {', '.join(at) or 'none'}"
+            )
+    for name, effect in model.effects.items():
+        known = effect.port == "part" or effect.port.startswith("sensor:")
+        if not known and effect.port not in plant.PORTS:
+            raise ModelError(
+                f"[{name}] acts at port {effect.port}, which a {model.plant} does not have; "
+                f"its ports: {', '.join(plant.PORTS)}"
+            )
+
+
+def dump_model(model: Model) -> str:
+    """The model as TOML text; the same model gives the same bytes."""
+    lines = [f"schema = {SCHEMA}"]
+    lines += [f"{key} = {_text(getattr(model, key))}" for key in ("name", "title", "plant")]
+    for effect in model.parameters:
+        lines += ["", f"[{effect}]"]
+        for name, value in model.at_the_door(effect).items():
+            lines.append(f"{name} = {_entry(value, model.notes.get(f'{effect}.{name}', Note()))}")
+    return "\n".join(lines) + "\n"
+
+
+def _entry(value: Value, note: Note) -> str:
+    parts = [f"value = {_text(value)}"]
+    parts += [f"{key} = {_text(end)}" for key in ("low", "high") if (end := getattr(note, key)) is not None]
+    parts += [f"source = {_text(note.source)}"] if note.source else []
+    return f"{{ {', '.join(parts)} }}"
+
+
+def _text(value: str | Value) -> str:
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    if isinstance(value, tuple):
+        return "[" + ", ".join(_text(one) for one in value) + "]"
+    # Nine digits: below every interval, and free of the last bits that unit factors leave.
+    short = f"{value:.9g}"
+    return short if math.isfinite(float(short)) else repr(value)

@@ -1,0 +1,126 @@
+"""Units at the door: SI inside, a unit in every name outside.
+
+Files, plots and messages use the units that people of this field read (mm, N, kPa, s, deg, V);
+the code computes in SI. `Quantity` joins the two for one physical parameter.
+"""
+
+import math
+from dataclasses import dataclass
+
+SI_FACTORS: dict[str, float] = {
+    "1": 1.0,
+    "%": 0.01,
+    "V": 1.0,
+    "s": 1.0,
+    "ms": 1e-3,
+    "Hz": 1.0,
+    "kg": 1.0,
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "deg": math.pi / 180.0,
+    "rad": 1.0,
+    "N": 1.0,
+    "N m": 1.0,
+    "kPa": 1e3,
+    "bar": 1e5,
+    "1/kPa": 1e-3,
+    "1/mm": 1e3,
+    "1/%": 100.0,
+    "1/N": 1.0,
+    "mm/s": 1e-3,
+    "deg/s": math.pi / 180.0,
+    "N/kPa": 1e-3,
+    "N/bar": 1e-5,
+    "N/bar/%": 1e-3,
+    "N/mm": 1e3,
+    "N/mm/kPa": 1.0,
+    "N/mm^2": 1e6,
+    "N/mm^3": 1e9,
+    "N s/mm": 1e3,
+    "N s/mm/kPa": 1.0,
+    "N s^2/mm^2": 1e6,
+    "N/V": 1.0,
+    "kPa/V": 1e3,
+    "m/V": 1.0,
+    "m/V^2": 1.0,
+    "V/mm": 1e3,
+    "V/N": 1.0,
+    "V/bar": 1e-5,
+    "V/deg": 180.0 / math.pi,
+    "N m s": 1.0,
+    "kg m^2": 1.0,
+}
+"""Value in SI of one of each unit."""
+
+
+def suffix(unit: str) -> str:
+    """The ending that says a unit in a name: `N/mm` gives `n_per_mm`; `1` gives nothing.
+
+    >>> suffix("N s/mm"), suffix("kg m^2"), suffix("%"), suffix("1/kPa"), suffix("1")
+    ('n_s_per_mm', 'kg_m2', 'percent', 'per_kpa', '')
+    """
+    if unit == "1":
+        return ""
+    words = unit.replace("1/", "per_", 1) if unit.startswith("1/") else unit
+    words = words.replace("/", "_per_").replace(" ", "_").replace("^", "").replace("%", "percent")
+    return words.lower()
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Unit, bounds, neutral value and source of one physical parameter.
+
+    Attributes:
+        unit: unit at the door (a key of `SI_FACTORS`); bounds and neutral value are in it.
+        lower: smallest value that makes physical sense.
+        upper: largest value that makes physical sense.
+        source: where the bounds and the usual value come from; says "assumption" for one.
+        neutral: value at which the parameter has no effect at all, or None.
+    """
+
+    unit: str
+    lower: float
+    upper: float
+    source: str
+    neutral: float | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a unit without a factor and bounds in the wrong order."""
+        if self.unit not in SI_FACTORS:
+            raise ValueError(f"unknown unit {self.unit!r}; add it to pma_gym.units.SI_FACTORS")
+        if not self.lower <= self.upper:
+            raise ValueError(f"bounds {self.lower} to {self.upper} {self.unit} are reversed")
+
+    @property
+    def factor(self) -> float:
+        """Value in SI of one unit at the door."""
+        return SI_FACTORS[self.unit]
+
+    def name(self, stem: str) -> str:
+        """The name at the door of the parameter that the code calls `stem`.
+
+        >>> Quantity("N/kPa", 0, 10, "example").name("slope")
+        'slope_n_per_kpa'
+        """
+        ending = suffix(self.unit)
+        return f"{stem}_{ending}" if ending else stem
+
+    def to_si(self, value: float) -> float:
+        """The value in SI of one given in the unit at the door."""
+        return value * self.factor
+
+    def from_si(self, value: float) -> float:
+        """The value in the unit at the door of one given in SI."""
+        return value / self.factor
+
+    def check(self, name: str, value: float) -> None:
+        """Refuse a value at the door outside the bounds.
+
+        Raises:
+            ValueError: names the parameter, the range, the unit and what came.
+        """
+        if not self.lower <= value <= self.upper:
+            raise ValueError(
+                f"{name} must lie in {self.lower:g} to {self.upper:g} {self.unit}, got {value!r}"
+            )
