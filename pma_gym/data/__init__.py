@@ -1,0 +1,1 @@
+"""Measurements: trials, calibrations, and the tables of the dissertation behind the models."""

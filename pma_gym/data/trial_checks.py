@@ -1,0 +1,82 @@
+"""What every trial must obey, said in words that tell where it does not and what to do."""
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, Column, TrialError
+
+Place = Callable[[int], str]
+"""Says where the sample of an index stands: `row 381 of ramp.csv`."""
+
+COMMANDS = tuple(column.quantity for column in COLUMNS if column.kind == "command")
+"""motor_voltage, regulator_voltage (V); instead of them load_command (N), pressure_command (Pa)."""
+
+
+def check_commanded(quantities: Iterable[str], owner: str) -> None:
+    """Refuse a trial without a command.
+
+    Args:
+        quantities: what the trial holds.
+        owner: what to call it.
+    Raises:
+        TrialError: none of them is a command.
+    """
+    if not set(quantities) & set(COMMANDS):
+        names = " or ".join(BY_QUANTITY[quantity].name for quantity in COMMANDS)
+        raise TrialError(f"{owner} needs at least one command, {names}; it has none")
+
+
+def check_time(time: NDArray[np.float64], place: Place) -> None:
+    """Refuse times (s) that are not finite or do not strictly increase.
+
+    Raises:
+        TrialError: says where, and both times.
+    """
+    bad = np.flatnonzero(~np.isfinite(time))
+    if bad.size:
+        came = "none" if np.isnan(time[bad[0]]) else f"{time[bad[0]]}"
+        raise TrialError(
+            f"time_s must be a finite number of seconds, {place(int(bad[0]))} has {came}; "
+            "fill it in or remove the row"
+        )
+    later = 1 + np.flatnonzero(np.diff(time) <= 0)
+    if later.size:
+        before, after = (float(time[later[0] - 1]), float(time[later[0]]))
+        raise TrialError(
+            f"time_s must increase strictly, {place(int(later[0]))} has {after!r} s after "
+            f"{before!r} s; sort the rows, or split the file where a new trial begins"
+        )
+
+
+def check_values(
+    name: str, values: NDArray[np.float64], column: Column | None, place: Place, mend: str
+) -> None:
+    """Refuse infinity, and values outside the limits of their column.
+
+    Args:
+        name: what to call the values.
+        values: in the unit of the limits; NaN = not measured.
+        column: whose limits hold; None for no limits.
+        place: where a sample stands.
+        mend: what to do about a value outside the limits.
+    Raises:
+        TrialError: names the value, the limits, the unit and the place.
+    """
+    bad = np.flatnonzero(np.isinf(values))
+    if bad.size:
+        raise TrialError(
+            f"{name} must be finite, {place(int(bad[0]))} has {values[bad[0]]}; "
+            "leave empty (NaN) what was not measured"
+        )
+    if column is None or column.limits is None:
+        return
+    low, high = column.limits
+    bad = np.flatnonzero((values < low) | (values > high))
+    if bad.size:
+        limits = f"{low:g}-{high:g}" if low >= 0 else f"{low:g} to {high:g}"
+        raise TrialError(
+            f"{name} must lie in {limits} {column.unit}, {place(int(bad[0]))} has "
+            f"{float(values[bad[0]])!r}; {mend}"
+        )

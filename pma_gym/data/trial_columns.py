@@ -1,0 +1,199 @@
+"""The columns of a trial's file: name and unit at the door, kind and name inside."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data import calibration
+from pma_gym.data.calibration import DAQ_LIMIT, Calibration
+from pma_gym.units import SI_FACTORS
+
+ColumnMap = Mapping[str, str | Mapping[str, object]]
+"""A lab's own column names to ours: `{"Weg": "contraction_mm"}`, or with a linear conversion,
+`{"Weg": {"name": "contraction_mm", "factor": -1.0, "offset": 60.0}}`: ours = factor * theirs +
+offset, in the unit of our column. It is what `[columns]` of a `dataset.toml` holds."""
+
+
+class TrialError(ValueError):
+    """A trial, or its file, that cannot be used; the message says where, why and the mend."""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes:
+        name: at the door, with unit.
+        unit: at the door.
+        kind: "time", "command" or "measurement".
+        quantity: what a `Trial` calls it; in SI there.
+        limits: smallest and largest value at the door, where there are any.
+        calibration: for a sensor's raw voltage, the line that decodes it.
+    """
+
+    name: str
+    unit: str
+    kind: str
+    quantity: str
+    limits: tuple[float, float] | None = None
+    calibration: Calibration | None = None
+
+    def to_si(self, door: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values in SI of values at the door."""
+        if self.calibration is None:
+            return door * SI_FACTORS[self.unit]
+        values = self.calibration.from_volts(door)
+        # A potentiometer's zero is its protractor's; a trial's rotation starts at 0.
+        return values - _first_measured(values) if self.quantity == "rotation" else values
+
+    def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values at the door that `to_si` takes back to the same bits, where such values exist.
+
+        The one with fewest digits is chosen, so that 25.3 mm is written 25.3; where no double at
+        the door stands for exactly this one in SI, the result reads back 1 ulp off.
+        """
+        nearest = values / SI_FACTORS[self.unit]
+        chosen = nearest.copy()
+        neighbours = (np.nextafter(nearest, -np.inf), np.nextafter(nearest, np.inf), nearest)
+        # Later candidates overwrite earlier ones: the shortest comes last.
+        for candidate in (*neighbours, _rounded(nearest, 16), _rounded(nearest, 15)):
+            exact = self.to_si(candidate) == values
+            chosen[exact] = candidate[exact]
+        return chosen
+
+
+VOLTAGE_RANGE = (0.0, 10.0)
+"""What the motor's drive and the regulator accept (V)."""
+
+COLUMNS: tuple[Column, ...] = (
+    Column("time_s", "s", "time", "time"),
+    Column("motor_voltage_v", "V", "command", "motor_voltage", VOLTAGE_RANGE),
+    Column("regulator_voltage_v", "V", "command", "regulator_voltage", VOLTAGE_RANGE),
+    Column("load_command_n", "N", "command", "load_command"),
+    Column("pressure_command_kpa", "kPa", "command", "pressure_command"),
+    Column("contraction_mm", "mm", "measurement", "contraction"),
+    Column("rotation_deg", "deg", "measurement", "rotation"),
+    Column("load_n", "N", "measurement", "load"),
+    Column("pressure_kpa", "kPa", "measurement", "pressure"),
+)
+"""What files hold, in the order in which they are written."""
+
+_DAQ_RANGE = (-DAQ_LIMIT, DAQ_LIMIT)
+
+RAW_COLUMNS: tuple[Column, ...] = tuple(
+    Column(name, "V", "measurement", quantity, _DAQ_RANGE, line)
+    for name, quantity, line in (
+        ("lvdt_v", "contraction", calibration.LVDT),
+        ("potentiometer_v", "rotation", calibration.POTENTIOMETER),
+        ("load_cell_v", "load", calibration.LOAD_CELL),
+        ("pressure_transducer_v", "pressure", calibration.PRESSURE_TRANSDUCER),
+    )
+)
+"""Raw sensor volts, which a file may hold instead; decoded on reading, never written."""
+
+BY_NAME = {column.name: column for column in (*COLUMNS, *RAW_COLUMNS)}
+BY_QUANTITY = {column.quantity: column for column in COLUMNS}
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where in a file a column comes from.
+
+    Attributes:
+        index: position in the file.
+        name: the file's own name of it.
+        column: what it is.
+        factor: ours = factor * theirs + offset.
+        offset: see factor; in the unit of our column.
+    """
+
+    index: int
+    name: str
+    column: Column
+    factor: float = 1.0
+    offset: float = 0.0
+
+
+def sources(
+    header: Iterable[str], mapping: ColumnMap, file: str
+) -> tuple[list[Source], dict[int, str]]:
+    """Which of a file's columns hold what.
+
+    Args:
+        header: names of the file's columns.
+        mapping: the lab's names to ours.
+        file: the file's name, for messages.
+    Returns:
+        Sources of the columns that are known, and the names of the others by position.
+    Raises:
+        TrialError: the mapping is malformed, or two columns hold the same quantity.
+    """
+    known: dict[str, Source] = {}
+    unknown: dict[int, str] = {}
+    for index, name in enumerate(header):
+        source = _source(index, name, mapping)
+        if source is None:
+            unknown[index] = name
+            continue
+        rival = known.setdefault(source.column.quantity, source)
+        if rival is not source:
+            raise TrialError(
+                f"{file} has {source.column.quantity} twice, in columns {rival.name!r} and "
+                f"{name!r}; remove or rename one"
+            )
+    return list(known.values()), unknown
+
+
+def suggestion(name: str, known: Iterable[str] = BY_NAME) -> str:
+    """` (did you mean 'time_s'?)` for a name close to a known one, else nothing."""
+    lowered = {entry.lower(): entry for entry in known}
+    close = difflib.get_close_matches(name.strip().lower(), lowered, n=1, cutoff=0.7)
+    return f" (did you mean {lowered[close[0]]!r}?)" if close else ""
+
+
+def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
+    """The source that one header names; None for an unknown one."""
+    if name not in mapping:
+        return Source(index, name, BY_NAME[name]) if name in BY_NAME else None
+    entry = mapping[name]
+    entry = {"name": entry} if isinstance(entry, str) else entry
+    extra = set(entry) - {"name", "factor", "offset"}
+    if extra:
+        raise TrialError(
+            f"[columns] {name!r} takes name, factor and offset, got {sorted(extra)[0]!r}"
+        )
+    ours = entry.get("name", name)
+    if not isinstance(ours, str) or ours not in BY_NAME:
+        raise TrialError(
+            f"[columns] {name!r} must name one of {', '.join(BY_NAME)}, "
+            f"got {ours!r}{suggestion(str(ours))}"
+        )
+    factor, offset = (
+        _number(f"[columns] {name!r} {key}", entry.get(key, usual))
+        for key, usual in (("factor", 1.0), ("offset", 0.0))
+    )
+    if factor == 0.0:
+        raise TrialError(f"[columns] {name!r} factor must not be 0, or every value is the same")
+    return Source(index, name, BY_NAME[ours], factor, offset)
+
+
+def _number(name: str, value: object) -> float:
+    """A finite number of a mapping."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise TrialError(f"{name} must be a finite number, got {value!r}")
+    return float(value)
+
+
+def _rounded(values: NDArray[np.float64], digits: int) -> NDArray[np.float64]:
+    """Values rounded to a number of significant decimal digits."""
+    return np.array([float(f"{value:.{digits}g}") for value in values.tolist()])
+
+
+def _first_measured(values: NDArray[np.float64]) -> float:
+    """The first value that is no gap; 0 if all are."""
+    measured = values[~np.isnan(values)]
+    return float(measured[0]) if measured.size else 0.0

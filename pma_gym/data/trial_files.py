@@ -1,0 +1,210 @@
+"""Trials in files: one file a trial, columns by name and unit, SI inside.
+
+A value at the door is a double; its text is the shortest that names it. What was read from a file
+is written and read again bit for bit. What comes from a computation in m, rad and Pa goes through
+mm, deg and kPa, where not every double has a counterpart: writing it and reading it back gives the
+same bits or, for one value in fifty (one in ten for angles), a neighbour (1 ulp). XLSX keeps 16
+digits of the value at the door: within 4 ulp.
+"""
+
+import os
+import re
+import secrets
+import warnings
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_checks import check_commanded, check_time, check_values
+from pma_gym.data.trial_columns import (
+    COLUMNS,
+    ColumnMap,
+    Source,
+    TrialError,
+    sources,
+    suggestion,
+)
+from pma_gym.data.trial_formats import DECODERS, ENCODERS, Table
+
+_NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
+_COUNTS = "if the log is in raw DAQ counts, give [columns] a factor"
+
+
+class TrialWarning(UserWarning):
+    """Something in a trial's file was passed over; the message says what."""
+
+
+def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Trial:
+    """A trial from a CSV, Parquet or XLSX file.
+
+    Columns are matched by name: `time_s`, a command (`motor_voltage_v`, `regulator_voltage_v`,
+    `load_command_n`, `pressure_command_kpa`) and any of `contraction_mm`, `rotation_deg`,
+    `load_n`, `pressure_kpa`, or a sensor's raw voltage in place of one of these: `lvdt_v`,
+    `potentiometer_v`, `load_cell_v`, `pressure_transducer_v`, decoded by table 1 (rotation then
+    counts from its first value). An empty cell is not measured: NaN.
+
+    Args:
+        path: the file; its suffix tells the format.
+        columns: the file's own names to ours, with factor and offset (see `ColumnMap`).
+    Returns:
+        The trial; its provenance is what the file carries (a CSV file carries none).
+    Raises:
+        TrialError: the file cannot be used; names file, row, column, rule and mend.
+    Warns:
+        TrialWarning: unknown columns, which are passed over.
+    """
+    path = Path(path)
+    table = _load(path)
+    mapping = columns or {}
+    found = _match(table, mapping)
+    arrays = {source.column.quantity: _door_values(source, table) for source in found}
+    check_time(arrays["time"], table.place)
+    check_commanded(arrays, table.file)
+    inside = {
+        source.column.quantity: source.column.to_si(arrays[source.column.quantity])
+        for source in found
+    }
+    kinds: dict[str, dict[str, NDArray[np.float64]]] = {"command": {}, "measurement": {}}
+    for column in COLUMNS[1:]:
+        if column.quantity in inside:
+            kinds[column.kind][column.quantity] = inside[column.quantity]
+    return Trial(
+        time=inside["time"],
+        commands=kinds["command"],
+        measurements=kinds["measurement"],
+        provenance=table.provenance,
+    )
+
+
+def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
+    """Write a trial as the station's log would be: time, commands and measurements.
+
+    Truth is not written, for no log has it. Provenance goes into Parquet's metadata and XLSX's
+    second sheet; CSV has no place for it. The file appears whole or not at all. The same trial
+    gives the same bytes in CSV and Parquet; XLSX stamps the time of writing.
+
+    Args:
+        trial: what to write.
+        path: a name that ends in .csv, .parquet or .xlsx; replaced if it exists.
+    Raises:
+        TrialError: unknown suffix, no such folder, or a library of `pma-gym[files]` is missing.
+        OSError: the disk refuses.
+    """
+    path = Path(path)
+    suffix = _suffix(path)
+    held = {"time": trial.time, **trial.commands, **trial.measurements}
+    columns = {
+        column.name: column.from_si(held[column.quantity])
+        for column in COLUMNS
+        if column.quantity in held
+    }
+    if path.is_dir() or not path.parent.is_dir():
+        fault = f"{path} is a folder" if path.is_dir() else f"there is no folder {path.parent}"
+        raise TrialError(f"cannot write {path}: {fault}; name a file in a folder that exists")
+    _put(path, ENCODERS[suffix](columns, trial.provenance))
+
+
+def _load(path: Path) -> Table:
+    """The file's table, which has a header and a row."""
+    decode = DECODERS[_suffix(path)]
+    if not path.is_file():
+        raise TrialError(f"there is no file {path}; check the name and the folder")
+    content = path.read_bytes()
+    table = decode(content, path.name) if content else Table(path.name, [], [], [])
+    if not table.header:
+        raise TrialError(f"{path.name} is empty; {_NEEDED}")
+    if not table.rows:
+        raise TrialError(f"{path.name} has a header but no rows; {_NEEDED}")
+    return table
+
+
+def _suffix(path: Path) -> str:
+    """The suffix in lower case, if there is a format for it."""
+    suffix = path.suffix.lower()
+    if suffix not in DECODERS:
+        raise TrialError(
+            f"{path.name} must end in {', '.join(DECODERS)}, got {path.suffix or 'no suffix'!r}; "
+            "save it in one of these formats"
+        )
+    return suffix
+
+
+def _match(table: Table, mapping: ColumnMap) -> list[Source]:
+    """The columns that are known; warns of the others."""
+    named = [name for name in table.header if name]
+    twice = sorted({name for name in named if named.count(name) > 1})
+    if twice:
+        raise TrialError(f"{table.file} has the column {twice[0]!r} twice; rename or remove one")
+    found, unknown = sources(table.header, mapping, table.file)
+    strange = [f"{name!r}{suggestion(name)}" for name in unknown.values() if name]
+    absent = [f"{name!r}{suggestion(name, named)}" for name in mapping if name not in named]
+    if not any(source.column.quantity == "time" for source in found):
+        raise TrialError(
+            f"{table.file} has no column time_s; its columns are "
+            f"{', '.join(strange or named)}; rename one, or map it in [columns]"
+        )
+    if strange:
+        _warn(f"{table.file}: unknown columns are ignored: {', '.join(strange)}")
+    if absent:
+        _warn(f"{table.file} lacks columns that [columns] maps: {', '.join(absent)}")
+    return found
+
+
+def _warn(message: str) -> None:
+    """Warn at the line that called `read_trial`."""
+    warnings.warn(message, TrialWarning, stacklevel=4)
+
+
+def _door_values(source: Source, table: Table) -> NDArray[np.float64]:
+    """A column's values in its unit at the door, mapped and checked; NaN where a cell is empty."""
+    theirs = np.empty(len(table.rows))
+    for index, cell in enumerate(table.cells[source.index]):
+        number = _number(cell)
+        if number is None:
+            raise TrialError(
+                f"{source.name} must hold numbers, {table.place(index)} has {cell!r}; "
+                f"{_mend(source, cell)}"
+            )
+        theirs[index] = number
+    values = source.factor * theirs + source.offset
+    if source.column.kind != "time":
+        check_values(source.column.name, values, source.column, table.place, _COUNTS)
+    return values
+
+
+def _number(cell: object) -> float | None:
+    """The cell's number, NaN for an empty cell, None for anything else."""
+    if cell is None:
+        return np.nan
+    if isinstance(cell, int | float) and not isinstance(cell, bool):
+        return float(cell)
+    # Python's float also takes 1_000, which no log means.
+    if not isinstance(cell, str) or "_" in cell:
+        return None
+    try:
+        return float(cell) if cell.strip() else np.nan
+    except ValueError:
+        return None
+
+
+def _mend(source: Source, cell: object) -> str:
+    """What to do about a cell that is no number."""
+    if isinstance(cell, str) and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
+        return "write it with a decimal point"
+    if source.column.kind == "time":
+        return "give seconds since the start of the trial"
+    return "leave the cell empty where nothing was measured"
+
+
+def _put(path: Path, content: bytes) -> None:
+    """Write a file so that a reader sees the old one or the new one, never a part."""
+    # In the same folder, for only there is the final step a rename.
+    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
+    try:
+        partial.write_bytes(content)
+        os.replace(partial, path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise

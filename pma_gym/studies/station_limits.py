@@ -1,0 +1,187 @@
+"""Limits of the station: tables 17 and 18 out of table I3 (section 5.2.1)."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.serres2008 import Table, load_table
+from pma_gym.metrics import rmse
+from pma_gym.studies.comparison import (
+    Comparison,
+    compare,
+    compare_computed,
+    half_units,
+    rounding_reach,
+)
+from pma_gym.studies.contraction import SPRING_SPLIT_KPA
+from pma_gym.studies.position_voltage import Quadratic, printed_quadratics, used_quadratics
+
+STUDY = "station limits"
+
+
+def position_voltage_fit(pressure_kpa: float) -> tuple[Quadratic, float]:
+    """Least-squares quadratic of table I3's extension (m) on motor voltage (V), and its R2.
+
+    Args:
+        pressure_kpa: one of table I3's eleven, 150-575.
+
+    Source:
+        Serres 2008, table 18.
+    """
+    rows = load_table("I3").where(pressure_nominal_kpa=pressure_kpa)
+    figures = _fit(rows["motor_voltage_v"], 1e-3 * rows["extension_mm"])
+    return Quadratic(*figures[:3]), figures[3]
+
+
+def _fit(voltage: NDArray[np.float64], extension: NDArray[np.float64]) -> list[float]:
+    coefficients = np.polyfit(voltage, extension, 2)
+    residual = extension - np.polyval(coefficients, voltage)
+    spread = extension - np.mean(extension)
+    return [*map(float, coefficients), 1.0 - float(residual @ residual) / float(spread @ spread)]
+
+
+def compare_station_limits() -> list[Comparison]:
+    """Tables 17, 18 and 23 and the text's figures beside table I3."""
+    return _compare_table_17() + _compare_table_18() + _compare_text() + _compare_moments()
+
+
+class ThreeElementErrors(NamedTuple):
+    """RMSE of table 2's model against table I3: extension (mm), contraction (mm), force (N)."""
+
+    extension_mm: float
+    contraction_mm: float
+    force_n: float
+
+
+def three_element_errors() -> ThreeElementErrors:
+    """How far table 2's model is from the station's own measurements, at nominal pressures.
+
+    Extension is load over K; contraction is (F_ce - load) / K; force is F_ce - K x contraction.
+    The three repeats of a measurement differ by 0.65 mm.
+
+    Source:
+        Serres 2008, table 2 and section 5.1.1 against table I3.
+    """
+    table = load_table("I3")
+    pressure, load, extension = (
+        table[name] for name in ("pressure_nominal_kpa", "load_n", "extension_mm")
+    )
+    low, high = load_table("2").where(parameter="spring_n_per_mm")["intercept"]
+    falling, rising = load_table("2").where(parameter="spring_n_per_mm")["slope_per_kpa"]
+    below = pressure <= SPRING_SPLIT_KPA
+    spring = np.where(below, low + falling * pressure, high + rising * pressure)
+    slope, intercept = load_table("text").where(section="5.1.1")["printed"]
+    force = slope * pressure + intercept
+    contraction = table["no_load_contraction_mm"] - extension
+    return ThreeElementErrors(
+        rmse(load / spring - extension),
+        rmse((force - load) / spring - contraction),
+        rmse(force - spring * contraction - load),
+    )
+
+
+def _at_load(pressure: str, load: float = 900.0) -> Table:
+    return load_table("I3").where(pressure_nominal_kpa=float(pressure), load_nominal_n=load)
+
+
+def _compare_table_17() -> list[Comparison]:
+    printed = load_table("17").printed
+    names = ("no_load_contraction_mm", "extension_mm", "extension_percent")
+    rows: list[Comparison] = []
+    for row, pressure in enumerate(printed["pressure_kpa"]):
+        cells = _at_load(pressure).printed
+        rows += compare_computed(
+            (STUDY, "17"),
+            [f"{pressure} kPa {name}" for name in names],
+            [printed[name][row] for name in names],
+            _means_at_load,
+            [*cells["no_load_contraction_mm"], *cells["extension_mm"]],
+            "mean of three repeats at 900 N",
+        )
+    return rows
+
+
+def _means_at_load(inputs: NDArray[np.float64]) -> list[float]:
+    contraction, extension = inputs[:3].mean(), inputs[3:].mean()
+    return [contraction, extension, 100.0 * extension / contraction]
+
+
+def _compare_table_18() -> list[Comparison]:
+    printed = load_table("18").printed
+    names = ("v2_m_per_v2", "v1_m_per_v", "v0_m", "r_squared")
+    rows: list[Comparison] = []
+    for row, pressure in enumerate(printed["pressure_kpa"]):
+        data = load_table("I3").where(pressure_nominal_kpa=float(pressure))
+        voltage = data["motor_voltage_v"]
+
+        def compute(extension_mm: NDArray, voltage: NDArray = voltage) -> list[float]:
+            return _fit(voltage, 1e-3 * extension_mm)
+
+        extension = data["extension_mm"]
+        reach = rounding_reach(compute, extension, half_units(data.printed["extension_mm"]))
+        labels = [f"{pressure} kPa {name}" for name in names]
+        texts = [printed[name][row] for name in names]
+        note = "least squares over 36 rows of table I3"
+        rows += compare((STUDY, "18"), labels, texts, compute(extension), reach, note)
+    return rows + _compare_used_quadratics()
+
+
+def _compare_used_quadratics() -> list[Comparison]:
+    """The profiles of 250 kPa were computed with other coefficients than table 18 prints."""
+    printed = load_table("18").printed
+    used = used_quadratics()
+    rows: list[Comparison] = []
+    for pressure, quadratic in printed_quadratics().items():
+        if quadratic != used[pressure]:
+            row = printed["pressure_kpa"].index(str(pressure))
+            labels = [f"{pressure} kPa {name} as used in table I6" for name in Quadratic._fields]
+            texts = [printed[name][row] for name in ("v2_m_per_v2", "v1_m_per_v", "v0_m")]
+            note = "recovered from table I6; table 18 prints the fit of table I3"
+            place = ("voltage profiles", "18")
+            rows += compare(place, labels, texts, list(used[pressure]), note=note)
+    return rows
+
+
+def _compare_text() -> list[Comparison]:
+    text = load_table("text").where(section="5.2.1").printed
+    values: list[float] = []
+    for pressure in ("150", "550"):
+        data = load_table("I3").where(pressure_nominal_kpa=float(pressure))
+        values.append(float(data["no_load_contraction_mm"].mean()))
+    for pressure in ("150", "550"):
+        cells = _at_load(pressure)
+        inputs = np.concatenate([cells["no_load_contraction_mm"], cells["extension_mm"]])
+        values.append(_means_at_load(inputs)[2])
+    note = "contraction: mean of 36 rows of table I3; percent: of the three at 900 N"
+    return compare((STUDY, "text"), text["quantity"], text["printed"], values, note=note)
+
+
+def load_at_rotation(pressure_kpa: float, rotation_deg: float = 90.0) -> float:
+    """Load (N) at which the mean rotation of table I3's repeats reaches an angle.
+
+    Linear between the twelve loads; a lost figure is left out of its mean.
+
+    Args:
+        pressure_kpa: one of table I3's eleven.
+        rotation_deg: within the measured rotations.
+    """
+    data = load_table("I3").where(pressure_nominal_kpa=pressure_kpa)
+    loads = np.unique(data["load_nominal_n"])
+    at_load = [data.where(load_nominal_n=load) for load in loads]
+    rotation = [float(np.nanmean(rows["rotation_deg"])) for rows in at_load]
+    measured = [float(rows["load_n"].mean()) for rows in at_load]
+    return float(np.interp(rotation_deg, rotation, measured))
+
+
+def _compare_moments() -> list[Comparison]:
+    """Table 23 beside load times pulley radius: no one radius gives it."""
+    printed = load_table("23").printed
+    rows: list[Comparison] = []
+    for pressure, moment in zip(printed["pressure_kpa"], printed["moment_nm"], strict=True):
+        load = load_at_rotation(float(pressure))
+        radius_mm = 1e3 * float(moment) / load
+        note = f"load at 90 deg x 25.4 mm; the printed moment would need {radius_mm:.1f} mm"
+        name = f"{pressure} kPa moment (N m)"
+        rows += compare((STUDY, "23"), [name], [moment], [25.4e-3 * load], note=note)
+    return rows

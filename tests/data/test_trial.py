@@ -1,0 +1,110 @@
+import copy
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pma_gym.data.trial import Trial, TrialError
+
+TIME = np.array([0.0, 0.5, 1.0])
+VOLTS = {"motor_voltage": [0.0, 1.0, 2.0]}
+
+
+def trial(**changes):
+    given = {"time": TIME, "commands": VOLTS, "measurements": {"contraction": [0.05, 0.04, 0.06]}}
+    return Trial(**(given | changes))
+
+
+def test_arrays_are_copies_that_nobody_can_change():
+    time = TIME.copy()
+    made = trial(time=time)
+    time[0] = -1.0
+    assert made.time[0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        made.commands["motor_voltage"][0] = 3.0
+    with pytest.raises(TypeError):
+        made.commands["motor_voltage"] = TIME
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        made.time = TIME
+
+
+def test_extension_counts_from_the_first_contraction():
+    made = trial()
+    assert made.zero_contraction == 0.05
+    assert_allclose(made.extension, [0.0, 0.01, -0.01])
+    assert made.duration == 1.0
+    assert len(made) == 3
+
+
+def test_rotation_is_the_measured_one():
+    assert_array_equal(
+        trial(measurements={"rotation": [0.0, np.nan, 2.0]}).rotation, [0, np.nan, 2]
+    )
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.deepcopy, lambda made: pickle.loads(pickle.dumps(made))]
+)
+def test_a_trial_travels_between_processes(duplicate):
+    made = duplicate(trial(truth={"extension": TIME}, provenance={"seed": 7}))
+    assert_array_equal(made.extension, trial().extension)
+    assert_array_equal(made.truth["extension"], TIME)
+    assert dict(made.provenance) == {"seed": "7"}
+    assert not made.time.flags.writeable
+
+
+def test_replacing_a_part_keeps_the_rest():
+    made = dataclasses.replace(trial(), measurements={"load": [1.0, 2.0, 3.0]})
+    assert_array_equal(made.commands["motor_voltage"], VOLTS["motor_voltage"])
+    assert set(made.measurements) == {"load"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"time": []}, r"time must have shape \(n,\) with n at least 1, got \(0,\)"),
+        ({"time": [[0, 1, 2]]}, r"time must have shape \(n,\) .*, got \(1, 3\)"),
+        ({"time": ["a", "b", "c"]}, "time must be an array of numbers"),
+        (
+            {"time": [0.0, 1.0, 1.0]},
+            "time_s must increase strictly, sample 2 has 1.0 s after 1.0 s; sort the rows",
+        ),
+        ({"time": [0.0, np.nan, 1.0]}, "time_s must be a finite number .*, sample 1 has none"),
+        ({"time": [0.0, 1.0, np.inf]}, "time_s must be a finite number .*, sample 2 has inf"),
+        ({"commands": {}}, "needs at least one command, motor_voltage_v or .*pressure_command_kpa"),
+        (
+            {"commands": {"motor_volts": TIME}},
+            r"commands are .*, got 'motor_volts' \(did you mean 'motor_voltage'\?\)",
+        ),
+        ({"commands": {"motor_voltage": [1.0]}}, "as long as time, 3 samples, got 1"),
+        (
+            {"commands": {"motor_voltage": [0.0, 10.5, 11.0]}},
+            "motor_voltage_v must lie in 0-10 V, sample 1 has 10.5; clip the command",
+        ),
+        (
+            {"commands": {"regulator_voltage": [-0.1, 1.0, 1.0]}},
+            "regulator_voltage_v must lie in 0-10 V, sample 0 has -0.1",
+        ),
+        (
+            {"measurements": {"load": [0.0, np.inf, 0.0]}},
+            r"load_n must be finite, sample 1 has inf; leave empty \(NaN\) what was not measured",
+        ),
+        ({"measurements": {"extension": TIME}}, "measurements are contraction, .*'extension'"),
+        ({"truth": {"speed": TIME}}, "truth are .*'speed'"),
+        ({"truth": {"extension": [0, np.inf, 0]}}, "extension must be finite, sample 1 has inf"),
+    ],
+)
+def test_a_trial_refuses(changes, message):
+    with pytest.raises(TrialError, match=message):
+        trial(**changes)
+
+
+def test_extension_needs_a_contraction_at_the_start():
+    with pytest.raises(TrialError, match="has no contraction_mm; it has load_n"):
+        _ = trial(measurements={"load": TIME}).extension
+    with pytest.raises(TrialError, match="contraction_mm is empty at the first sample"):
+        _ = trial(measurements={"contraction": [np.nan, 0.1, 0.1]}).extension
+    with pytest.raises(TrialError, match="has no rotation_deg; it has no measurements"):
+        _ = trial(measurements={}).rotation

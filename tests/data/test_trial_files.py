@@ -1,0 +1,341 @@
+import datetime
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pma_gym.data import trial_files
+from pma_gym.data.trial import COMMANDS, MEASUREMENTS, Trial, TrialError
+from pma_gym.data.trial_files import TrialWarning, read_trial, write_trial
+
+SUFFIXES = [".csv", ".parquet", ".xlsx"]
+GOOD = "time_s,motor_voltage_v,contraction_mm\n0,0,40\n0.5,1,\n1,2,25.3\n"
+
+# What a station can show in SI, nanometres to megapascals, and NaN for a gap.
+magnitude = st.floats(1e-9, 1e7)
+measured = magnitude | magnitude.map(lambda value: -value) | st.sampled_from([0.0, np.nan])
+
+
+@st.composite
+def trials(draw):
+    rows = draw(st.integers(1, 6))
+    steps = draw(arrays(float, rows, elements=st.floats(1e-4, 1e3)))
+    commands = draw(st.sets(st.sampled_from(COMMANDS), min_size=1))
+    volts = st.floats(0, 10) | st.just(np.nan)
+    return Trial(
+        time=np.cumsum(steps),
+        commands={
+            name: draw(arrays(float, rows, elements=volts if "voltage" in name else measured))
+            for name in commands
+        },
+        measurements={
+            name: draw(arrays(float, rows, elements=measured))
+            for name in draw(st.sets(st.sampled_from(MEASUREMENTS)))
+        },
+    )
+
+
+def quantities(trial):
+    return {"time": trial.time, **trial.commands, **trial.measurements}
+
+
+def written(folder, text, name="ramp.csv"):
+    path = folder / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@given(trial=trials())
+def test_what_is_written_is_read_back(suffix, trial):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / f"trial{suffix}"
+        write_trial(trial, path)
+        once = quantities(read_trial(path))
+        assert set(once) == set(quantities(trial))
+        for name, values in quantities(trial).items():
+            # Through mm, kPa, deg (and 16 digits in XLSX) a double may become a neighbour...
+            assert_array_equal(np.isnan(once[name]), np.isnan(values))
+            gap = np.abs(once[name] - values) / np.spacing(np.abs(values))
+            assert np.nanmax(gap, initial=0.0) <= (4 if suffix == ".xlsx" else 1)
+        write_trial(read_trial(path), path)
+        for name, values in quantities(read_trial(path)).items():
+            # ...and then stays what it is.
+            assert_array_equal(values, once[name])
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_the_same_trial_gives_the_same_bytes(suffix, tmp_path):
+    trial = read_trial(written(tmp_path, GOOD))
+    paths = [tmp_path / f"{name}{suffix}" for name in ("a", "b")]
+    for path in paths:
+        write_trial(trial, path)
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_written_log_shows_the_digits_that_were_logged(tmp_path):
+    path = tmp_path / "again.csv"
+    write_trial(read_trial(written(tmp_path, GOOD)), path)
+    assert path.read_text() == (
+        "time_s,motor_voltage_v,contraction_mm\n0.0,0.0,40.0\n0.5,1.0,\n1.0,2.0,25.3\n"
+    )
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".xlsx"])
+def test_provenance_travels_where_the_format_has_room(suffix, tmp_path):
+    path = tmp_path / f"trial{suffix}"
+    notes = {"model": "serres2008", "note": "2 % slack, \u00b11 mm"}
+    write_trial(Trial(np.arange(2.0), {"load_command": [0, 1]}, provenance=notes), path)
+    assert dict(read_trial(path).provenance) == notes
+
+
+def test_a_file_is_read_in_si(tmp_path):
+    text = (
+        "pressure_kpa,time_s,rotation_deg,pressure_command_kpa,contraction_mm,load_n\n"
+        "400,0,0,410,,12\n, 0.5 ,90,420,25,nan\n"
+    )
+    trial = read_trial(written(tmp_path, text))
+    assert_array_equal(trial.time, [0, 0.5])
+    assert_allclose(trial.commands["pressure_command"], [410e3, 420e3])
+    assert_allclose(trial.measurements["pressure"], [400e3, np.nan])
+    assert_allclose(trial.measurements["rotation"], [0, np.pi / 2])
+    assert_allclose(trial.measurements["contraction"], [np.nan, 0.025])
+    assert_array_equal(trial.measurements["load"], [12, np.nan])
+    assert not trial.truth
+
+
+def test_comment_lines_byte_order_mark_and_blank_lines_do_no_harm(tmp_path):
+    text = '\ufeff# a log, from the "old" rig\n# model: none\n' + GOOD + "\n,,\n"
+    assert len(read_trial(written(tmp_path, text))) == 3
+    bad = text.replace("25.3", "wide")
+    with pytest.raises(TrialError, match="row 6 of ramp.csv has 'wide'"):
+        read_trial(written(tmp_path, bad))
+
+
+def test_raw_sensor_volts_are_decoded_by_table_1(tmp_path):
+    volts = [0.0979 * 10 - 0.881, 0.0041 * 500 + 0.0347, 1.02 * 4 + 0.027, 0.0142 * 30 + 0.087]
+    later = [volts[0], volts[1], volts[2], 0.0142 * 75 + 0.087]
+    header = "time_s,motor_voltage_v,lvdt_v,load_cell_v,pressure_transducer_v,potentiometer_v\n"
+    rows = [",".join(map(str, [k, k, *row])) for k, row in enumerate([volts, later])]
+    trial = read_trial(written(tmp_path, header + "\n".join(rows)))
+    assert_allclose(trial.measurements["contraction"], 0.010)
+    assert_allclose(trial.measurements["load"], 500)
+    assert_allclose(trial.measurements["pressure"], 400e3)
+    # The potentiometer's zero is not the trial's.
+    assert_allclose(np.rad2deg(trial.measurements["rotation"]), [0, 45], atol=1e-12)
+
+
+def test_a_labs_own_names_units_and_signs(tmp_path):
+    text = "t [ms],Weg,Motor\n0,60,0\n500,50,819\n"
+    mapping = {
+        "t [ms]": {"name": "time_s", "factor": 1e-3},
+        "Weg": {"name": "contraction_mm", "factor": -1, "offset": 100.0},
+        "Motor": {"name": "motor_voltage_v", "factor": 10 / 4095},
+    }
+    trial = read_trial(written(tmp_path, text), columns=mapping)
+    assert_array_equal(trial.time, [0, 0.5])
+    assert_allclose(trial.measurements["contraction"], [0.040, 0.050])
+    assert_allclose(trial.commands["motor_voltage"], [0, 2])
+    assert len(read_trial(written(tmp_path, GOOD.replace("time_s", "t")), {"t": "time_s"})) == 3
+
+
+def test_unknown_columns_are_named_and_ignored(tmp_path):
+    text = "time_s,load_command_n,contration_mm,phase,\n0,0,1,a,\n1,1,2,b,\n"
+    message = (
+        r"ramp.csv: unknown columns are ignored: "
+        r"'contration_mm' \(did you mean 'contraction_mm'\?\), 'phase'$"
+    )
+    with pytest.warns(TrialWarning, match=message):
+        trial = read_trial(written(tmp_path, text))
+    assert not trial.measurements
+
+
+def test_a_mapped_column_that_is_not_there_is_named(tmp_path):
+    message = r"lacks columns that \[columns\] maps: 'Time_s' \(did you mean 'time_s'\?\)"
+    with pytest.warns(TrialWarning, match=message):
+        read_trial(written(tmp_path, GOOD), {"Time_s": "time_s"})
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "^ramp.csv is empty; a trial needs a header with time_s and a command"),
+        ("\n\n", "ramp.csv is empty"),
+        ("time_s,motor_voltage_v\n", "ramp.csv has a header but no rows; a trial needs"),
+        (
+            "Time_S,motor_voltage_v\n0,1\n",
+            r"no column time_s; its columns are 'Time_S' \(did you mean 'time_s'\?\); rename one",
+        ),
+        ("motor_voltage_v\n0\n", "no column time_s; its columns are motor_voltage_v;"),
+        ("time_s,load_n\n0,1\n", "ramp.csv needs at least one command, motor_voltage_v or"),
+        (
+            GOOD.replace("25.3", "wide"),
+            "contraction_mm must hold numbers, row 4 of ramp.csv has 'wide'; leave the cell empty",
+        ),
+        (GOOD.replace("25.3", "1_000"), "row 4 of ramp.csv has '1_000'"),
+        (
+            GOOD.replace("25.3", '"25,3"'),
+            "row 4 of ramp.csv has '25,3'; write it with a decimal point",
+        ),
+        (
+            GOOD.replace("0.5,1", "10:02:07,1"),
+            "time_s must hold numbers, row 3 .* has '10:02:07'; give seconds since the start",
+        ),
+        (GOOD.replace("0.5,1", ",1"), "time_s must be .* seconds, row 3 of ramp.csv has none"),
+        (
+            GOOD.replace("0.5,1", "1.5,1"),
+            "time_s must increase strictly, row 4 of ramp.csv has 1.0 s after 1.5 s; sort",
+        ),
+        (
+            GOOD.replace("0.5,1", "0.5,12.4"),
+            "^motor_voltage_v must lie in 0-10 V, row 3 of ramp.csv has 12.4; if the log is in "
+            r"raw DAQ counts, give \[columns\] a factor$",
+        ),
+        (GOOD.replace("40", "inf"), "contraction_mm must be finite, row 2 of ramp.csv has inf"),
+        (GOOD.replace("40", "1e999"), "contraction_mm must be finite, row 2 of ramp.csv has inf"),
+        (
+            "time_s,load_command_n,load_n,load_n\n0,1,2,3\n",
+            "ramp.csv has the column 'load_n' twice; rename or remove one",
+        ),
+        (
+            "time_s,load_command_n,load_n,load_cell_v\n0,1,2,3\n",
+            "ramp.csv has load twice, in columns 'load_n' and 'load_cell_v'",
+        ),
+        (
+            "time_s,load_command_n,lvdt_v\n0,1,2048\n",
+            "lvdt_v must lie in -10 to 10 V, row 2 of ramp.csv has 2048.0; .* DAQ counts",
+        ),
+        (
+            GOOD.replace(",", ";"),
+            "ramp.csv separates its columns by semicolons, .* commas .* points in numbers",
+        ),
+        (GOOD.replace(",", "\t"), "ramp.csv separates its columns by tabs"),
+        (GOOD.replace("25.3", "25,3"), "row 4 of ramp.csv has 4 cells, its header has 3; .*comma"),
+        (GOOD[: GOOD.rindex(",2")], "row 4 of ramp.csv has 2 cells, its header has 3; complete"),
+        ("Weg_m\u00e4ssig,time_s\n".encode("latin-1"), r"not UTF-8 text \(byte 5\); save it as"),
+        ('time_s,load_n\n0,"' + "x" * 200_000, "ramp.csv, row 2: .*is it a CSV file"),
+    ],
+)
+def test_a_csv_file_that_cannot_be_used(text, message, tmp_path):
+    with pytest.raises(TrialError, match=message):
+        read_trial(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("mapping", "message"),
+    [
+        ({"a": "tme_s"}, r"'a' must name one of time_s, .*, got 'tme_s' \(did you mean 'time_s'"),
+        ({"a": {"factor": 2.0}}, "'a' must name one of .*, got 'a'"),
+        ({"a": {"name": "load_n", "scale": 2}}, "takes name, factor and offset, got 'scale'"),
+        ({"a": {"name": "load_n", "factor": "2"}}, "'a' factor must be a finite number, got '2'"),
+        ({"a": {"name": "load_n", "offset": np.nan}}, "'a' offset must be a finite number, got na"),
+        ({"a": {"name": "load_n", "factor": 0}}, "'a' factor must not be 0"),
+        ({"a": "contraction_mm"}, "contraction twice, in columns 'contraction_mm' and 'a'"),
+    ],
+)
+def test_a_mapping_that_cannot_be_used(mapping, message, tmp_path):
+    text = GOOD.replace("\n", ",0\n").replace("mm,0", "mm,a")
+    with pytest.raises(TrialError, match=message):
+        read_trial(written(tmp_path, text), mapping)
+
+
+@pytest.mark.parametrize("suffix", [".parquet", ".xlsx"])
+def test_a_damaged_file_is_named(suffix, tmp_path):
+    path = tmp_path / f"trial{suffix}"
+    with pytest.raises(TrialError, match=f"trial{suffix} is empty"):
+        read_trial(written(tmp_path, "", path.name))
+    with pytest.raises(TrialError, match=f"trial{suffix} is not a readable"):
+        read_trial(written(tmp_path, "time_s,load_n\n", path.name))
+    write_trial(Trial(np.arange(3.0), {"load_command": np.arange(3.0)}), path)
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(TrialError, match=f"trial{suffix} is not a readable"):
+        read_trial(path)
+
+
+def test_text_and_dates_in_a_spreadsheet_are_named(tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    for cell, shown in (
+        ("wide", "'wide'"),
+        (datetime.datetime(2008, 1, 1), "datetime"),
+        (True, "T"),
+    ):
+        book = openpyxl.Workbook()
+        for row in (["time_s", "load_command_n", "load_n"], [0, 1, None], [1, 1, cell]):
+            book.active.append(row)
+        book.save(tmp_path / "ramp.xlsx")
+        with pytest.raises(
+            TrialError, match=f"load_n must hold numbers, row 3 of ramp.xlsx has {shown}"
+        ):
+            read_trial(tmp_path / "ramp.xlsx")
+
+
+def test_text_in_parquet_is_named(tmp_path):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    columns = {"time_s": [0, 1], "load_command_n": [1, None], "load_n": ["2", "wide"]}
+    parquet.write_table(pyarrow.table(columns), tmp_path / "ramp.parquet")
+    with pytest.raises(
+        TrialError, match="load_n must hold numbers, row 2 of ramp.parquet has 'wide"
+    ):
+        read_trial(tmp_path / "ramp.parquet")
+
+
+@pytest.mark.parametrize(("suffix", "library"), [(".parquet", "pyarrow"), (".xlsx", "openpyxl")])
+def test_a_missing_library_is_named_with_what_to_install(suffix, library, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, library, None)
+    path = written(tmp_path, "x", f"trial{suffix}")
+    message = rf'{library}, which .* needs, is not installed: pip install "pma-gym\[files\]"'
+    with pytest.raises(TrialError, match=message):
+        read_trial(path)
+    with pytest.raises(TrialError, match=message):
+        write_trial(Trial([0.0], {"load_command": [0.0]}), path)
+    assert path.read_text() == "x"
+
+
+def test_suffixes_and_folders_that_do_not_exist(tmp_path):
+    trial = Trial([0.0], {"load_command": [0.0]})
+    with pytest.raises(TrialError, match=r"ramp.txt must end in .csv, .parquet, .xlsx, got '.txt'"):
+        read_trial(written(tmp_path, GOOD, "ramp.txt"))
+    with pytest.raises(TrialError, match="got 'no suffix'; save it in one of these"):
+        write_trial(trial, tmp_path / "ramp")
+    with pytest.raises(TrialError, match="there is no file .*none.csv; check the name"):
+        read_trial(tmp_path / "none.csv")
+    with pytest.raises(TrialError, match="cannot write .*: there is no folder .*results; name a"):
+        write_trial(trial, tmp_path / "results" / "ramp.csv")
+    (tmp_path / "folder.csv").mkdir()
+    with pytest.raises(TrialError, match="folder.csv is a folder"):
+        write_trial(trial, tmp_path / "folder.csv")
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["folder.csv", "ramp.txt"]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_an_interrupted_write_leaves_the_old_file_and_nothing_else(suffix, tmp_path, monkeypatch):
+    path = tmp_path / f"ramp{suffix}"
+    write_trial(Trial([0.0], {"load_command": [0.0]}), path)
+    before = path.read_bytes()
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(trial_files.os, "replace", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_trial(Trial([0.0], {"load_command": [1.0]}), path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_full_disk_leaves_nothing(tmp_path, monkeypatch):
+    def full(self, content):
+        self.touch()
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space left"):
+        write_trial(Trial([0.0], {"load_command": [0.0]}), tmp_path / "ramp.csv")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,98 @@
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pma_gym.data.serres2008 import load_table, pressures
+from pma_gym.studies.position_voltage import used_quadratics, voltage_from_input
+from pma_gym.studies.recursion import PROFILES, agreeing_rows
+from pma_gym.studies.voltage_profile import (
+    feedforward,
+    profile_model,
+    reachable_mm,
+    voltage_profile,
+)
+
+TABLE_18 = used_quadratics()
+
+
+@pytest.mark.parametrize("table", PROFILES)
+def test_every_row_of_the_printed_profiles_is_reproduced(table):
+    assert agreeing_rows(table).all()
+
+
+def test_842_rows_are_reproduced():
+    assert sum(agreeing_rows(table).sum() for table in PROFILES) == 842
+
+
+@pytest.mark.parametrize("table", PROFILES)
+def test_the_wanted_positions_are_the_printed_ones(table):
+    printed = load_table(table)
+    profile = voltage_profile(str(printed["task"][0]), float(printed["pressure_kpa"][0]))
+    assert profile.time == pytest.approx(printed["time_s"])
+    assert profile.reference == pytest.approx(printed["y_desired_m"], abs=1e-12)
+
+
+@pytest.mark.parametrize("pressure", TABLE_18)
+def test_the_voltage_maps_back_to_its_displacement(pressure):
+    quadratic = TABLE_18[pressure]
+    wanted = np.linspace(max(1e-4, quadratic.constant), quadratic.reach, 50)
+    voltage = voltage_from_input(wanted, quadratic)
+    assert quadratic.displacement(voltage) == pytest.approx(wanted)
+    assert np.all(np.diff(voltage) > 0)
+    assert voltage[0] >= 0
+    assert voltage[-1] <= 10
+
+
+def test_table_18_has_a_dead_zone_from_250_kpa_on_and_ends_at_27_mm_at_150_kpa():
+    for pressure, quadratic in TABLE_18.items():
+        if pressure >= 250:
+            assert 0.38 < voltage_from_input([1e-9], quadratic)[0] < 0.50
+    assert reachable_mm(150) == pytest.approx(27.2, abs=0.05)
+
+
+@pytest.mark.parametrize("pressure", pressures("rotation"))
+def test_the_hold_chatters_by_more_than_half_a_volt(pressure):
+    hold = voltage_profile("rotation", pressure).voltage[25:51]
+    steps = np.diff(hold)
+    assert np.all(steps[1:] * steps[:-1] < 0)
+    assert np.all((np.abs(steps) > 0.58) & (np.abs(steps) < 0.98))
+
+
+@given(st.floats(150, 575))
+def test_a_profile_exists_at_every_pressure_between(pressure):
+    reference = np.linspace(0.0, 0.02, 26)
+    voltage = feedforward(reference, pressure).voltage
+    assert voltage[0] == 0
+    assert np.all((voltage >= 0) & (voltage <= 10))
+
+
+@given(st.floats(150, 575), st.sampled_from([0.05, 0.1, 0.25]))
+def test_a_profile_exists_at_other_sample_times(pressure, period):
+    time = np.arange(0, 5, period)
+    voltage = feedforward(0.004 * time, pressure, period).voltage
+    assert np.all((voltage >= 0) & (voltage <= 10))
+
+
+def test_the_model_is_linear_between_the_pressures():
+    low, middle, high = (profile_model(pressure) for pressure in (300, 325, 350))
+    assert middle.muscle_rate == pytest.approx((low.muscle_rate + high.muscle_rate) / 2)
+    mean = (np.array(low.quadratic) + np.array(high.quadratic)) / 2
+    assert middle.quadratic == pytest.approx(mean)
+
+
+def test_beyond_the_map_the_error_names_what_can_be_reached():
+    with pytest.raises(ValueError, match=r"150 kPa: displacement must lie in 0-27\.2\d mm"):
+        feedforward(np.linspace(0, 0.04, 26), 150)
+    with pytest.raises(
+        ValueError, match="reference itself needs only 24.99 mm.*longer sample_time"
+    ):
+        feedforward(np.arange(0, 0.025, 1e-5), 150, 0.002)
+    with pytest.raises(ValueError, match="150-575 kPa.*got 600"):
+        feedforward([0.0], 600)
+    with pytest.raises(ValueError, match="150-575 kPa.*got nan"):
+        profile_model(float("nan"))
+    with pytest.raises(ValueError, match="displacement must lie in"):
+        voltage_from_input([np.nan], TABLE_18[300])
+    with pytest.raises(KeyError, match="displacement, rotation"):
+        voltage_profile("pull", 300)
