@@ -1,16 +1,28 @@
 """The catalogue: every phenomenon that a plant can have, one file each."""
 
 from pma_gym.effects.cable import CABLE
+from pma_gym.effects.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.coulomb_friction import COULOMB_FRICTION
-from pma_gym.effects.damping import DAMPING
+from pma_gym.effects.damping import DAMPING, SYMMETRIC_DAMPING
 from pma_gym.effects.drive import DRIVE
 from pma_gym.effects.effect import Effect
+from pma_gym.effects.geometric_force import (
+    CALDWELL_FORCE,
+    CHOU_HANNAFORD_FORCE,
+    SCHULTE_FORCE,
+    SCHULZ_FORCE,
+    TONDU_LOPEZ_FORCE,
+)
 from pma_gym.effects.hysteresis import HYSTERESIS
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.position_map import POSITION_MAP
+from pma_gym.effects.pressure_curvature import PRESSURE_CURVATURE
 from pma_gym.effects.regulator import REGULATOR_LAG, REGULATOR_LINE
+from pma_gym.effects.regulator_asymmetry import REGULATOR_ASYMMETRY
+from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.rotor import ROTOR
+from pma_gym.effects.sarosi import SAROSI_FORCE
 from pma_gym.effects.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
 from pma_gym.effects.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.slide import SLIDE
@@ -21,7 +33,18 @@ CATALOGUE: dict[str, Effect] = {
     for effect in (
         CONTRACTILE_FORCE,
         STIFFNESS,
+        SAROSI_FORCE,
+        SCHULTE_FORCE,
+        SCHULZ_FORCE,
+        CHOU_HANNAFORD_FORCE,
+        CALDWELL_FORCE,
+        TONDU_LOPEZ_FORCE,
+        COLBRUNN_SPRING,
+        REPPERGER_SPRING,
+        PRESSURE_CURVATURE,
         DAMPING,
+        SYMMETRIC_DAMPING,
+        REPPERGER_DAMPING,
         HYSTERESIS,
         COULOMB_FRICTION,
         CABLE,
@@ -30,6 +53,7 @@ CATALOGUE: dict[str, Effect] = {
         SLIDE,
         REGULATOR_LINE,
         REGULATOR_LAG,
+        REGULATOR_ASYMMETRY,
         POSITION_MAP,
         SERVO,
         SERVO_INERTIA,

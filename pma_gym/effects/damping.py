@@ -1,8 +1,8 @@
-"""Viscous damping of the muscle, by direction of motion and pressure."""
+"""Viscous damping of the muscle: by direction of motion, or the same both ways."""
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import where
+from pma_gym.effects.arithmetic import positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -49,4 +49,41 @@ DAMPING = Effect(
     parameters=Damping,
     law=damping,
     signature="force proportional to speed, another factor in each direction",
+)
+
+
+class SymmetricDamping(NamedTuple):
+    """Parameters of `symmetric_damping`."""
+
+    intercept: Annotated[
+        float, Quantity("N s/mm", -20, 20, "fitted to Serres 2008, tables I2 and I3", 0.0)
+    ]
+    slope: Annotated[
+        float, Quantity("N s/mm/kPa", -0.1, 0.1, "fitted to Serres 2008, tables I2 and I3", 0.0)
+    ]
+
+
+def symmetric_damping(pressure, p):
+    """Damping coefficient B, the same in both directions; the force is -B x'.
+
+        B = max(0, intercept + slope P)
+
+    Args:
+        pressure: gauge pressure P (Pa).
+        p: SymmetricDamping: intercept (N s/m), slope (N s/m/Pa).
+    Returns:
+        Coefficient (N s/m), not negative.
+    Source:
+        Ours: once the regulator fills and vents at paces of its own, the pressure steps of Serres
+        2008, table I2, do not ask for a damping that depends on direction.
+    """
+    return positive(p.intercept + p.slope * pressure)
+
+
+SYMMETRIC_DAMPING = Effect(
+    name="symmetric_damping",
+    port="muscle_damping",
+    parameters=SymmetricDamping,
+    law=symmetric_damping,
+    signature="force proportional to speed, the same both ways",
 )

@@ -31,9 +31,9 @@ STRAIGHT = 1e-8
 """Square of the diameter (m^2) below which a braid counts as pulled straight: 0.1 mm."""
 
 _FIT = "least-squares fit to Serres 2008, table I3, 200-575 kPa"
-_SCALE = Quantity("1", 0, 10, "1 is the published law; less where a muscle gives less", 0.0)
-_LENGTH = Quantity("mm", 1, 5000, "Serres 2008, 2.1.2.1: 250")
-_DIAMETER = Quantity("mm", 0.1, 500, "Serres 2008, 2.1.2.1: 20 (inner)")
+_SCALE = Quantity("1", 0, 2, "1 is the published law; less where a muscle gives less", 0.0)
+_LENGTH = Quantity("mm", 10, 1000, "Serres 2008, 2.1.2.1: 250")
+_DIAMETER = Quantity("mm", 1, 100, "Serres 2008, 2.1.2.1: 20 (inner)")
 
 
 class SchulteForce(NamedTuple):
@@ -42,7 +42,7 @@ class SchulteForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.01, 1000, f"{_FIT}: 2.085 (27.7 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)")]
 
 
 def schulte_force(pressure, contraction, p):
@@ -75,7 +75,7 @@ class SchulzForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.01, 1000, f"{_FIT}: 1.780 (24.1 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 1.780 (24.1 deg at rest)")]
     elasticity: Annotated[
         float, Quantity("N/mm", 0, 1000, f"{_FIT}: 3.348; modulus of the tube times its wall")
     ]
@@ -132,11 +132,11 @@ class ChouHannafordForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[
-        float, Quantity("mm", 0.1, 500, "of the braid: inner diameter 20 + 2 thickness = 22")
+        float, Quantity("mm", 1, 100, "of the braid: inner diameter 20 + 2 thickness = 22")
     ]
-    turns: Annotated[float, Quantity("1", 0.01, 1000, f"{_FIT}: 2.012 (29.1 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.012 (29.1 deg at rest)")]
     thickness: Annotated[
-        float, Quantity("mm", 0, 50, f"assumption: 1 (braid and tube); {_FIT} would have 0")
+        float, Quantity("mm", 0, 10, f"assumption: 1 (braid and tube); {_FIT} would have 0")
     ]
 
 
@@ -175,9 +175,9 @@ class CaldwellForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.01, 1000, f"{_FIT}: 2.085 (27.7 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)")]
     cap_diameter: Annotated[
-        float, Quantity("mm", 0, 500, "assumption: 20, plugs as wide as the resting tube", 0.0)
+        float, Quantity("mm", 0, 100, "assumption: 20, plugs as wide as the resting tube", 0.0)
     ]
 
 
@@ -196,7 +196,7 @@ def caldwell_force(pressure, contraction, p):
     Returns:
         Force (N); positive shortens the muscle.
     Source:
-        1. D. G. Caldwell and others 2000; Serres 2008, Eq. 4a-4c.
+        1. N. Tsagarakis and D. G. Caldwell 2000; Serres 2008, Eq. 4a-4c.
         2. Turns fitted to Serres 2008, table I3, 200-575 kPa: 131.0 N rms.
     """
     length = p.resting_length - contraction
@@ -214,7 +214,7 @@ class TonduLopezForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.01, 1000, f"{_FIT}: 1.881 (25.3 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 1.881 (25.3 deg at rest)")]
     end_factor: Annotated[
         float, Quantity("1", 0, 5, f"{_FIT}: 1.442; 1 for a cylinder, somewhat more in practice")
     ]

@@ -39,18 +39,20 @@ def commanded_pressure(regulator_voltage, p):
     return positive(p.gain * regulator_voltage + p.offset)
 
 
-def regulator_rate(pressure_command, p):
+def regulator_rate(pressure_command, regulator_pace, p):
     """Rate of the pressure: tau P' = P_command - P.
 
     Args:
         pressure_command: gauge pressure asked for (Pa).
+        regulator_pace: factor on the time constant, 1 unless an effect changes it.
         p: RegulatorLag: time_constant tau (s).
     Returns:
         (source, decay) with P' = source - decay * P.
     Source:
         First order is our reading of the response time in Serres 2008, section 2.1.2.3.
     """
-    return pressure_command / p.time_constant, 1.0 / p.time_constant
+    time_constant = p.time_constant * regulator_pace
+    return pressure_command / time_constant, 1.0 / time_constant
 
 
 REGULATOR_LINE = Effect("regulator_line", "regulator_line", RegulatorLine, commanded_pressure)

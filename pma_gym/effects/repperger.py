@@ -33,8 +33,9 @@ def repperger_spring(pressure, contraction, p):
 
         F = -K x,   K = stiffness + linear x + quadratic x^2 + stiffening P
 
-    Departure: the source's K has no pressure in it, being fitted at one. With stiffening at 0 the
-    law is the source's; the term is that of its successor [2].
+    Departure: Serres 2008 says that K is a function of position and prints no formula, and the
+    source was not open to us; the second degree is our choice. The source's K has no pressure in
+    it: that is stiffening at 0. The term is that of its successor [2].
 
     Args:
         pressure: gauge pressure P (Pa).
@@ -77,8 +78,9 @@ def repperger_damping(pressure, velocity, p):
     The velocity counts with its sign, so that a contracting muscle is damped more than a relaxing
     one, as filling differs from venting.
 
-    Departure: the source's polynomial in velocity is cut after the first power, beyond which
-    Serres 2008, table I2 says nothing; the pressure is that of [2].
+    Departure: Serres 2008 says that B is a function of velocity and prints no formula, and the
+    source was not open to us; the line is our choice, beyond which Serres 2008, table I2 says
+    nothing. The pressure is that of [2].
 
     Args:
         pressure: gauge pressure P (Pa).

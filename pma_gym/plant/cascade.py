@@ -20,6 +20,7 @@ PORTS: dict[str, str] = {
     "servo_inertia": "none or one: acceleration of the motor's displacement",
     "regulator_line": "one: pressure that the regulator settles at (Pa)",
     "regulator_lag": "one: rate of the pressure",
+    "regulator_pace": "any number, multiplied: factor on the regulator's time constant",
 }
 """Ports of the cascade: how many effects each takes, and what becomes of their results."""
 
@@ -40,6 +41,7 @@ def write_equations(equations: Equations) -> None:
     let = equations.let
     equations.functions.append(spring_stiffness)
     let("pressure_command", equations.one("regulator_line"))
+    let("regulator_pace", equations.product("regulator_pace"))
     let("displacement_input", equations.one("position_map"))
     let("muscle_stiffness", "spring_stiffness(pressure, p_stiffness)")
     let("no_load", "contractile_force(pressure, p_contractile_force) / muscle_stiffness")

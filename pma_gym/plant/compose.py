@@ -57,6 +57,11 @@ class Equations:
         terms = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
         return " + ".join(terms) or "0.0"
 
+    def product(self, port: str) -> str:
+        """The text of the product over the effects at a port."""
+        factors = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
+        return " * ".join(factors) or "1.0"
+
     def let(self, name: str, expression: str) -> None:
         """Add an assignment."""
         self.lines.append(f"{name} = {expression}")

@@ -65,6 +65,11 @@ class Model:
         object.__setattr__(self, "notes", MappingProxyType(dict(self.notes)))
         _check_ports(self)
 
+    def __reduce__(self) -> tuple[type["Model"], tuple[object, ...]]:
+        """Copy and send to other processes by construction: a read-only mapping cannot be."""
+        groups = (dict(self.parameters), dict(self.notes))
+        return Model, (self.name, self.title, self.plant, *groups)
+
     @property
     def effects(self) -> dict[str, Effect]:
         """The model's effects by name, in catalogue order."""

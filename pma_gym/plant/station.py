@@ -18,6 +18,7 @@ PORTS: dict[str, str] = {
     "drive": "one: load that the drive asks for (N)",
     "regulator_line": "one: pressure that the regulator settles at (Pa)",
     "regulator_lag": "one: rate of the pressure",
+    "regulator_pace": "any number, multiplied: factor on the regulator's time constant",
 }
 """Ports of the station: how many effects each takes, and what becomes of their results."""
 
@@ -37,6 +38,7 @@ def write_equations(equations: Equations) -> None:
     let = equations.let
     let("load_command", equations.one("drive"))
     let("pressure_command", equations.one("regulator_line"))
+    let("regulator_pace", equations.product("regulator_pace"))
     let("stretch", "p_rotor.radius * angle + contraction - zero_contraction")
     let("stretch_rate", "p_rotor.radius * spin + velocity")
     let("cable_tension", equations.one("cable"))
