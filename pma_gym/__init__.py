@@ -1,0 +1,9 @@
+"""pma-gym: an open test bench for the control of pneumatic muscles."""
+
+from pma_gym.data.trial import Trial
+from pma_gym.envs import ENVIRONMENTS, PMAEnv
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.plant import Plant
+
+__version__ = "0.1.0"
+__all__ = ["ENVIRONMENTS", "Model", "PMAEnv", "Plant", "Trial", "load_model"]

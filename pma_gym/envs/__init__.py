@@ -1,0 +1,20 @@
+"""Gymnasium environments; importing this registers them."""
+
+import gymnasium as gym
+
+from pma_gym.envs.knowledge import Reading, Station
+from pma_gym.envs.options import Options
+from pma_gym.envs.pma_env import PMAEnv
+
+ENVIRONMENTS = {
+    "pma_gym/IsokineticDisplacement-v0": "displacement",
+    "pma_gym/IsokineticRotation-v0": "rotation",
+}
+"""Registered environments, and the task of each."""
+
+for _name, _task in ENVIRONMENTS.items():
+    # An id stays as it was registered: a user's own entry under it, or a second import's.
+    if _name not in gym.registry:
+        gym.register(_name, entry_point="pma_gym.envs.pma_env:PMAEnv", kwargs={"task": _task})
+
+__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "Reading", "Station"]

@@ -1,0 +1,42 @@
+"""What a controller may know: the station before a trial, the sensors' readings during it."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
+
+
+@dataclass(frozen=True)
+class Station:
+    """What a controller may know of the station before a trial.
+
+    Attributes:
+        model: the nominal model, also where the plant's own is drawn anew at every reset.
+        task: the task, with its protocol.
+        pressure: gauge pressure that the trial begins at (Pa).
+        period: time of a control step (s).
+    """
+
+    model: Model
+    task: Task
+    pressure: float
+    period: float
+
+
+class Reading(NamedTuple):
+    """What the sensors said at one instant, in SI; extension and rotation from their zeros.
+
+    Attributes:
+        time: when it was taken, since the trial began (s).
+        extension: how far the muscle was pulled out of its no-load contraction (m).
+        rotation: pulley angle (rad).
+        load: cable tension (N).
+        pressure: gauge pressure (Pa).
+    """
+
+    time: float
+    extension: float
+    rotation: float
+    load: float
+    pressure: float

@@ -1,0 +1,117 @@
+"""What the agent sees: one table of entries, which packs, describes and bounds the observation."""
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from pma_gym.envs.knowledge import Reading
+from pma_gym.envs.options import Options
+from pma_gym.tasks import TASKS, Task
+from pma_gym.units import SI_FACTORS
+
+BOUND = 5.0
+"""Entries are clipped to +-5; all but runaway states stay within +-2."""
+
+EXTENSION_SCALE = TASKS["displacement"].protocol.span
+ROTATION_SCALE = TASKS["rotation"].protocol.span
+LOAD_SCALE = 1000.0
+PRESSURE_SCALE = 600e3
+"""What 1.0 stands for (m, rad, N, Pa)."""
+
+
+class ObservationTable:
+    """Entries of the observation for a task and options.
+
+    Args:
+        task: the task.
+        options: the environment's options.
+
+    Attributes:
+        rows: (entry, what 1.0 stands for) in order.
+        space: the observation space.
+        references: reference (m or rad) at every control step, and `preview` steps past the end.
+    """
+
+    def __init__(self, task: Task, options: Options) -> None:
+        """List the entries, and evaluate the reference at every step once."""
+        protocol = task.protocol
+        last = task.steps(options.control_rate_hz) + options.preview
+        self.references = protocol.reference(np.arange(last + 1) * options.period).tolist()
+        self.rows = _rows(task, options)
+        self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
+        self._span = protocol.span
+        self._scaled = [reference / protocol.span for reference in self.references]
+        self._preview = options.preview
+        self._position = Reading._fields.index(protocol.quantity)
+
+    def describe(self) -> str:
+        """The table of entries as text.
+
+        >>> print(ObservationTable(TASKS["displacement"], Options(preview=1)).describe())
+        0  measured extension                      1.0 = 25 mm
+        1  measured rotation                       1.0 = 90 deg
+        2  measured load                           1.0 = 1000 N
+        3  measured pressure                       1.0 = 600 kPa
+        4  reference now                           1.0 = 25 mm
+        5  reference now less measured position    1.0 = 25 mm
+        6  reference 1 control step ahead          1.0 = 25 mm
+        7  last motor action                       1.0 = 10 V, -1.0 = 0 V
+        """
+        width = max(len(name) for name, _ in self.rows) + 4
+        digits = len(str(len(self.rows) - 1))
+        return "\n".join(
+            f"{i:{digits}}  {name:<{width}}1.0 = {unit}" for i, (name, unit) in enumerate(self.rows)
+        )
+
+    def pack(
+        self, step: int, reading: Reading, action: Sequence[float], earlier: Iterable[Reading]
+    ) -> NDArray[np.float32]:
+        """The observation.
+
+        Args:
+            step: control steps since the trial began.
+            reading: what the sensors say.
+            action: the last action, -1 to 1.
+            earlier: readings heard before, latest first.
+        Returns:
+            Array of shape (entries,), a new one each time.
+        """
+        at, span = self._position, self._span
+        reference, *ahead = self._scaled[step : step + self._preview + 1]
+        entries = [
+            reading.extension / EXTENSION_SCALE,
+            reading.rotation / ROTATION_SCALE,
+            reading.load / LOAD_SCALE,
+            reading.pressure / PRESSURE_SCALE,
+            reference,
+            reference - reading[at] / span,
+            *ahead,
+            *action,
+            *(past[at] / span for past in earlier),
+        ]
+        packed = np.array(entries, dtype=np.float32)
+        return packed.clip(-BOUND, BOUND, out=packed)
+
+
+def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
+    unit = task.protocol.unit
+    span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
+    volts = "10 V, -1.0 = 0 V"
+    return [
+        ("measured extension", "25 mm"),
+        ("measured rotation", "90 deg"),
+        ("measured load", "1000 N"),
+        ("measured pressure", "600 kPa"),
+        ("reference now", span),
+        ("reference now less measured position", span),
+        *((f"reference {_steps(k)} ahead", span) for k in range(1, options.preview + 1)),
+        ("last motor action", volts),
+        *([("last regulator action", volts)] if options.regulator_action else []),
+        *((f"position heard {_steps(k)} before", span) for k in range(1, options.history + 1)),
+    ]
+
+
+def _steps(count: int) -> str:
+    return f"{count} control step{'s' if count > 1 else ''}"

@@ -1,0 +1,186 @@
+"""The environments' options: checked once, with errors that say how to mend them."""
+
+import difflib
+import numbers
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, TypeGuard
+
+from pma_gym.plant.model import Model
+from pma_gym.tasks import RANDOMISATIONS, REWARDS, TASKS, Task
+
+LOWEST_PRESSURE_KPA = 150.0
+HIGHEST_PRESSURE_KPA = 575.0
+"""Pressures at which the station was ever shown (kPa): table I3."""
+
+
+Pressure = float | Sequence[float] | str
+"""Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Keyword arguments of the environments; each survives JSON (a model as a name or path).
+
+    Attributes:
+        pressure_kpa: gauge pressure of the episodes (kPa): a number, a list to draw from, or
+            "random" for any pressure of the task's trials.
+        model: name of a shipped model, path of a TOML file, or a Model.
+        control_rate_hz: control steps a second (Hz).
+        preview: how many future references the observation holds, one a control step.
+        noise: sensor noise and quantisation; the sensors' lag stays either way.
+        action_delay_s: how late an action reaches the drive (s), whole control steps.
+        observation_delay_s: how late the sensors are heard (s), whole control steps.
+        history: how many earlier readings of the position the observation holds.
+        reward: name of a reward in `pma_gym.tasks.REWARDS`.
+        randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`.
+        regulator_action: whether a second action commands the regulator (0-10 V).
+    """
+
+    pressure_kpa: Pressure = "random"
+    model: str | Path | Model = "station"
+    control_rate_hz: float = 100.0
+    preview: int = 0
+    noise: bool = True
+    action_delay_s: float = 0.0
+    observation_delay_s: float = 0.0
+    history: int = 0
+    reward: str = "absolute"
+    randomisation: str = "none"
+    regulator_action: bool = False
+
+    @property
+    def period(self) -> float:
+        """Time of a control step (s)."""
+        return 1.0 / self.control_rate_hz
+
+    @property
+    def action_delay(self) -> int:
+        """How late an action reaches the drive, in control steps."""
+        return round(self.action_delay_s * self.control_rate_hz)
+
+    @property
+    def observation_delay(self) -> int:
+        """How late the sensors are heard, in control steps."""
+        return round(self.observation_delay_s * self.control_rate_hz)
+
+
+def parse_options(given: Mapping[str, Any]) -> Options:
+    """Checked options from keyword arguments.
+
+    Raises:
+        TypeError: an unknown keyword, with the nearest known one.
+        ValueError: a value that is out of range or of the wrong kind.
+    """
+    check_known("option", given, [field.name for field in fields(Options)])
+    options = Options(**given)
+    _check_model(options.model)
+    _check_rate_and_delays(options)
+    for name in ("preview", "history"):
+        _check_whole(name, getattr(options, name))
+    for name in ("noise", "regulator_action"):
+        if not isinstance(getattr(options, name), bool):
+            raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
+    check_named("reward", options.reward, REWARDS)
+    check_named("randomisation", options.randomisation, RANDOMISATIONS)
+    check_pressure(options.pressure_kpa)
+    return options
+
+
+def parse_task(name: str) -> Task:
+    """The task of a name.
+
+    Raises:
+        ValueError: an unknown name, with the nearest known one.
+    """
+    check_named("task", name, TASKS)
+    return TASKS[name]
+
+
+def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
+    """Refuse names that nobody knows.
+
+    Raises:
+        TypeError: the first unknown name, the nearest known one, and all known.
+    """
+    for name in given:
+        if name not in known:
+            raise TypeError(
+                f"unknown {what} {name!r}{_nearest(name, known)}; known: {', '.join(known)}"
+            )
+
+
+def check_named(what: str, value: object, known: Iterable[str]) -> None:
+    """Refuse a value that is none of the known names.
+
+    Raises:
+        ValueError: what it is, the known names, what came and the nearest known name.
+    """
+    names = list(known)
+    if not isinstance(value, str) or value not in names:
+        raise ValueError(
+            f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
+        )
+
+
+def check_pressure(pressure: object) -> None:
+    """Refuse a pressure that the station was never shown at.
+
+    Raises:
+        ValueError: names the range, the unit and what came.
+    """
+    if isinstance(pressure, str) and pressure == "random":
+        return
+    several = pressure if isinstance(pressure, list | tuple) else [pressure]
+    if not several or not all(map(_is_real, several)):
+        raise ValueError(
+            f'pressure_kpa must be a number in kPa, a list of numbers or "random", got {pressure!r}'
+        )
+    for one in several:
+        _check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
+
+
+def _check_model(model: object) -> None:
+    if not isinstance(model, str | Path | Model):
+        raise ValueError(
+            f"model must be a shipped model's name, the path of a .toml file or a Model, "
+            f"got {model!r}"
+        )
+
+
+def _check_rate_and_delays(options: Options) -> None:
+    _check_number("control_rate_hz", options.control_rate_hz, 1.0, 10000.0, "Hz")
+    for name in ("action_delay_s", "observation_delay_s"):
+        delay = getattr(options, name)
+        _check_number(name, delay, 0.0, 1.0, "s")
+        steps = delay * options.control_rate_hz
+        if abs(steps - round(steps)) > 1e-6:
+            raise ValueError(
+                f"{name} must be a whole number of control steps of {options.period:g} s, "
+                f"got {delay:g} s = {steps:g} steps; change it or control_rate_hz"
+            )
+
+
+def _check_whole(name: str, value: object) -> None:
+    if not _is_whole(value) or not 0 <= value <= 1000:
+        raise ValueError(f"{name} must be a whole number of control steps in 0-1000, got {value!r}")
+
+
+def _check_number(name: str, value: object, lower: float, upper: float, unit: str) -> None:
+    # `not <=`: NaN is out of every range.
+    if not _is_real(value) or not lower <= value <= upper:
+        raise ValueError(f"{name} must be a number in {lower:g}-{upper:g} {unit}, got {value!r}")
+
+
+def _is_real(value: object) -> TypeGuard[float]:
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def _is_whole(value: object) -> TypeGuard[int]:
+    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
+
+
+def _nearest(name: object, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(str(name).lower(), known, n=1, cutoff=0.5)
+    return f" (did you mean {close[0]!r}?)" if close else ""

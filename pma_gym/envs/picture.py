@@ -1,0 +1,116 @@
+"""A picture of the station at work: the rig on the left, the trial so far on the right.
+
+The only importer of matplotlib in the environments; `PMAEnv.render` imports it when first needed.
+What never changes is drawn once; each picture restores it and draws what moves on top.
+"""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pma_gym.envs.rig_drawing import FAINT, INK, REFERENCE, RigDrawing
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.tasks import Task
+from pma_gym.units import SI_FACTORS
+
+if TYPE_CHECKING:
+    from pma_gym.envs.pma_env import PMAEnv
+
+WIDTH, HEIGHT, DPI = 800, 400, 100
+ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
+STRIDE = 4
+"""Of the samples at 384 Hz one in four is drawn: more than there are pixels."""
+
+
+class Picture:
+    """Draws an environment again and again.
+
+    Args:
+        task: the task, which says what the plot's axes are.
+    """
+
+    def __init__(self, task: Task) -> None:
+        """Draw what never changes."""
+        self._factor = SI_FACTORS[task.protocol.unit]
+        self._figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI, facecolor="white")
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._rig = RigDrawing(self._figure.add_axes((0.0, 0.0, 0.47, 1.0)), task)
+        self._moving: list[tuple[Axes, Artist]] = [(self._rig.axes, a) for a in self._rig.moving]
+        self._add_position_plot(task)
+        self._add_voltage_plot(task)
+        for _, artist in self._moving:
+            artist.set_animated(True)
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def draw(self, env: "PMAEnv") -> NDArray[np.uint8]:
+        """The picture now.
+
+        Args:
+            env: an environment of the task, in or after an episode.
+        Returns:
+            RGB of shape (400, 800, 3), a new array each time.
+        """
+        self._rig.update(env)
+        position = env.trajectory()[::STRIDE] / self._factor
+        self._actual.set_data(np.arange(len(position)) * STRIDE / SAMPLE_RATE_HZ, position)
+        self._now.set_data([env.time], [env.truth[env.task.protocol.quantity] / self._factor])
+        held = np.append(env.motor_voltages, env.motor_voltages[-1:])
+        self._volts.set_data(np.arange(len(held)) * env.options.period, held)
+        self._canvas.restore_region(self._still)
+        for axes, artist in self._moving:
+            axes.draw_artist(artist)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _add_position_plot(self, task: Task) -> None:
+        protocol = task.protocol
+        axes = self._plot((0.545, 0.46, 0.435, 0.44), task)
+        time = np.linspace(0.0, protocol.duration, 301)
+        axes.plot(
+            time,
+            protocol.reference(time) / self._factor,
+            "--",
+            color=REFERENCE,
+            lw=1.4,
+            label="reference",
+        )
+        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
+        (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
+        axes.set_ylim(-0.12 * protocol.span / self._factor, 1.2 * protocol.span / self._factor)
+        axes.set_ylabel(f"{protocol.quantity} ({protocol.unit})")
+        axes.tick_params(labelbottom=False)
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=2,
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+            borderaxespad=0.1,
+        )
+        self._moving += [(axes, self._actual), (axes, self._now)]
+
+    def _add_voltage_plot(self, task: Task) -> None:
+        axes = self._plot((0.545, 0.13, 0.435, 0.27), task)
+        axes.set_ylim(-0.5, 10.5)
+        axes.set_yticks([0, 5, 10])
+        axes.set_ylabel("motor (V)")
+        axes.set_xlabel("time (s)")
+        (self._volts,) = axes.plot([], [], color=VOLTAGE, lw=1.2, drawstyle="steps-post")
+        self._moving.append((axes, self._volts))
+
+    def _plot(self, place: tuple[float, float, float, float], task: Task) -> Axes:
+        axes = self._figure.add_axes(place)
+        axes.set_xlim(0.0, 1.01 * task.protocol.duration)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.spines[["left", "bottom"]].set_color(FAINT)
+        axes.tick_params(labelsize=8, color=FAINT, labelcolor=INK)
+        axes.grid(color=FAINT, lw=0.5, alpha=0.6)
+        axes.xaxis.label.set(size=8, color=INK)
+        axes.yaxis.label.set(size=8, color=INK)
+        return axes

@@ -1,0 +1,158 @@
+"""Bad input: each error names the thing, the rule, the unit, what came and the mend."""
+
+import re
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAEnv
+
+
+def refused(error: type[Exception], *words: str, **options) -> None:
+    """The environment refuses options, and says all of these words."""
+    with pytest.raises(error) as caught:
+        PMAEnv(**({"model": "serres2008"} | options))
+    for word in words:
+        assert word in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("action", "words"),
+    [
+        (0.3, ["shape (1,)", "motor voltage", "-1 to 1 for 0 to 10 V", "shape ()", "[0.0]"]),
+        ([0.1, 0.2], ["shape (1,)", "got shape (2,)", "[0.1, 0.2]"]),
+        (np.zeros((1, 1)), ["got shape (1, 1)"]),
+        ([np.nan], ["finite", "[nan]", "diverged"]),
+        ([np.inf], ["finite", "[inf]"]),
+        (["fast"], ["shape (1,)", "['fast']"]),
+        (None, ["shape (1,)", "None"]),
+        ([[1.0], [1.0, 2.0]], ["shape (1,)", "[[1.0], [1.0, 2.0]]"]),
+    ],
+)
+def test_bad_actions_are_refused_and_change_nothing(make, action, words):
+    env = make()
+    env.reset(seed=0)
+    env.step(env.action(1.0))
+    state, time = env.condition.state.copy(), env.time
+    with pytest.raises(ValueError) as caught:
+        env.step(action)
+    for word in ("action", *words):
+        assert word in str(caught.value)
+    np.testing.assert_array_equal(env.condition.state, state)
+    assert env.time == time
+    env.step(env.action(1.0))
+
+
+def test_two_actions_are_named(make):
+    env = make(regulator_action=True)
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"shape \(2,\): motor voltage, regulator voltage"):
+        env.step(np.zeros(1))
+
+
+def test_unknown_options_are_refused_with_the_nearest():
+    refused(
+        TypeError, "unknown option 'presure_kpa'", "did you mean 'pressure_kpa'?", presure_kpa=1
+    )
+    refused(TypeError, "unknown option 'zzz'", "known: pressure_kpa, model", zzz=1)
+
+
+@pytest.mark.parametrize("pressure", [149.9, 576, float("nan"), [300, 700.0]])
+def test_pressures_out_of_range_are_refused(pressure):
+    bad = pressure[1] if isinstance(pressure, list) else pressure
+    refused(ValueError, "pressure_kpa", "150-575 kPa", f"got {bad!r}", pressure_kpa=pressure)
+
+
+@pytest.mark.parametrize("pressure", ["high", [], None, [300, "random"], True, {"kpa": 3}])
+def test_pressures_of_the_wrong_kind_are_refused(pressure):
+    refused(
+        ValueError, "pressure_kpa must be a number in kPa, a list of numbers or \"random\"",
+        f"got {pressure!r}", pressure_kpa=pressure,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("rate", [0, -100.0, 20000.0, "100", None, True, float("inf")])
+def test_bad_control_rates_are_refused(rate):
+    refused(ValueError, "control_rate_hz", "1-10000 Hz", f"got {rate!r}", control_rate_hz=rate)
+
+
+@pytest.mark.parametrize("name", ["action_delay_s", "observation_delay_s"])
+def test_bad_delays_are_refused(name):
+    refused(ValueError, name, "0-1 s", "got -0.1", **{name: -0.1})
+    refused(ValueError, name, "0-1 s", "got '10 ms'", **{name: "10 ms"})
+    refused(
+        ValueError, name, "whole number of control steps of 0.01 s", "0.015 s = 1.5 steps",
+        "change it or control_rate_hz", **{name: 0.015},
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["preview", "history"])
+@pytest.mark.parametrize("value", [-1, 1.5, 1001, "3", True])
+def test_bad_counts_are_refused(name, value):
+    refused(
+        ValueError, name, "whole number of control steps in 0-1000", repr(value), **{name: value}
+    )
+
+
+@pytest.mark.parametrize("name", ["noise", "regulator_action"])
+@pytest.mark.parametrize("value", [1, "yes", None])
+def test_bad_switches_are_refused(name, value):
+    refused(ValueError, f"{name} must be true or false, got {value!r}", **{name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "nearest"),
+    [
+        ("reward", "absolut", "absolute"),
+        ("randomisation", "interval", "intervals"),
+        ("task", "Displacement", "displacement"),
+        ("render_mode", "rgb", "rgb_array"),
+    ],
+)
+def test_unknown_names_are_refused_with_the_nearest(name, value, nearest):
+    refused(
+        ValueError, f"{name} must be one of", f"got {value!r} (did you mean {nearest!r}?)",
+        **{name: value},
+    )  # fmt: skip
+
+
+def test_names_of_the_wrong_kind_are_refused():
+    refused(ValueError, "reward must be one of absolute, quadratic", "got 3", reward=3)
+    refused(ValueError, "model must be", "a shipped model's name", "got 3", model=3)
+
+
+def test_unknown_models_are_refused_with_the_nearest(tmp_path):
+    refused(ValueError, "no model 'seres2008'", "did you mean 'serres2008'?", model="seres2008")
+    broken = tmp_path / "broken.toml"
+    broken.write_text("schema = ")
+    refused(ValueError, str(broken), "not valid TOML", model=str(broken))
+
+
+def test_bad_reset_options_are_refused_and_the_episode_goes_on(make):
+    env = make()
+    env.reset(seed=0)
+    words = "unknown reset option 'presure' (did you mean 'pressure_kpa'?)"
+    with pytest.raises(TypeError, match=re.escape(words)):
+        env.reset(options={"presure": 3})
+    with pytest.raises(ValueError, match=r"150-575 kPa, got 900"):
+        env.reset(options={"pressure_kpa": 900})
+    env.step(env.action(0.0))
+
+
+def test_numbers_of_numpy_are_numbers():
+    env = PMAEnv(
+        model="serres2008", pressure_kpa=np.float32(300), preview=np.int64(2),
+        control_rate_hz=np.int64(50),
+    )  # fmt: skip
+    assert env.reset(seed=0)[0].shape == (9,)
+
+
+def test_render_says_what_is_missing(make):
+    env = make(render_mode="rgb_array")
+    with pytest.raises(gym.error.ResetNeeded, match=r"call reset\(\) before render\(\)"):
+        env.render()
+    env = make()
+    env.reset(seed=0)
+    with pytest.warns(UserWarning, match='render_mode="rgb_array"'):
+        assert env.render() is None

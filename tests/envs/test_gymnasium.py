@@ -1,0 +1,80 @@
+"""The environments as Gymnasium knows them: ids, specs, vectors, and its checker's verdict."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import pma_gym
+from pma_gym.envs import ENVIRONMENTS, PMAEnv
+
+OPTIONS = [
+    {},
+    {"preview": 4, "history": 3},
+    {"regulator_action": True, "randomisation": "varied", "pressure_kpa": "random"},
+    {"noise": False, "action_delay_s": 0.02, "observation_delay_s": 0.03, "reward": "smooth"},
+    {"model": "cascade", "control_rate_hz": 50.0, "pressure_kpa": [300, 400.0]},
+    {"render_mode": "rgb_array"},
+    {"model": "station", "randomisation": "varied", "pressure_kpa": "random"},
+]
+MADE = {"model": "serres2008", "pressure_kpa": 300}
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+@pytest.mark.parametrize("options", OPTIONS, ids=lambda options: ",".join(options) or "defaults")
+def test_check_env_finds_nothing_to_say(name, options):
+    # pytest turns each warning into an error.
+    check_env(gym.make(name, **(MADE | options)).unwrapped)
+
+
+@pytest.mark.parametrize("prefix", ["", "pma_gym:"])
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_ids_make_their_task(name, prefix):
+    env = gym.make(prefix + name, **MADE)
+    assert isinstance(env.unwrapped, PMAEnv)
+    assert env.unwrapped.task.name == pma_gym.ENVIRONMENTS[name]
+
+
+def test_spec_survives_json():
+    given = {
+        "model": "serres2008", "pressure_kpa": [200, 300.5], "control_rate_hz": 50.0, "preview": 2,
+        "noise": False, "action_delay_s": 0.02, "observation_delay_s": 0.04, "history": 1,
+        "reward": "smooth", "randomisation": "varied", "regulator_action": True,
+    }  # fmt: skip
+    env = gym.make("pma_gym/IsokineticRotation-v0", **given)
+    assert env.spec is not None
+    text = env.spec.to_json()
+    assert json.loads(text)["kwargs"] == {"task": "rotation"} | given
+    again = gym.make(gym.envs.registration.EnvSpec.from_json(text))
+    assert again.unwrapped.options == env.unwrapped.options
+    first, _ = env.reset(seed=4)
+    second, _ = again.reset(seed=4)
+    np.testing.assert_array_equal(first, second)
+
+
+@pytest.mark.parametrize("kind", ["sync", "async"])
+def test_vectors_of_environments_run_past_the_ends_of_episodes(kind):
+    name = "pma_gym/IsokineticDisplacement-v0"
+    made = MADE | {"control_rate_hz": 4.0}
+    envs = gym.make_vec(name, 2, vectorization_mode=kind, **made)
+    observations, _ = envs.reset(seed=[1, 2])
+    single = gym.make(name, **made)
+    expected, _ = single.reset(seed=1)
+    np.testing.assert_array_equal(observations[0], expected)
+    ended = 0
+    for _ in range(50):
+        *_, truncated, infos = envs.step(envs.action_space.sample() * 0.0 - 0.8)
+        ended += int(truncated.sum())
+        if truncated.any():
+            assert np.all(infos["rmse_mm"] > 0.0)
+    assert ended == 4
+    envs.close()
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_the_default_is_the_identified_station(name):
+    env = gym.make(name)
+    check_env(env.unwrapped)
+    assert env.unwrapped.station.model.name == "station"
