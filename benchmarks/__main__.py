@@ -1,0 +1,150 @@
+"""`python -m benchmarks`: the main job, and the other jobs as subcommands."""
+
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+# Figures are drawn to files; each process computes on its own core.
+os.environ.setdefault("MPLBACKEND", "Agg")
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+RESULTS = Path("results")
+
+app = typer.Typer(
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    invoke_without_command=True,
+)
+
+Out = Annotated[Path, typer.Option(help="File to write.")]
+OptionalOut = Annotated[Path | None, typer.Option(help="File to write.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+
+
+@app.callback()
+def reproduction(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "reproduction",
+    controllers: Annotated[
+        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; all if empty.")
+    ] = "",
+    model: Annotated[
+        str,
+        typer.Option(help="Models by commas: shipped names or TOML files; the suite's if empty."),
+    ] = "",
+    task: Annotated[str, typer.Option(help="displacement or rotation; both if empty.")] = "",
+    pressures: Annotated[str, typer.Option(help="Pressures in kPa by commas; all if empty.")] = "",
+    jobs: Jobs = 2,
+) -> None:
+    """Run every controller through every trial and write the report (the main job)."""
+    if context.invoked_subcommand is not None:
+        return
+    from rich.console import Console
+
+    from benchmarks.contender import ControllerError, parse_contenders
+    from benchmarks.job import INTERRUPTED, run_job
+    from benchmarks.suite import SuiteError, load_suite
+    from pma_gym.plant.model import ModelError, load_model
+
+    suite = load_suite()
+    try:
+        models = _listed(model)
+        for name in models or suite.models:
+            load_model(name)
+        chosen = parse_contenders(controllers, suite.controllers) if controllers else []
+        suite = suite.select(models, chosen, _listed(task), _pressures(pressures))
+        if out.exists() and not out.is_dir():
+            raise SuiteError(f"--out {out} is a file; name a folder for the results")
+    except (ControllerError, ModelError, SuiteError) as error:
+        _refuse(error)
+    try:
+        code = run_job(suite, out, jobs, Console())
+    except KeyboardInterrupt:
+        print("interrupted before or after the cases; the report was not written", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+@app.command()
+def profiles(out: Out) -> None:
+    """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
+    from benchmarks.profiles import run_profiles
+
+    print(f"{run_profiles(out)} rows in {out}")
+
+
+@app.command()
+def studies(out: OptionalOut = None) -> None:
+    """Recompute the dissertation's regressions and variance tables beside the printed ones."""
+    from benchmarks.studies import run_studies
+
+    run_studies(out)
+
+
+@app.command()
+def identify(out: Out, jobs: Jobs = 2) -> None:
+    """Fit the station's model from tables I1, I2 and I3."""
+    from benchmarks.identify import run_identify
+
+    run_identify(out, jobs)
+
+
+@app.command()
+def tune(
+    out: OptionalOut = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    model: Annotated[str, typer.Option(help="Shipped name or TOML file.")] = "station",
+    jobs: Jobs = 2,
+) -> None:
+    """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
+    from benchmarks.tune import GAINS_FILE, run_tune
+
+    try:
+        written = run_tune(out or GAINS_FILE, seed, model, jobs)
+    except ValueError as error:
+        _refuse(error)
+    raise typer.Exit(0 if written else 130)
+
+
+@app.command()
+def accuracy(out: OptionalOut = None) -> None:
+    """Measure the integrator's accuracy; exit code 1 if the default step misses a limit."""
+    from benchmarks.accuracy import run_accuracy
+
+    raise typer.Exit(0 if run_accuracy(out=out) else 1)
+
+
+def _listed(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+def _pressures(text: str) -> list[float]:
+    from benchmarks.suite import SuiteError
+
+    try:
+        return [float(part) for part in _listed(text)]
+    except ValueError:
+        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}") from None
+
+
+def _refuse(error: Exception) -> NoReturn:
+    """One message and exit code 2."""
+    print(f"error: {error}", file=sys.stderr)
+    raise typer.Exit(2)
+
+
+def main() -> None:
+    """The whole command; a file that cannot be written ends it with one message."""
+    try:
+        app(prog_name="python -m benchmarks")
+    except OSError as error:
+        print(f"error: {error}", file=sys.stderr)
+        sys.exit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,141 @@
+"""Who is scored: a controller of the registry, or a class in somebody's own file."""
+
+import difflib
+import importlib.util
+import inspect
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+
+from controllers import CONTROLLERS
+from controllers.controller import Controller
+
+
+class ControllerError(ValueError):
+    """A controller that cannot be scored; the message says why and how to mend it."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A controller by its name; made anew for every case, in the process that runs the case.
+
+    Attributes:
+        name: what the results call it.
+        title: what the report calls it.
+        path: file of its class; empty for one of `controllers.CONTROLLERS`.
+    """
+
+    name: str
+    title: str = ""
+    path: str = ""
+
+    @property
+    def source(self) -> str:
+        """What names it on the command line."""
+        return f"{self.path}:{self.name}" if self.path else self.name
+
+    @property
+    def label(self) -> str:
+        """Its title, or its name if it has none."""
+        return self.title or self.name
+
+    def make(self) -> Controller:
+        """A new controller.
+
+        Raises:
+            ControllerError: its file, class or methods are missing or do not work.
+        """
+        if not self.path and self.name not in CONTROLLERS:
+            near = difflib.get_close_matches(self.name, CONTROLLERS, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ControllerError(
+                f"no controller {self.name!r}; there are {', '.join(CONTROLLERS)}, or give "
+                f"path/to/file.py:ClassName{hint}"
+            )
+        factory = _class_of(self) if self.path else CONTROLLERS[self.name]
+        try:
+            controller = factory()
+        except Exception as error:
+            raise ControllerError(
+                f"cannot make {self.source}: {factory.__name__}() raised "
+                f"{type(error).__name__}: {error}; a controller must need no arguments"
+            ) from error
+        _check_protocol(self, controller)
+        return controller
+
+
+def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contender]:
+    """Controllers from a list as the command line has it: `pid,path/to/mine.py:MyController`.
+
+    Args:
+        text: names or files with a class, separated by commas.
+        known: controllers whose titles are kept.
+    Raises:
+        ControllerError: one that cannot be made; each is tried.
+    """
+    titled = {contender.name: contender for contender in known}
+    contenders = []
+    for item in (part.strip() for part in text.split(",")):
+        if not item:
+            raise ControllerError(f"an empty name in {text!r}; separate controllers by one comma")
+        path, colon, name = item.rpartition(":")
+        if item.endswith(".py") or (colon and not name):
+            raise ControllerError(f"{item} names no class; write {item.rstrip(':')}:ClassName")
+        contender = Contender(name, path=path) if colon else titled.get(item, Contender(item))
+        contender.make()
+        contenders.append(contender)
+    return contenders
+
+
+def _class_of(contender: Contender) -> type:
+    """The contender's class, from its file."""
+    module = _module(Path(contender.path))
+    found = getattr(module, contender.name, None)
+    if isinstance(found, type):
+        return found
+    classes = [
+        name
+        for name, value in vars(module).items()
+        if isinstance(value, type) and value.__module__ == module.__name__
+    ]
+    has = f"it has {', '.join(classes)}" if classes else "it has no class"
+    raise ControllerError(f"{contender.path} has no class {contender.name!r}; {has}")
+
+
+def _module(path: Path) -> ModuleType:
+    """The file as a module of its own name; imported once in each process."""
+    if not path.is_file():
+        raise ControllerError(f"there is no file {path}; check the name and the folder")
+    name = f"contender_{path.resolve().as_posix()}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ControllerError(f"{path} is no Python file; its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise ControllerError(f"cannot import {path}: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _check_protocol(contender: Contender, controller: object) -> None:
+    """Refuse an object that is no `controllers.controller.Controller`."""
+    for method, arguments in (("reset", "(reference, station)"), ("act", "(observation, time)")):
+        found = getattr(controller, method, None)
+        if not callable(found):
+            raise ControllerError(
+                f"{contender.source} has no method {method}{arguments}; a controller needs reset "
+                "and act, see controllers/controller.py"
+            )
+        try:
+            inspect.signature(found).bind(None, None)
+        except (TypeError, ValueError):
+            raise ControllerError(
+                f"{contender.source}: {method} must take {arguments}, see controllers/controller.py"
+            ) from None

@@ -1,0 +1,184 @@
+"""A report as a list of blocks, and the same blocks as Markdown and as one page of HTML."""
+
+import base64
+import html
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class Heading:
+    """A heading; level 1 is the report's."""
+
+    text: str
+    level: int = 2
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Text; `code` and **bold** in it are marked up."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Cells of text.
+
+    Attributes:
+        title: above it.
+        header: a cell a column; a group before ` | ` spans the columns that share it.
+        rows: cells; a row of one empty cell draws a line.
+        words: how many columns at the left hold words, aligned left.
+    """
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int = 1
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A plot.
+
+    Attributes:
+        name: of its file, without suffix.
+        caption: below it.
+    """
+
+    name: str
+    caption: str
+
+
+Block = Heading | Paragraph | TextTable | Picture
+
+_PAGE = Path(__file__).parent / "page.html"
+_GROUP = " | "
+
+
+def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: str) -> str:
+    """The blocks as Markdown; pictures are linked, in a folder beside the file.
+
+    Args:
+        blocks: the report.
+        pictures: PNG by name; one that is missing is left out.
+        folder: where their files will be.
+    """
+    parts = []
+    for block in blocks:
+        match block:
+            case Heading(text, level):
+                parts.append(f"{'#' * level} {text}")
+            case Paragraph(text):
+                parts.append(text)
+            case TextTable():
+                parts.append(_markdown_table(block))
+            case Picture(name, caption) if name in pictures:
+                parts.append(f"![{caption}]({folder}/{name}.png)\n\n*{caption}*")
+            case Picture():
+                pass
+    return "\n\n".join(parts) + "\n"
+
+
+def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
+    """The blocks as one page that needs nothing else: pictures and style are inside.
+
+    Args:
+        blocks: the report; the first is its heading.
+        pictures: PNG by name; one that is missing is left out.
+    """
+    title = next(block.text for block in blocks if isinstance(block, Heading))
+    body = "\n".join(_html_block(block, pictures) for block in blocks)
+    page = _PAGE.read_text(encoding="utf-8")
+    return page.replace("{title}", html.escape(title)).replace("{body}", body)
+
+
+def _markdown_table(table: TextTable) -> str:
+    """A table; groups of columns stay in front of their names, for Markdown cannot span."""
+    columns = len(table.header)
+    names = [name.replace(_GROUP, "<br>") for name in table.header]
+    rules = [":--" if column < table.words else "--:" for column in range(columns)]
+    rows = [list(row) for row in table.rows if len(row) == columns]
+    cells = [names, rules, *rows]
+    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
+    return "\n".join([f"**{table.title}**", "", *lines])
+
+
+def _html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
+    match block:
+        case Heading(text, level):
+            return f"<h{level}>{_inline(text)}</h{level}>"
+        case Paragraph(text):
+            return f"<p>{_inline(text)}</p>"
+        case TextTable():
+            return _html_table(block)
+        case Picture(name, caption) if name in pictures:
+            data = base64.b64encode(pictures[name]).decode("ascii")
+            image = f'<img alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
+            return f"<figure>{image}<figcaption>{_inline(caption)}</figcaption></figure>"
+        case _:
+            return ""
+
+
+def _html_table(table: TextTable) -> str:
+    columns = len(table.header)
+    body = []
+    ruled = False
+    for row in table.rows:
+        if len(row) != columns:
+            ruled = True
+            continue
+        cells = "".join(
+            f"<td{_verdict_class(cell)}>{_inline(cell)}</td>"
+            if column >= table.words
+            else f"<th>{_inline(cell)}</th>"
+            for column, cell in enumerate(row)
+        )
+        body.append(f'<tr class="ruled">{cells}</tr>' if ruled else f"<tr>{cells}</tr>")
+        ruled = False
+    head = _html_header(table)
+    prose = ' class="prose"' if table.words == columns else ""
+    return (
+        f'<div class="wide"><table{prose}><caption>{_inline(table.title)}</caption>'
+        f"<thead>{head}</thead><tbody>{''.join(body)}</tbody></table></div>"
+    )
+
+
+def _html_header(table: TextTable) -> str:
+    """One row of column names, or two where columns share a group."""
+    top, below = [], []
+    names = [name.partition(_GROUP) for name in table.header]
+    grouped = any(found for _, found, _ in names)
+    for group, same in groupby(enumerate(names), key=_group_of):
+        members = list(same)
+        index, (name, _, _) = members[0]
+        if isinstance(group, str):
+            top.append(f'<th class="group" colspan="{len(members)}">{_inline(name)}</th>')
+            below += [f"<th>{_inline(part)}</th>" for _, (_, _, part) in members]
+        else:
+            words = ' class="words"' if index < table.words else ""
+            rows = ' rowspan="2"' if grouped else ""
+            top.append(f"<th{words}{rows}>{_inline(name)}</th>")
+    lower = f"<tr>{''.join(below)}</tr>" if grouped else ""
+    return f"<tr>{''.join(top)}</tr>{lower}"
+
+
+def _group_of(column: tuple[int, tuple[str, str, str]]) -> str | int:
+    """The name of a column's group; its own number if it has none."""
+    index, (group, found, _) = column
+    return group if found else index
+
+
+def _verdict_class(cell: str) -> str:
+    return f' class="{cell.replace(" ", "-")}"' if cell in ("met", "missed", "no figure") else ""
+
+
+def _inline(text: str) -> str:
+    """Escaped text with `code` and **bold**."""
+    escaped = html.escape(text, quote=False)
+    escaped = re.sub(r"`([^`]+)`", r"<code>\1</code>", escaped)
+    return re.sub(r"\*\*([^*]+)\*\*", r"<strong>\1</strong>", escaped)

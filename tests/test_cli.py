@@ -1,0 +1,188 @@
+"""`pma-gym` from the shell: what it writes is a log; what it cannot use ends in one message."""
+
+import re
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pma_gym.cli import main
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_files import read_trial, write_trial
+from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
+
+HEADER = "time_s,motor_voltage_v,regulator_voltage_v"
+RAMP = f"{HEADER}\n0,0,5\n2,3,5\n4,3,5\n"
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Runs the command in a folder of its own: exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments):
+        with pytest.raises(SystemExit) as caught:
+            main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return caught.value.code or 0, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def ramp(tmp_path):
+    path = tmp_path / "ramp.csv"
+    path.write_text(RAMP)
+    return path
+
+
+def test_simulate_writes_the_log(run, ramp, tmp_path):
+    code, out, err = run("simulate", "ramp.csv", "--model", "serres2008", "--out", "log.csv")
+    assert (code, err) == (0, "")
+    assert "3 samples, 4 s, on serres2008 with noise, seed 0: log.csv" in out
+    names = (tmp_path / "log.csv").read_text().splitlines()[0]
+    assert names == f"{HEADER},contraction_mm,rotation_deg,load_n,pressure_kpa"
+    log = read_trial(tmp_path / "log.csv")
+    assert np.all(np.diff(log.extension[:2]) > 5e-3)
+
+
+def test_the_seed_and_the_noise_are_options(run, ramp, tmp_path):
+    logs = {}
+    for name, options in {
+        "first": ["--seed", "1"],
+        "again": ["--seed", "1"],
+        "other": ["--seed", "2"],
+        "quiet": ["--no-noise"],
+    }.items():
+        assert (
+            run("simulate", ramp, "--model", "serres2008", "--out", f"{name}.csv", *options)[0] == 0
+        )
+        logs[name] = (tmp_path / f"{name}.csv").read_bytes()
+    assert logs["first"] == logs["again"]
+    assert len({logs["first"], logs["other"], logs["quiet"]}) == 3
+
+
+def test_commands_are_joined_or_held(run, ramp, tmp_path):
+    model = ("--model", "serres2008", "--no-noise")
+    loads = {}
+    for hold in ("linear", "zero"):
+        assert run("simulate", ramp, *model, "--hold", hold, "--out", f"{hold}.csv")[0] == 0
+        loads[hold] = read_trial(tmp_path / f"{hold}.csv").measurements["load"][1]
+    # Held, the motor has not yet been told to pull when the second row is logged.
+    assert loads["linear"] > 200.0
+    assert loads["zero"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_leaving_the_models_range_is_said(run, tmp_path):
+    (tmp_path / "high.csv").write_text(f"{HEADER}\n0,0,5\n1,0,10\n2,0,10\n")
+    code, _, err = run("simulate", "high.csv", "--model", "serres2008", "--out", "log.csv")
+    assert code == 0
+    assert "warning: model serres2008 holds for 150 to 575 kPa" in err
+
+
+def test_unknown_columns_are_said(run, tmp_path):
+    (tmp_path / "more.csv").write_text(
+        RAMP.replace("regulator_voltage_v", "regulator_voltage_v,x", 1).replace(",5\n", ",5,1\n")
+    )
+    code, _, err = run("simulate", "more.csv", "--model", "serres2008", "--out", "log.csv")
+    assert code == 0
+    assert "warning: more.csv: unknown columns are ignored: 'x'" in err
+
+
+@pytest.mark.parametrize(
+    ("content", "options", "message"),
+    [
+        (RAMP, ["--out", "ramp.csv"], "is the command file itself"),
+        (RAMP, ["--out", "log.txt"], "must end in .csv, .parquet, .xlsx"),
+        (RAMP, ["--out", "nowhere/log.csv"], "there is no folder nowhere"),
+        (RAMP, ["--out", "log.csv", "--model", "statoin"], "no model 'statoin'.*did you mean"),
+        (RAMP, ["--out", "log.csv", "--hold", "cubic"], "'cubic' is not one of"),
+        (RAMP, ["--out", "log.csv", "--seed", "-1"], "--seed"),
+        (RAMP, [], "Missing option '--out'"),
+        ("", ["--out", "log.csv"], "ramp.csv is empty"),
+        (f"{HEADER}\n", ["--out", "log.csv"], "no rows"),
+        (f"{HEADER}\n0,0,5\n1,full,5\n", ["--out", "log.csv"], "row 3 of ramp.csv has 'full'"),
+        (f"{HEADER}\n0,0,5\n1,12.4,5\n", ["--out", "log.csv"], "must lie in 0-10 V, row 3"),
+        (f"{HEADER}\n1,0,5\n0,1,5\n", ["--out", "log.csv"], "time_s must increase strictly"),
+        (
+            "time_s,motor_voltage_v\n0,0\n1,1\n",
+            ["--out", "log.csv"],
+            "give regulator_voltage_v or pressure_command_kpa",
+        ),
+        ("t,motor_voltage_v\n0,0\n", ["--out", "log.csv"], "has no column time_s"),
+    ],
+)
+def test_what_cannot_be_simulated_ends_in_one_message(run, tmp_path, content, options, message):
+    (tmp_path / "ramp.csv").write_text(content)
+    if "--model" not in options:
+        options = [*options, "--model", "serres2008"]
+    code, out, err = run("simulate", "ramp.csv", *options)
+    assert (code, out) == (2, "")
+    assert "Traceback" not in err
+    assert re.search(message, err)
+    assert {path.name for path in tmp_path.iterdir()} == {"ramp.csv"}
+    assert (tmp_path / "ramp.csv").read_text() == content
+
+
+def displacement_log(path, slope=5.2561355, intercept=-0.823263):
+    """A log whose extension is the line that table 21 prints for 150 kPa."""
+    time = np.arange(PHASE_SAMPLES) / SAMPLE_RATE_HZ
+    extension = (intercept + slope * time) * 1e-3
+    extension[0] = 0.0
+    contraction = 0.03 - extension
+    write_trial(Trial(time, {"motor_voltage": 0.0 * time}, {"contraction": contraction}), path)
+
+
+def test_evaluate_prints_a_trials_rows(run, tmp_path):
+    displacement_log(tmp_path / "log.csv")
+    code, out, err = run("evaluate", "log.csv", "--task", "displacement")
+    assert (code, err) == (0, "")
+    assert "Slope (mm/s)" in out and "5.25" in out
+    assert "RMSE (mm)" in out
+
+
+@pytest.mark.parametrize(
+    ("task", "message"),
+    [
+        ("rotation", "the trial has no rotation_deg"),
+        ("lifting", "task must be one of displacement, rotation, got 'lifting'"),
+    ],
+)
+def test_what_cannot_be_evaluated_ends_in_one_message(run, tmp_path, task, message):
+    displacement_log(tmp_path / "log.csv")
+    code, out, err = run("evaluate", "log.csv", "--task", task)
+    assert (code, out) == (2, "")
+    assert message in err
+
+
+def test_a_simulated_log_can_be_evaluated(run, tmp_path):
+    time = np.arange(PHASE_SAMPLES) / SAMPLE_RATE_HZ
+    commands = {"motor_voltage": 0.8 * time, "pressure_command": np.full(time.size, 300e3)}
+    write_trial(Trial(time, commands), tmp_path / "commands.csv")
+    assert run("simulate", "commands.csv", "--model", "serres2008", "--out", "log.csv")[0] == 0
+    code, out, _ = run("evaluate", "log.csv", "--task", "displacement")
+    assert code == 0
+    assert "1923" in out
+
+
+def test_info_names_models_and_environments(run):
+    code, out, _ = run("info")
+    assert code == 0
+    for name in ("numba", "serres2008", "cascade", "pma_gym/IsokineticRotation-v0"):
+        assert name in out
+
+
+def test_info_shows_a_models_parameters(run):
+    code, out, _ = run("info", "--model", "serres2008")
+    assert code == 0
+    assert "97.84" in out and "N/V" in out and "assumption" in out
+    code, _, err = run("info", "--model", "nothing")
+    assert code == 2
+    assert "no model 'nothing'" in err
+
+
+def test_the_command_loads_neither_plots_nor_torch():
+    code = "import sys, pma_gym.cli; print(sorted({'matplotlib', 'torch'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
