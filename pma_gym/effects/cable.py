@@ -6,6 +6,9 @@ from pma_gym.effects.arithmetic import positive
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
+TIGHT_FORCE = 20.0
+"""Spring force (N) at which half of the damper acts: our assumption."""
+
 
 class Cable(NamedTuple):
     """Parameters of `tension`."""
@@ -22,7 +25,10 @@ class Cable(NamedTuple):
 def tension(stretch, stretch_rate, p):
     """Tension of the cable, which the load cell reads.
 
-        T = max(0, stiffness (s - slack) + damping s')   while s > slack, else 0
+        T = max(0, F + damping s' F / (F + 20 N)),   F = stiffness max(0, s - slack)
+
+    The damper comes in with the spring, so that the cable tightens without a jump of its tension,
+    which no integrator would take in its stride.
 
     Args:
         stretch: cable wound in less the way of the slide, s (m).
@@ -33,10 +39,9 @@ def tension(stretch, stretch_rate, p):
     Source:
         Our model of a cable; stiffness and slack are identified from Serres 2008, table I3.
     """
-    beyond = stretch - p.slack
-    # The damper acts in full only once the cable is 1 um tight, so that tightening has no jump.
-    taut = positive(beyond) / (abs(beyond) + 1e-6)
-    return positive(p.stiffness * positive(beyond) + taut * p.damping * stretch_rate)
+    spring = p.stiffness * positive(stretch - p.slack)
+    taut = spring / (spring + TIGHT_FORCE)
+    return positive(spring + taut * p.damping * stretch_rate)
 
 
 CABLE = Effect(

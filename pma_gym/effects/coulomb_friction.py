@@ -7,7 +7,7 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 BREAKAWAY_SHARE = 0.7
-"""Share of the kinetic deflection below which the bristle is elastic: our assumption."""
+"""Share of the sliding force below which the bristle is elastic: our assumption."""
 
 
 class CoulombFriction(NamedTuple):
@@ -18,7 +18,9 @@ class CoulombFriction(NamedTuple):
     stribeck_speed: Annotated[
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10")
     ]
-    presliding: Annotated[float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force")]
+    presliding: Annotated[
+        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force")
+    ]
 
 
 def friction_force(memory, p):
@@ -44,8 +46,10 @@ def friction_rate(velocity, memory, p):
         z' = k v - a(z, v) |v| k z / f(v),   k = static / presliding
         f(v) = dynamic + (static - dynamic) / (1 + (v / stribeck_speed)^2)
 
-    a is 0 while |z| is under 0.7 dynamic (purely elastic, so stuck) or the motion unloads the
-    bristle, and 1 once |z| reaches f. At static = 0 there is no bristle and the law is absent.
+    a is 0 while |z| is under 0.7 f (purely elastic, so stuck) or the motion unloads the bristle,
+    and 1 once |z| reaches f. A constant load under static holds for ever, and so does one that
+    swings under 0.7 static; one that swings above it creeps a little at each swing. At static = 0
+    there is no bristle and the law is absent.
 
     Args:
         velocity: rate of contraction v (m/s).
@@ -57,7 +61,7 @@ def friction_rate(velocity, memory, p):
     stiffness = p.static / p.presliding
     ratio = velocity / p.stribeck_speed
     level = p.dynamic + (p.static - p.dynamic) / (1.0 + ratio * ratio) + 1e-12
-    elastic = BREAKAWAY_SHARE * p.dynamic
+    elastic = BREAKAWAY_SHARE * level
     plastic = smoothstep((abs(memory) - elastic) / (level - elastic))
     plastic = where(velocity * memory > 0.0, plastic, 0.0)
     return stiffness * velocity, plastic * stiffness * abs(velocity) / level

@@ -3,11 +3,16 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 from typing import Any, get_type_hints
 
 from pma_gym.units import Quantity
 
 Value = float | tuple[float, ...]
+
+Parameters = Any
+"""An effect's parameters in SI: its own NamedTuple, which no annotation can name here."""
 
 
 @dataclass(frozen=True)
@@ -34,33 +39,35 @@ class Effect:
     rate: Callable | None = None
     signature: str = ""
 
-    @property
+    @cached_property
     def quantities(self) -> dict[str, Quantity]:
         """Unit, bounds and source of every parameter, by field name."""
         hints = get_type_hints(self.parameters, include_extras=True)
         return {name: hint.__metadata__[0] for name, hint in hints.items()}
 
     @property
-    def neutral(self) -> Any:
+    def neutral(self) -> Parameters | None:
         """Parameters at which the law is exactly absent, or None if there are none such."""
-        values = {name: q.neutral for name, q in self.quantities.items()}
-        if all(value is None for value in values.values()):
-            return None
-        start = self.start
-        given = {k: self.quantities[k].to_si(v) for k, v in values.items() if v is not None}
-        return start._replace(**given)
+        known = {n: q.to_si(q.neutral) for n, q in self.quantities.items() if q.neutral is not None}
+        return self.start._replace(**known) if known else None
 
     @property
-    def start(self) -> Any:
+    def start(self) -> Parameters:
         """Parameters in the middle of their bounds, a place to start a fit from."""
         middle = {n: q.to_si(0.5 * (q.lower + q.upper)) for n, q in self.quantities.items()}
         return self.parameters(**middle)
+
+    @cached_property
+    def rows(self) -> tuple[str, ...]:
+        """Names of the parameters that are rows of numbers; the first one's increase."""
+        hints = get_type_hints(self.parameters)
+        return tuple(name for name, hint in hints.items() if hint is not float)
 
     def names_at_the_door(self) -> dict[str, str]:
         """Field name by its name in files, which ends in the unit: slope_n_per_kpa -> slope."""
         return {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
 
-    def parse(self, values: Mapping[str, Value]) -> Any:
+    def parse(self, values: Mapping[str, Value]) -> Parameters:
         """Parameters in SI from values by their names at the door.
 
         Raises:
@@ -71,21 +78,58 @@ class Effect:
         unknown = [name for name in values if name not in names]
         if unknown or missing:
             raise ValueError(
-                f"[{self.name}] takes {', '.join(names)}; "
-                + f"unknown: {', '.join(unknown) or 'none'}, missing: {', '.join(missing) or 'none'}"
+                f"[{self.name}] takes {', '.join(names)}; unknown: {', '.join(unknown) or 'none'}, "
+                f"missing: {', '.join(missing) or 'none'}"
             )
-        return self.parameters(**{stem: self._si(door, values[door]) for door, stem in names.items()})
+        given = {stem: self._si(door, stem, values[door]) for door, stem in names.items()}
+        return self.checked(self.parameters(**given))
 
-    def _si(self, door: str, value: Value) -> Value:
-        quantity = self.quantities[self.names_at_the_door()[door]]
-        many = isinstance(value, list | tuple)
-        for one in value if many else (value,):
-            if isinstance(one, bool) or not isinstance(one, int | float):
-                raise ValueError(f"{self.name}.{door} must be a number in {quantity.unit}, got {one!r}")
-            quantity.check(f"{self.name}.{door}", one)
-        return tuple(map(quantity.to_si, value)) if many else quantity.to_si(value)  # type: ignore[arg-type]
+    def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
+        """The parameters, some of them given anew by their names at the door.
 
-    def at_the_door(self, parameters: Any) -> dict[str, Value]:
+        Raises:
+            ValueError: an unknown or out-of-bounds parameter.
+        """
+        names = self.names_at_the_door()
+        given = {names[door]: self._si(door, names[door], values[door]) for door in values}
+        return self.checked(parameters._replace(**given))
+
+    def checked(self, parameters: Parameters) -> Parameters:
+        """The parameters, if their rows belong together.
+
+        Raises:
+            ValueError: rows of different lengths, or a first row that does not increase.
+        """
+        rows = [getattr(parameters, name) for name in self.rows]
+        if not rows:
+            return parameters
+        if len({len(row) for row in rows}) > 1 or len(rows[0]) < 2:
+            lengths = ", ".join(f"{n} {len(r)}" for n, r in zip(self.rows, rows, strict=True))
+            raise ValueError(
+                f"rows of [{self.name}] must have one length, 2 or more; got {lengths}"
+            )
+        if any(after <= before for before, after in pairwise(rows[0])):
+            raise ValueError(f"{self.rows[0]} of [{self.name}] must increase from entry to entry")
+        return parameters
+
+    def _si(self, door: str, stem: str, value: Value) -> Value:
+        quantity, many = self.quantities[stem], isinstance(value, list | tuple)
+        if many != (stem in self.rows):
+            wanted = "a list of numbers" if stem in self.rows else "one number"
+            raise ValueError(
+                f"{self.name}.{door} must be {wanted} in {quantity.unit}, got {value!r}"
+            )
+        numbers = value if isinstance(value, list | tuple) else (value,)
+        for number in numbers:
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                raise ValueError(
+                    f"{self.name}.{door} must be a number in {quantity.unit}, got {number!r}"
+                )
+            quantity.check(f"{self.name}.{door}", number)
+        converted = tuple(quantity.to_si(float(number)) for number in numbers)
+        return converted if many else converted[0]
+
+    def at_the_door(self, parameters: Parameters) -> dict[str, Value]:
         """Values by their names at the door: the inverse of `parse`."""
         out: dict[str, Value] = {}
         for door, stem in self.names_at_the_door().items():

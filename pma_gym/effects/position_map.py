@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import interpolate, positive
+from pma_gym.effects.arithmetic import interpolate, positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -10,7 +10,7 @@ _TABLE_18 = "Serres 2008, table 18 (275 and 575 kPa: recovered from tables I13 a
 
 
 class PositionMap(NamedTuple):
-    """Rows of the map, one a pressure."""
+    """Rows of the map, one a pressure; pressures increase."""
 
     pressure: Annotated[tuple[float, ...], Quantity("kPa", 0, 1000, _TABLE_18)]
     square: Annotated[tuple[float, ...], Quantity("m/V^2", -0.1, 0.1, _TABLE_18)]
@@ -38,7 +38,8 @@ def mapped_displacement(motor_voltage, pressure, p):
     square = interpolate(pressure, p.pressure, p.square)
     linear = interpolate(pressure, p.pressure, p.linear)
     constant = interpolate(pressure, p.pressure, p.constant)
-    peak = linear / (-2.0 * square)
+    # Only a parabola that opens downwards has a peak to be held at.
+    peak = where(square < 0.0, linear / (-2.0 * where(square < 0.0, square, -1.0)), motor_voltage)
     voltage = motor_voltage - positive(motor_voltage - peak)
     return positive((square * voltage + linear) * voltage + constant)
 

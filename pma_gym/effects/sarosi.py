@@ -30,7 +30,7 @@ def sarosi_force(pressure, contraction, p):
         k = x / L0
 
     Departure: steepness and softening are positive here, the source's c and d are negative.
-    `exponential` is exact to 1e-11 for |steepness k| up to 9, so for k from -30 to 30 % at 0.2955.
+    `exponential` is exact to 1e-12 for |steepness k| up to 12, so for |k| up to 40 % at 0.2955.
 
     Args:
         pressure: gauge pressure P (Pa); the source has bar.

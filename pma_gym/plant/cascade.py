@@ -9,18 +9,26 @@ One-way: the muscle does not load the motor. With J = 0 and one pressure this is
 cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
 """
 
-from pma_gym.effects.stiffness import spring_stiffness
-from pma_gym.plant.compose import Equations
+from collections.abc import Mapping
 
-PORTS: dict[str, str] = {
-    "muscle_force": "contractile_force and stiffness, both needed",
-    "muscle_damping": "one: damping coefficient of the muscle (N s/m)",
-    "position_map": "one: displacement that a voltage leads to (m)",
-    "servo": "one: rate of the motor's displacement",
-    "servo_inertia": "none or one: acceleration of the motor's displacement",
-    "regulator_line": "one: pressure that the regulator settles at (Pa)",
-    "regulator_lag": "one: rate of the pressure",
-    "regulator_pace": "any number, multiplied: factor on the regulator's time constant",
+from pma_gym.effects.effect import Parameters
+from pma_gym.effects.stiffness import spring_stiffness
+from pma_gym.plant.compose import Equations, Port
+
+PORTS: dict[str, Port] = {
+    "muscle_force": Port(
+        "force of the muscle (N), from its two elements",
+        least=2,
+        most=2,
+        only=("contractile_force", "stiffness"),
+    ),
+    "muscle_damping": Port("damping coefficient of the muscle (N s/m)", least=1, most=1),
+    "position_map": Port("displacement that a voltage leads to (m)", least=1, most=1),
+    "servo": Port("rate of the motor's displacement (m/s)", least=1, most=1),
+    "servo_inertia": Port("acceleration of the motor's displacement (m/s^2)", most=1),
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": Port("factor on the regulator's time constant, multiplied"),
 }
 """Ports of the cascade: how many effects each takes, and what becomes of their results."""
 
@@ -35,6 +43,10 @@ OUTPUTS: dict[str, str] = {
 }
 """True outputs by name: the text of each, in terms of the equations' variables."""
 
+FIRST_PARTS = 4
+"""Parts of the first internal step after a command: the servo, 13 428 1/s, overtakes the muscle
+there, and the damping turns with it."""
+
 
 def write_equations(equations: Equations) -> None:
     """Write the dissertation's cascade, with the model's effects at its ports."""
@@ -48,12 +60,18 @@ def write_equations(equations: Equations) -> None:
     let("contraction", "no_load - extension")
     # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
     let("velocity", "extension - servo")
-    let("resistance", equations.total("muscle_damping"))
+    let("resistance", equations.one("muscle_damping"))
     let("muscle_rate", "muscle_stiffness / resistance")
     equations.add_state("extension", "muscle_rate * (servo - extension)")
     _write_servo(equations)
     equations.add_rate("pressure", equations.one("regulator_lag"))
     equations.add_sensors(OUTPUTS)
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """Frequency (rad/s) of the motor on its position loop; 0 without inertia."""
+    inertial = parameters.get("servo_inertia")
+    return (parameters["servo"].stiffness / inertial.inertia) ** 0.5 if inertial else 0.0
 
 
 def _write_servo(equations: Equations) -> None:

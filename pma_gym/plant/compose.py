@@ -5,11 +5,38 @@ effects that a model has fill the ports. The result is plain Python text that ru
 (for debugging and for `symbolic`), and that `compiled.py` compiles.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from pma_gym.effects import Effect
 from pma_gym.effects.effect import signals
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where effects act on a plant.
+
+    Attributes:
+        result: what the effects there contribute, and what becomes of it.
+        least: fewest effects that it takes.
+        most: most effects that it takes.
+        only: names of the effects that it takes; any of this port if empty.
+    """
+
+    result: str
+    least: int = 0
+    most: float = math.inf
+    only: tuple[str, ...] = ()
+
+    @property
+    def takes(self) -> str:
+        """How many effects it takes, or which, in words."""
+        if self.only:
+            return " and ".join(self.only)
+        if self.most == 1:
+            return "exactly one effect" if self.least else "at most one effect"
+        return f"{self.least} or more effects"
 
 
 @dataclass(frozen=True)
@@ -115,4 +142,3 @@ def imports(equations: Equations) -> list[str]:
         names.add((effect.parameters.__module__, effect.parameters.__name__))
         names.update((law.__module__, law.__name__) for law in effect.laws())
     return [f"from {module} import {name}" for module, name in sorted(names)]
-

@@ -6,7 +6,6 @@ same law for another kind of number, without a second copy of it.
 
 import types
 from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
@@ -23,9 +22,12 @@ def rebind(function: Callable, names: Mapping[str, Callable]) -> Callable:
     return _rebind(function, names, {})
 
 
-def _rebind(function: Any, names: Mapping[str, Callable], done: dict[int, Callable]) -> Callable:
+def _rebind(
+    function: Callable, names: Mapping[str, Callable], done: dict[int, Callable]
+) -> Callable:
     if id(function) in done:
         return done[id(function)]
+    assert isinstance(function, types.FunctionType)
     own = dict(function.__globals__)
     fresh = types.FunctionType(
         function.__code__, own, function.__name__, function.__defaults__, function.__closure__

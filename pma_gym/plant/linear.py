@@ -1,10 +1,9 @@
-"""A plant seen by control theory: linearised as a state space, and written as equations."""
+"""A plant linearised about rest, as a state space of python-control."""
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from pma_gym.plant.lanes import rebind
 from pma_gym.plant.plant import OUTPUTS, Condition, Plant
 from pma_gym.plant.settle import static_force
 
@@ -12,9 +11,15 @@ if TYPE_CHECKING:
     import control
 
 INPUTS = ("motor_voltage", "regulator_voltage")
+SEEN = (*OUTPUTS, "extension")
 DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
-_STEPS = {"pressure": 100.0, "velocity": 1e-7}
-_STEP = 1e-7
+"""Sign of the velocity by direction of motion."""
+
+_STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
+"""Steps of the central differences: m, rad or 1/s of them; Pa; V."""
+
+_AWAY = 1e-6
+"""How far from rest (m/s, m) the motion begins, beyond the kink of the damping there."""
 
 
 def linearize(
@@ -22,8 +27,9 @@ def linearize(
 ) -> "control.StateSpace":
     """The plant near rest at a pressure and a contraction, as a linear system.
 
-    Damping has two values at rest, so a direction is named. Memories (dry friction, hysteresis)
-    stay where they are: the system slides. Sensor lags are left out.
+    Damping has two values at rest, so a direction is named; a regulator with two paces gets their
+    mean. Memories (dry friction, hysteresis) stay where they are: the system slides. Sensor lags
+    are left out.
 
     Args:
         plant: the plant.
@@ -41,13 +47,22 @@ def linearize(
     if direction not in DIRECTIONS:
         raise ValueError(f"direction must be one of {', '.join(DIRECTIONS)}, got {direction!r}")
     rest, commands = operating_point(plant, pressure, contraction)
+    base = Condition(rest.state.copy(), rest.zero_contraction)
+    if "velocity" in plant.states:
+        base.state[plant.states.index("velocity")] += _AWAY * DIRECTIONS[direction]
+    else:
+        # The cascade's muscle shortens where its motor stands behind it.
+        base.state[plant.states.index("servo")] -= _AWAY * DIRECTIONS[direction]
     kept = [i for i, name in enumerate(plant.states) if not name.startswith(("memory_", "lag_"))]
-    sign = DIRECTIONS[direction]
-    a, b = _dynamics(plant, rest, commands, kept, sign)
-    return control.ss(
-        a, b, _outputs(plant, rest, kept), np.zeros((len(OUTPUTS) + 1, len(INPUTS))),
-        states=[plant.states[i] for i in kept], inputs=list(INPUTS),
-        outputs=[*OUTPUTS, "extension"], name=plant.model.name,
+    return control.StateSpace(
+        _by_state(plant, base, commands, kept),
+        _by_input(plant, base, commands)[kept],
+        _outputs(plant, rest, kept),
+        np.zeros((len(SEEN), len(INPUTS))),
+        states=[plant.states[i] for i in kept],
+        inputs=list(INPUTS),
+        outputs=list(SEEN),
+        name=plant.model.name,
     )
 
 
@@ -65,20 +80,21 @@ def operating_point(
 
 
 def _holding_voltage(plant: Plant, regulator: float, contraction: float) -> float:
-    from scipy.optimize import brentq
+    from scipy.optimize import root_scalar
 
     def off(voltage: float) -> float:
         state = plant.settle(voltage, regulator_voltage=regulator).state
         return float(plant.observe(state[None, :], 0.0)["contraction"][0]) - contraction
 
-    shortest, longest = off(0.0), off(_strongest(plant, regulator))
-    if not longest <= 0.0 < shortest:
-        reach = (longest + contraction) * 1e3, (shortest + contraction) * 1e3
+    strongest = _strongest(plant, regulator)
+    slack, furthest = off(0.0), off(strongest)
+    if not furthest <= 0.0 < slack:
         raise ValueError(
-            f"contraction must lie in {reach[0]:.4g} to {reach[1]:.4g} mm (below that at no load) "
-            f"at this pressure, got {contraction * 1e3:.4g} mm"
+            f"contraction must lie in {(furthest + contraction) * 1e3:.4g} to "
+            f"{(slack + contraction) * 1e3:.4g} mm (below that at no load), what a motor voltage "
+            f"of 0 to {strongest:.4g} V holds at this pressure; got {contraction * 1e3:.4g} mm"
         )
-    return float(brentq(off, 0.0, _strongest(plant, regulator), xtol=1e-12))
+    return float(root_scalar(off, method="brentq", bracket=(0.0, strongest), xtol=1e-12).root)
 
 
 def _strongest(plant: Plant, regulator: float) -> float:
@@ -91,79 +107,43 @@ def _strongest(plant: Plant, regulator: float) -> float:
     return min(10.0, (most - drive.offset) / drive.gain)
 
 
-def _dynamics(plant: Plant, rest: Condition, commands: tuple[float, float], kept: list[int],
-              sign: float) -> tuple[np.ndarray, np.ndarray]:
-    """A and B by central differences; the velocity is moved to one side of its kink."""
-    base = rest.state.copy()
-    moving = {"velocity": 1e-6 * sign} if "velocity" in plant.states else {"servo": -1e-9 * sign}
-    for name, value in moving.items():
-        base[plant.states.index(name)] += value
+def _by_state(
+    plant: Plant, base: Condition, commands: tuple[float, float], kept: list[int]
+) -> np.ndarray:
+    columns = []
+    for high, low, step in _pairs(plant, base.state, kept):
+        up = plant.derivative(high, *commands, base.zero_contraction)
+        down = plant.derivative(low, *commands, base.zero_contraction)
+        columns.append((up - down)[kept] / (2.0 * step))
+    return np.stack(columns, axis=1)
 
-    def rate(state: np.ndarray, motor: float, regulator: float) -> np.ndarray:
-        return plant.derivative(state, motor, regulator, rest.zero_contraction)[kept]
 
-    a = np.empty((len(kept), len(kept)))
-    for column, at in enumerate(kept):
-        step = _STEPS.get(plant.states[at], _STEP)
-        step = 1e-10 if plant.model.plant == "cascade" and "pressure" not in plant.states[at] else step
-        up, down = base.copy(), base.copy()
-        up[at] += step
-        down[at] -= step
-        a[:, column] = (rate(up, *commands) - rate(down, *commands)) / (2.0 * step)
-    b = np.empty((len(kept), len(INPUTS)))
-    for column in range(len(INPUTS)):
-        step = np.zeros(len(INPUTS))
-        step[column] = 1e-4
-        high, low = np.add(commands, step), np.subtract(commands, step)
-        b[:, column] = (rate(base, *high) - rate(base, *low)) / 2e-4
-    return a, b
+def _by_input(plant: Plant, base: Condition, commands: tuple[float, float]) -> np.ndarray:
+    columns = []
+    for step in _VOLTAGE_STEP * np.eye(len(INPUTS)):
+        (motor, regulator), zero = commands, base.zero_contraction
+        up = plant.derivative(base.state, motor + step[0], regulator + step[1], zero)
+        down = plant.derivative(base.state, motor - step[0], regulator - step[1], zero)
+        columns.append((up - down) / (2.0 * _VOLTAGE_STEP))
+    return np.stack(columns, axis=1)
 
 
 def _outputs(plant: Plant, rest: Condition, kept: list[int]) -> np.ndarray:
-    rows = []
+    columns = []
+    for high, low, step in _pairs(plant, rest.state, kept):
+        seen = plant.observe(np.stack([high, low]), rest.zero_contraction)
+        columns.append([(seen[name][0] - seen[name][1]) / (2.0 * step) for name in SEEN])
+    return np.transpose(columns)
+
+
+def _pairs(
+    plant: Plant, state: np.ndarray, kept: list[int]
+) -> list[tuple[np.ndarray, np.ndarray, float]]:
+    """The state moved up and down along each kept state, and the step."""
+    pairs = []
     for at in kept:
-        step = _STEPS.get(plant.states[at], _STEP)
-        pair = np.stack([rest.state, rest.state])
-        pair[:, at] += (step, -step)
-        seen = plant.observe(pair, rest.zero_contraction)
-        rows.append([(seen[n][0] - seen[n][1]) / (2.0 * step) for n in (*OUTPUTS, "extension")])
-    return np.array(rows).T
-
-
-def symbolic(plant: Plant) -> dict[str, Any]:
-    """The plant's equations of motion, from the text that is simulated.
-
-    Needs SymPy (`pip install "pma-gym[symbolic]"`).
-
-    Args:
-        plant: the plant.
-    Returns:
-        SymPy expression of every state's rate, by the state's name. Symbols are the states, the
-        commands, zero_contraction, and parameters as effect.name (SI).
-    """
-    import sympy
-
-    def where(condition: Any, yes: Any, no: Any) -> Any:
-        return sympy.Piecewise((yes, condition), (no, True))
-
-    rate = rebind(plant.plain.rate, {"where": where, "exponential": sympy.exp})
-    symbols = {name: sympy.Symbol(name, real=True) for name in plant.states}
-    inputs = [sympy.Symbol(name, real=True) for name in (*INPUTS, "zero_contraction")]
-    parameters = [_symbols(name, values) for name, values in plant.model.parameters.items()]
-    parts = iter(rate(*symbols.values(), *inputs, *parameters))
-    out = {}
-    for name, symbol in symbols.items():
-        source = next(parts)
-        out[name] = source - next(parts) * symbol if name in plant.decaying else source
-    return out
-
-
-def _symbols(effect: str, values: Any) -> Any:
-    import sympy
-
-    def one(path: str, value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(sympy.Symbol(f"{path}[{i}]", real=True) for i in range(len(value)))
-        return sympy.Symbol(path, real=True)
-
-    return type(values)(*(one(f"{effect}.{n}", getattr(values, n)) for n in values._fields))
+        step = _PRESSURE_STEP if plant.states[at] == "pressure" else _STEP
+        move = np.zeros_like(state)
+        move[at] = step
+        pairs.append((state + move, state - move, step))
+    return pairs

@@ -1,7 +1,7 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
-import math
+import json
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from pma_gym.effects import CATALOGUE, Effect
-from pma_gym.effects.effect import Value
+from pma_gym.effects.effect import Parameters, Value
 from pma_gym.plant import cascade, station
+from pma_gym.plant.compose import Port
 
 SCHEMA = 1
 PLANTS = {"station": station, "cascade": cascade}
@@ -55,11 +56,13 @@ class Model:
     name: str
     title: str
     plant: str
-    parameters: Mapping[str, Any]
+    parameters: Mapping[str, Parameters]
     notes: Mapping[str, Note] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Freeze the parameters and check that the plant's ports are filled."""
+        for name in self.parameters:
+            _known(name)
         ordered = {name: self.parameters[name] for name in CATALOGUE if name in self.parameters}
         object.__setattr__(self, "parameters", MappingProxyType(ordered))
         object.__setattr__(self, "notes", MappingProxyType(dict(self.notes)))
@@ -96,15 +99,21 @@ class Model:
         Raises:
             ModelError: an unknown parameter (with the nearest known) or one out of bounds.
         """
-        door = {effect: self.at_the_door(effect) for effect in self.parameters}
+        given: dict[str, dict[str, Value]] = {}
+        known = set(self.paths())
         for path, value in values.items():
-            effect, _, parameter = path.partition(".")
-            if parameter not in door.get(effect, {}):
+            if path not in known:
                 raise ModelError(f"model {self.name} has no parameter {path}{self._nearest(path)}")
-            door[effect][parameter] = value
+            effect, _, parameter = path.partition(".")
+            given.setdefault(effect, {})[parameter] = value
+        parameters = dict(self.parameters)
+        try:
+            for effect, changed in given.items():
+                parameters[effect] = CATALOGUE[effect].changed(parameters[effect], changed)
+        except ValueError as error:
+            raise ModelError(str(error)) from error
         notes = {path: note for path, note in self.notes.items() if path not in values}
-        parsed = {effect: _parse(effect, given) for effect, given in door.items()}
-        return replace(self, name=name or self.name, parameters=parsed, notes=notes)
+        return replace(self, name=name or self.name, parameters=parameters, notes=notes)
 
     def at_the_door(self, effect: str) -> dict[str, Value]:
         """One effect's values by their names at the door."""
@@ -181,49 +190,46 @@ def parse_model(document: Mapping[str, Any]) -> Model:
     return Model(**head, parameters=parameters, notes=notes)
 
 
-def _split(effect: str, table: Any) -> tuple[dict[str, Value], dict[str, Note]]:
+def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note]]:
     if not isinstance(table, dict):
         raise ModelError(f"{effect} = {table!r} is no table; parameters stand under [effect]")
     values, notes = {}, {}
     for name, given in table.items():
         entry = given if isinstance(given, dict) else {"value": given}
-        unknown = set(entry) - {"value", "low", "high", "source"}
-        if unknown or "value" not in entry:
+        low, high = entry.get("low"), entry.get("high")
+        if (
+            not {"value"} <= set(entry) <= {"value", "low", "high", "source"}
+            or not isinstance(low, int | float | None)
+            or not isinstance(high, int | float | None)
+        ):
             raise ModelError(
-                f"{effect}.{name} must be a number or a table of value, low, high, source; "
-                f"got {given!r}"
+                f"{effect}.{name} must be a number, or a table of value, low and high (numbers) "
+                f"and source (text); got {given!r}"
             )
         values[name] = entry["value"]
-        notes[f"{effect}.{name}"] = Note(
-            str(entry.get("source", "")), entry.get("low"), entry.get("high")
-        )
+        notes[f"{effect}.{name}"] = Note(str(entry.get("source", "")), low, high)
     return values, notes
 
 
-def _parse(effect: str, values: Mapping[str, Value]) -> Any:
+def _parse(effect: str, values: Mapping[str, Value]) -> Parameters:
+    try:
+        return _known(effect).parse(values)
+    except ValueError as error:
+        raise ModelError(str(error)) from error
+
+
+def _known(effect: str) -> Effect:
     if effect not in CATALOGUE:
         near = difflib.get_close_matches(effect, list(CATALOGUE), 1)
         hint = f"did you mean [{near[0]}]?" if near else f"known: {', '.join(CATALOGUE)}"
         raise ModelError(f"unknown effect [{effect}]; {hint}")
-    try:
-        return CATALOGUE[effect].parse(values)
-    except ValueError as error:
-        raise ModelError(str(error)) from error
+    return CATALOGUE[effect]
 
 
 def _check_ports(model: Model) -> None:
     if model.plant not in PLANTS:
         raise ModelError(f"plant must be one of {', '.join(PLANTS)}, got {model.plant!r}")
     plant = PLANTS[model.plant]
-    for part in plant.PARTS:
-        if part not in model.parameters:
-            raise ModelError(f"a {model.plant} needs [{part}]; add it (see models/serres2008.toml)")
-    for port, rule in plant.PORTS.items():
-        at = [name for name, effect in model.effects.items() if effect.port == port]
-        if rule.startswith("one") and len(at) != 1:
-            raise ModelError(
-                f"port {port} of a {model.plant} takes {rule}; got {', '.join(at) or 'none'}"
-            )
     for name, effect in model.effects.items():
         known = effect.port == "part" or effect.port.startswith("sensor:")
         if not known and effect.port not in plant.PORTS:
@@ -231,6 +237,24 @@ def _check_ports(model: Model) -> None:
                 f"[{name}] acts at port {effect.port}, which a {model.plant} does not have; "
                 f"its ports: {', '.join(plant.PORTS)}"
             )
+    for part in plant.PARTS:
+        if part not in model.parameters:
+            raise ModelError(
+                f"a {model.plant} needs [{part}]; copy it from the shipped model "
+                f"{'serres2008' if model.plant == 'station' else 'cascade'}"
+            )
+    for name, port in plant.PORTS.items():
+        _check_port(model, name, port)
+
+
+def _check_port(model: Model, name: str, port: Port) -> None:
+    at = [effect.name for effect in model.effects.values() if effect.port == name]
+    if not port.least <= len(at) <= port.most or (port.only and set(at) != set(port.only)):
+        fitting = port.only or [effect.name for effect in CATALOGUE.values() if effect.port == name]
+        raise ModelError(
+            f"port {name} of a {model.plant} takes {port.takes}: {port.result}; "
+            f"got {', '.join(at) or 'none'} of {', '.join(fitting)}"
+        )
 
 
 def dump_model(model: Model) -> str:
@@ -245,17 +269,16 @@ def dump_model(model: Model) -> str:
 
 
 def _entry(value: Value, note: Note) -> str:
-    parts = [f"value = {_text(value)}"]
-    parts += [f"{key} = {_text(end)}" for key in ("low", "high") if (end := getattr(note, key)) is not None]
-    parts += [f"source = {_text(note.source)}"] if note.source else []
+    known = {"value": value, "low": note.low, "high": note.high, "source": note.source or None}
+    parts = [f"{key} = {_text(part)}" for key, part in known.items() if part is not None]
     return f"{{ {', '.join(parts)} }}"
 
 
 def _text(value: str | Value) -> str:
     if isinstance(value, str):
-        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        # The escapes of JSON are those of TOML.
+        return json.dumps(value, ensure_ascii=False)
     if isinstance(value, tuple):
         return "[" + ", ".join(_text(one) for one in value) + "]"
     # Nine digits: below every interval, and free of the last bits that unit factors leave.
-    short = f"{value:.9g}"
-    return short if math.isfinite(float(short)) else repr(value)
+    return f"{value:.9g}"

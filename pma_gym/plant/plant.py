@@ -1,14 +1,18 @@
 """A plant that runs: settles, steps, simulates whole trials."""
 
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant import compiled, sensors, settle
+from pma_gym.plant import sensors, settle
+from pma_gym.plant.compiled import compile_module, import_text
 from pma_gym.plant.compose import Equations
 from pma_gym.plant.integrate import DEFAULT_STEP_S, module_text
 from pma_gym.plant.model import PLANTS, Model, load_model
@@ -39,6 +43,8 @@ class Plant:
     Args:
         model: a Model, the name of a shipped one, or the path of a TOML file.
         step: largest internal time step (s).
+        compiled: False runs the laws as plain Python, some hundred times slower, for debugging;
+            the results are the same bits.
 
     Attributes:
         model: the Model.
@@ -54,16 +60,20 @@ class Plant:
         39.8
     """
 
-    def __init__(self, model: str | Model = "serres2008", step: float = DEFAULT_STEP_S) -> None:
+    def __init__(
+        self,
+        model: str | Path | Model = "serres2008",
+        step: float = DEFAULT_STEP_S,
+        compiled: bool = True,
+    ) -> None:
         """Compile the model's equations, or load them from the cache."""
         self.model = load_model(model)
         self.step_limit = step
         self.text, equations = _written(self.model)
         self.states = [state.name for state in equations.states]
         self.decaying = {state.name for state in equations.states if state.decay}
-        laws = tuple(law for effect in self.model.effects.values() for law in effect.laws())
-        self._laws = laws
-        self._module = compiled.compile_module(self.text, laws)
+        self._warn_of_large_steps()
+        self._module = compile_module(self.text) if compiled else import_text(self.text)
         self.vector = self.model.vector()
         self.outputs = OUTPUTS
         self.sensor_columns = [
@@ -72,9 +82,19 @@ class Plant:
         ]
 
     @cached_property
-    def plain(self):  # noqa: ANN201 - a module of functions
+    def plain(self) -> ModuleType:
         """The same equations as an uncompiled Python module, for debugging."""
-        return compiled.import_text(self.text, self._laws)
+        return import_text(self.text)
+
+    def _warn_of_large_steps(self) -> None:
+        # Decays are integrated exactly; what swings is not, and is quietly wrong before it bursts.
+        frequency = PLANTS[self.model.plant].fastest_oscillation(self.model.parameters)
+        if frequency * self.step_limit > 1.0:
+            warnings.warn(
+                f"model {self.model.name} swings at {frequency:.3g} rad/s, too fast for steps of "
+                f"{self.step_limit:g} s; give Plant a step of at most {0.1 / frequency:.1g}",
+                stacklevel=3,
+            )
 
     def regulator_voltage(self, pressure: float) -> float:
         """Regulator voltage (V) that settles at a pressure (Pa).
@@ -92,8 +112,12 @@ class Plant:
             )
         return voltage
 
-    def settle(self, motor_voltage: float = 0.0, pressure: float | None = None,
-               regulator_voltage: float | None = None) -> Condition:
+    def settle(
+        self,
+        motor_voltage: float = 0.0,
+        pressure: float | None = None,
+        regulator_voltage: float | None = None,
+    ) -> Condition:
         """The plant at rest at constant commands, memories at zero.
 
         Args:
@@ -102,15 +126,24 @@ class Plant:
             regulator_voltage: regulator command (V).
         Returns:
             The settled condition.
+        Raises:
+            ValueError: neither pressure nor regulator voltage, a pressure that the regulator does
+                not reach, or a load that the muscle cannot balance.
         """
         if regulator_voltage is None:
-            assert pressure is not None
+            if pressure is None:
+                raise ValueError("settle needs a pressure (Pa) or a regulator_voltage (V)")
             regulator_voltage = self.regulator_voltage(pressure)
         state, zero = settle.at_rest(self, motor_voltage, regulator_voltage)
         return Condition(state, zero)
 
-    def derivative(self, state: np.ndarray, motor_voltage: float, regulator_voltage: float,
-                   zero_contraction: float) -> np.ndarray:
+    def derivative(
+        self,
+        state: np.ndarray,
+        motor_voltage: float,
+        regulator_voltage: float,
+        zero_contraction: float,
+    ) -> np.ndarray:
         """Time derivative of the state vector (SI per s)."""
         out = np.empty_like(state)
         self._module.derivative(
@@ -118,8 +151,15 @@ class Plant:
         )
         return out
 
-    def step(self, condition: Condition, motor_voltage: float, regulator_voltage: float,
-             duration: float, period: float = 0.0, samples: np.ndarray = NO_SAMPLES) -> None:
+    def step(
+        self,
+        condition: Condition,
+        motor_voltage: float,
+        regulator_voltage: float,
+        duration: float,
+        period: float = 0.0,
+        samples: np.ndarray = NO_SAMPLES,
+    ) -> None:
         """Hold the commands for a while; changes the condition in place.
 
         Args:
@@ -132,24 +172,46 @@ class Plant:
         """
         substeps = max(1, math.ceil(duration / self.step_limit - 1e-6))
         self._module.advance(
-            condition.state, motor_voltage, motor_voltage, regulator_voltage, regulator_voltage,
-            condition.time, duration, substeps, condition.zero_contraction, self.vector,
-            period, samples,
+            condition.state,
+            motor_voltage,
+            motor_voltage,
+            regulator_voltage,
+            regulator_voltage,
+            condition.time,
+            duration,
+            substeps,
+            condition.zero_contraction,
+            self.vector,
+            period,
+            samples,
         )
         condition.time += duration
 
     def observe(self, states: np.ndarray, zero_contraction: float) -> dict[str, np.ndarray]:
-        """True outputs of states of shape (rows, states): contraction, rotation, load, pressure
-        and extension (SI), each of shape (rows,)."""
+        """True outputs of states.
+
+        Args:
+            states: shape (rows, states).
+            zero_contraction: contraction x0 that extension counts from (m).
+        Returns:
+            contraction, rotation, load, pressure and extension (SI), shape (rows,) each.
+        """
         out = np.empty((states.shape[0], len(OUTPUTS)))
         self._module.observe(states, 0.0, 0.0, zero_contraction, self.vector, out)
         truth = {name: out[:, i] for i, name in enumerate(OUTPUTS)}
         truth["extension"] = zero_contraction - truth["contraction"]
         return truth
 
-    def run(self, time: np.ndarray, motor_voltage: np.ndarray, regulator_voltage: np.ndarray,
-            joined: bool = True, condition: Condition | None = None, period: float = 0.0,
-            samples: np.ndarray = NO_SAMPLES) -> tuple[np.ndarray, float]:
+    def run(
+        self,
+        time: np.ndarray,
+        motor_voltage: np.ndarray,
+        regulator_voltage: np.ndarray,
+        joined: bool = True,
+        condition: Condition | None = None,
+        period: float = 0.0,
+        samples: np.ndarray = NO_SAMPLES,
+    ) -> tuple[np.ndarray, float]:
         """States at each time under given commands.
 
         Args:
@@ -168,14 +230,23 @@ class Plant:
         )
         states = np.empty((len(time), len(self.states)))
         self._module.simulate(
-            np.ascontiguousarray(time, dtype=float), np.ascontiguousarray(motor_voltage, float),
-            np.ascontiguousarray(regulator_voltage, float), joined, self.step_limit,
-            first.state.copy(), first.zero_contraction, self.vector, period, samples, states,
+            np.ascontiguousarray(time, dtype=float),
+            np.ascontiguousarray(motor_voltage, float),
+            np.ascontiguousarray(regulator_voltage, float),
+            joined,
+            self.step_limit,
+            first.state.copy(),
+            first.zero_contraction,
+            self.vector,
+            period,
+            samples,
+            states,
         )
         return states, first.zero_contraction
 
-    def simulate(self, trial: Trial, noise: bool = True, seed: int | None = 0,
-                 joined: bool = True) -> Trial:
+    def simulate(
+        self, trial: Trial, noise: bool = True, seed: int | None = 0, joined: bool = True
+    ) -> Trial:
         """Run a trial's commands and log what the station's sensors would.
 
         Args:
@@ -196,8 +267,11 @@ class Plant:
         measured = sensors.measure(self.model, self.lagged(states, truth), generator)
         provenance = dict(trial.provenance) | self.provenance(noise, seed)
         return Trial(
-            time=trial.time, commands=trial.commands, measurements=measured,
-            truth=truth, provenance=provenance,
+            time=trial.time,
+            commands=trial.commands,
+            measurements=measured,
+            truth=truth,
+            provenance=provenance,
         )
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -223,4 +297,5 @@ def _written(model: Model) -> tuple[str, Equations]:
     plant = PLANTS[model.plant]
     equations = Equations(effects=model.effects)
     plant.write_equations(equations)
-    return module_text(equations, plant.OUTPUTS, model.lengths()), equations
+    text = module_text(equations, plant.OUTPUTS, model.lengths(), plant.FIRST_PARTS)
+    return text, equations

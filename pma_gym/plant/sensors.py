@@ -1,12 +1,16 @@
 """What the DAQ logs: lagged signals plus noise, through the calibrations, quantised."""
 
-from typing import Any
-
 import numpy as np
 
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE
+from pma_gym.effects.effect import Parameters
 from pma_gym.plant.model import Model
+from pma_gym.units import SI_FACTORS
+
+_ROUNDING = 1e-9
+"""Volts by which a conversion may miss the range."""
 
 SENSORS = {
     "lvdt": ("contraction", calibration.LVDT),
@@ -38,8 +42,16 @@ def read(lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray) -> np.ndar
     return (calibration.quantise(volts) - _OFFSETS) / _GAINS
 
 
-def measure(model: Model, lagged: np.ndarray, generator: np.random.Generator | None) -> dict[str, Any]:
-    """Measurements by name, of shape (rows,) each; without noise and quantisation if no generator."""
+def measure(
+    model: Model, lagged: np.ndarray, generator: np.random.Generator | None
+) -> dict[str, np.ndarray]:
+    """Measurements by name, of shape (rows,) each; without a generator neither noisy nor quantised.
+
+    Args:
+        model: the model whose sensors measure.
+        lagged: what the sensors hold, shape (rows, 4) (SI).
+        generator: source of the noise, or None.
+    """
     readings = lagged
     if generator is not None:
         readings = read(lagged, noise_levels(model), generator.standard_normal(lagged.shape))
@@ -50,24 +62,42 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """Motor and regulator voltages of a trial, from loads and pressures if it commands those.
 
     Raises:
-        ValueError: a command is missing.
+        ValueError: a command is missing, or asks for more than 0-10 V give.
     """
-    motor = _command(trial, "motor_voltage")
-    if motor is None:
-        drive = model.parameters.get("drive")
-        load = _command(trial, "load_command")
-        if load is None or drive is None:
-            raise ValueError("the trial commands no motor: give motor_voltage_v or load_command_n")
-        motor = (load - drive.offset) / drive.gain
-    regulator = _command(trial, "regulator_voltage")
-    if regulator is None:
-        line, pressure = model.parameters["regulator_line"], _command(trial, "pressure_command")
-        if pressure is None:
-            raise ValueError(
-                "the trial commands no pressure: give regulator_voltage_v or pressure_command_kpa"
+    line = model.parameters["regulator_line"]
+    return (
+        _voltage(trial, "motor_voltage", "load_command", model.parameters.get("drive")),
+        _voltage(trial, "regulator_voltage", "pressure_command", line),
+    )
+
+
+def _voltage(trial: Trial, voltage: str, wish: str, line: Parameters | None) -> np.ndarray:
+    """A voltage as commanded, or as a line (gain, offset) gives it from what is wished for."""
+    given = _command(trial, voltage)
+    if given is not None:
+        return given
+    wished = _command(trial, wish)
+    if wished is None or line is None:
+        choice = f"{voltage}_v or {BY_QUANTITY[wish].name}" if line else f"{voltage}_v"
+        raise ValueError(f"the trial does not command the {voltage.split('_')[0]}: give {choice}")
+    found = (wished - line.offset) / line.gain
+    lowest, highest = VOLTAGE_RANGE
+    outside = np.flatnonzero((found < lowest - _ROUNDING) | (found > highest + _ROUNDING))
+    if outside.size:
+        column, at = BY_QUANTITY[wish], outside[0]
+        low, high, came = (
+            value / SI_FACTORS[column.unit]
+            for value in (
+                line.gain * lowest + line.offset,
+                line.gain * highest + line.offset,
+                wished[at],
             )
-        regulator = (pressure - line.offset) / line.gain
-    return motor, regulator
+        )
+        raise ValueError(
+            f"{column.name} must lie in {low:g} to {high:g} {column.unit}, what {voltage}_v of "
+            f"{lowest:g} to {highest:g} gives; sample {at} has {came:g}"
+        )
+    return np.clip(found, *VOLTAGE_RANGE)
 
 
 def _command(trial: Trial, name: str) -> np.ndarray | None:

@@ -8,17 +8,20 @@
 The tension T is what the load cell reads. Effects add to these balances at their ports.
 """
 
-from pma_gym.plant.compose import Equations
+from collections.abc import Mapping
 
-PORTS: dict[str, str] = {
-    "muscle_force": "any number, added: force on the slide (N), positive shortens the muscle",
-    "muscle_damping": "any number, added: damping coefficient of the slide (N s/m)",
-    "slide_force": "any number, added: force on the slide (N), positive shortens the muscle",
-    "cable": "one: tension of the cable (N)",
-    "drive": "one: load that the drive asks for (N)",
-    "regulator_line": "one: pressure that the regulator settles at (Pa)",
-    "regulator_lag": "one: rate of the pressure",
-    "regulator_pace": "any number, multiplied: factor on the regulator's time constant",
+from pma_gym.effects.effect import Parameters
+from pma_gym.plant.compose import Equations, Port
+
+PORTS: dict[str, Port] = {
+    "muscle_force": Port("force on the slide (N), added; positive shortens the muscle", least=1),
+    "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
+    "slide_force": Port("force on the slide (N), added; positive shortens the muscle"),
+    "cable": Port("tension of the cable (N)", least=1, most=1),
+    "drive": Port("load that the drive asks for (N)", least=1, most=1),
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": Port("factor on the regulator's time constant, multiplied"),
 }
 """Ports of the station: how many effects each takes, and what becomes of their results."""
 
@@ -33,6 +36,10 @@ OUTPUTS: dict[str, str] = {
 }
 """True outputs by name: the text of each, in terms of the equations' variables."""
 
+FIRST_PARTS = 1
+"""Parts of the first internal step after a command: nothing here is faster than the step."""
+
+
 def write_equations(equations: Equations) -> None:
     """Write the balance of the station, with the model's effects at its ports."""
     let = equations.let
@@ -46,6 +53,14 @@ def write_equations(equations: Equations) -> None:
     let("slide_force", equations.total("slide_force"))
     let("resistance", equations.total("muscle_damping"))
     _write_states(equations)
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """Frequency (rad/s) at which slide and rotor swing against each other on the cable."""
+    rotor, slide = parameters["rotor"], parameters["slide"]
+    return (
+        parameters["cable"].stiffness * (1.0 / slide.mass + rotor.radius**2 / rotor.inertia)
+    ) ** 0.5
 
 
 def _write_states(equations: Equations) -> None:

@@ -1,0 +1,212 @@
+"""Every effect of the catalogue: one text, honest units, exactly absent at its neutral value."""
+
+import math
+import sys
+import types
+from functools import cache
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba.extending import register_jitable
+
+from pma_gym.effects import CATALOGUE
+from pma_gym.effects.arithmetic import exponential
+from pma_gym.effects.effect import signals
+from pma_gym.plant import cascade, station
+from pma_gym.plant.lanes import lanes
+from pma_gym.plant.model import Model, load_model, shipped_models
+from pma_gym.plant.plant import Condition, Plant
+
+SIGNALS = {
+    "pressure": (0.0, 600e3),
+    "contraction": (-0.01, 0.07),
+    "velocity": (-0.2, 0.2),
+    "memory": (-1.0, 1.0),
+    "stretch": (-1e-3, 2e-3),
+    "stretch_rate": (-0.1, 0.1),
+    "motor_voltage": (0.0, 10.0),
+    "regulator_voltage": (0.0, 10.0),
+    "pressure_command": (0.0, 600e3),
+    "regulator_pace": (0.5, 2.0),
+    "displacement_input": (0.0, 0.05),
+    "displacement": (0.0, 0.05),
+    "displacement_rate": (-0.2, 0.2),
+    "signal": (-0.01, 500e3),
+}
+"""Ranges of what laws are given (SI)."""
+
+LAWS = [
+    pytest.param(effect, law, id=law.__name__ if law is effect.law else f"{effect.name}-rate")
+    for effect in CATALOGUE.values()
+    for law in effect.laws()
+]
+
+
+@cache
+def shipped(name):
+    """Parameters of an effect in some shipped model; at the middle of the bounds if in none."""
+    for model in map(load_model, shipped_models()):
+        if name in model.parameters:
+            return model.parameters[name]
+    if name == "servo_inertia":
+        return CATALOGUE[name].parse({"inertia_kg_m2": 2e-3, "damping_ratio": 0.7})
+    return CATALOGUE[name].start
+
+
+def arguments(effect, law, rows, seed=0):
+    """Arrays of signals of a law, `None` where its parameters go."""
+    generator = np.random.default_rng(seed)
+    return [
+        shipped("servo" if name == "servo" else effect.name)
+        if name in ("p", "servo")
+        else generator.uniform(*SIGNALS[name], rows)
+        for name in signals(law)
+    ]
+
+
+def one_row(given, row):
+    return [value if isinstance(value, tuple) else float(value[row]) for value in given]
+
+
+def compiled(law):
+    """The law as numba compiles it in a plant."""
+    for name in (law.__module__, exponential.__module__):
+        for function in vars(sys.modules[name]).values():
+            if isinstance(function, types.FunctionType) and function.__module__ == name:
+                register_jitable(error_model="numpy")(function)
+    return numba.njit(error_model="numpy")(law)
+
+
+@pytest.mark.parametrize(("effect", "law"), LAWS)
+def test_one_text_gives_one_number(effect, law):
+    given = arguments(effect, law, 64)
+    plain = [law(*one_row(given, row)) for row in range(64)]
+    fast = compiled(law)
+    assert [fast(*one_row(given, row)) for row in range(64)] == plain
+    together = lanes(law)(*given)
+    parts = together if isinstance(together, tuple) else (together,)
+    for part, expected in zip(parts, np.reshape(plain, (64, -1)).T, strict=True):
+        scale, found = np.abs(expected).max(), np.broadcast_to(part, 64)
+        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * scale)
+
+
+@pytest.mark.parametrize(("effect", "law"), LAWS)
+def test_a_law_is_finite_wherever_its_signals_go(effect, law):
+    given = arguments(effect, law, 200, seed=1)
+    for row in range(200):
+        out = law(*one_row(given, row))
+        assert all(math.isfinite(value) for value in (out if isinstance(out, tuple) else (out,)))
+        if law is effect.rate:
+            assert out[1] >= 0.0
+
+
+@pytest.mark.parametrize(("effect", "law"), LAWS)
+def test_a_law_says_its_equation_units_and_source(effect, law):
+    text = law.__doc__
+    for name in signals(law):
+        assert f"{name}: " in text
+    assert "Returns:" in text
+    assert "(" in text.split("Args:")[1]
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
+def test_every_quantity_has_unit_bounds_and_source(effect):
+    assert effect.quantities.keys() == set(effect.parameters._fields)
+    for name, quantity in effect.quantities.items():
+        assert quantity.source
+        assert quantity.lower < quantity.upper
+        assert math.isfinite(quantity.lower) and math.isfinite(quantity.upper)
+        if quantity.neutral is not None:
+            quantity.check(name, quantity.neutral)
+    doors = effect.names_at_the_door()
+    assert len(doors) == len(effect.parameters._fields)
+    assert effect.parameters.__doc__
+    ports = {"part", *station.PORTS, *cascade.PORTS}
+    assert effect.port in ports or effect.port.startswith("sensor:")
+
+
+def test_names_are_unique_and_are_their_keys():
+    assert all(effect.name == name for name, effect in CATALOGUE.items())
+    classes = [effect.parameters for effect in CATALOGUE.values()]
+    assert len(set(classes)) == len(classes)
+    laws = [(law.__module__, law.__name__) for e in CATALOGUE.values() for law in e.laws()]
+    own = [name for _, name in set(laws)]
+    # Laws of one plant share its module's names.
+    assert len(own) == len(set(own))
+
+
+def test_a_signature_sets_every_phenomenon_apart():
+    told = [
+        effect.signature
+        for effect in CATALOGUE.values()
+        if effect.port in ("muscle_force", "muscle_damping", "slide_force", "regulator_pace")
+    ]
+    assert all(told)
+
+
+ADDED = [
+    effect
+    for effect in CATALOGUE.values()
+    if effect.port in station.PORTS
+    and effect.port in ("muscle_force", "muscle_damping", "slide_force", "regulator_pace")
+]
+
+
+def trajectory(model):
+    """States and outputs by name under a busy motor and regulator."""
+    plant, base = Plant(model, compiled=False), Plant(BASE, compiled=False)
+    rest = base.settle(2.0, 300e3)
+    settled = dict(zip(base.states, rest.state, strict=True))
+    state = np.array([settled.get(name, 0.0) for name in plant.states])
+    motor = np.array([2.0, 5.0, 0.0, 4.0, 4.0])
+    regulator = np.array([5.4, 6.0, 6.0, 5.0, 5.0])
+    start = Condition(state, rest.zero_contraction)
+    states, zero = plant.run(0.02 * np.arange(5), motor, regulator, condition=start)
+    truth = plant.observe(states, zero)
+    return {name: states[:, i] for i, name in enumerate(plant.states)} | truth
+
+
+SHIPPED = load_model("serres2008")
+KEPT = {name: p for name, p in SHIPPED.parameters.items() if name != "coulomb_friction"}
+BASE = Model("base", "", "station", KEPT)
+
+
+@pytest.fixture(scope="module")
+def without():
+    return trajectory(BASE)
+
+
+@pytest.mark.parametrize("effect", ADDED, ids=lambda effect: effect.name)
+def test_an_effect_at_its_neutral_value_is_exactly_absent(effect, without):
+    rest = {name: p for name, p in KEPT.items() if name != effect.name}
+    found = trajectory(Model("with", "", "station", {**rest, effect.name: effect.neutral}))
+    expected = (
+        without if effect.name not in KEPT else trajectory(Model("less", "", "station", rest))
+    )
+    for name, values in expected.items():
+        np.testing.assert_array_equal(found[name], values, err_msg=name)
+
+
+def test_a_sensor_does_not_disturb_the_plant(without):
+    names = ("lvdt", "load_cell", "pressure_transducer", "potentiometer")
+    bare = trajectory(
+        Model("bare", "", "station", {n: p for n, p in KEPT.items() if n not in names})
+    )
+    for name, values in bare.items():
+        np.testing.assert_array_equal(without[name], values)
+
+
+@given(st.floats(-12.0, 12.0))
+def test_the_laws_exponential_is_exact_to_1e_12(value):
+    assert exponential(value) == pytest.approx(math.exp(value), rel=1e-12)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
+def test_the_middle_of_the_bounds_is_a_parameter_set(effect):
+    if effect.rows:
+        assert effect.name == "position_map"
+        return
+    assert effect.parse(effect.at_the_door(effect.start)) == pytest.approx(effect.start, rel=1e-12)

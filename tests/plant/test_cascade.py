@@ -1,0 +1,82 @@
+"""The cascade is the dissertation's linear model, with its map, and with the motor's inertia."""
+
+import control
+import numpy as np
+import pytest
+
+from benchmarks.accuracy import with_effect
+from pma_gym.data.serres2008 import load_table
+from pma_gym.effects.position_map import mapped_displacement
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+
+
+def stepped(model, pressure, before, after, rows=201, duration=0.5):
+    """Extension over time when the motor voltage steps at constant pressure."""
+    plant = Plant(model)
+    when = np.linspace(0.0, duration, rows)
+    regulator = np.full(rows, plant.regulator_voltage(pressure))
+    start = plant.settle(before, pressure)
+    states, zero = plant.run(when, np.full(rows, after), regulator, condition=start)
+    return plant, when, plant.observe(states, zero)["extension"]
+
+
+@pytest.mark.parametrize(("pressure", "before", "after"), [(250e3, 1.0, 4.0), (500e3, 6.0, 2.0)])
+def test_without_inertia_it_is_eq_22(pressure, before, after):
+    plant, when, extension = stepped("cascade", pressure, before, after)
+    part = plant.model.parameters
+    stiffness, damping = (32.7 - 0.0321 * 250) * 1e3, 1.57e3
+    if pressure > 314e3:
+        # The motor lets go, so the muscle contracts.
+        stiffness, damping = (17.0 + 0.0179 * 500) * 1e3, 2.90e3
+    muscle, motor = stiffness / damping, part["servo"].stiffness / part["servo"].damping
+    assert motor == pytest.approx(13_428, abs=2)
+    system = control.tf([muscle * motor], [1.0, muscle + motor, muscle * motor])
+    response = control.step_response(system, when).outputs
+    ends = [mapped_displacement(v, pressure, part["position_map"]) for v in (before, after)]
+    expected = ends[0] + (ends[1] - ends[0]) * response
+    assert np.abs(extension - expected).max() < 1e-6 * abs(ends[1] - ends[0])
+
+
+def test_with_inertia_it_is_eq_10_and_the_muscle():
+    inertial = {"inertia_kg_m2": 2e-3, "damping_ratio": 0.7}
+    model = with_effect(load_model("cascade"), "servo_inertia", inertial)
+    plant, when, extension = stepped(model, 400e3, 1.0, 4.0)
+    part = plant.model.parameters
+    square = part["servo"].stiffness / 2e-3
+    motor = control.tf([square], [1.0, 1.4 * square**0.5, square])
+    # The motor overshoots, but the muscle never passes it at 0.7: one damping all the way.
+    rate = (17.0 + 0.0179 * 400.0) / (0.311 + 0.00338 * 400.0)
+    response = control.step_response(motor * control.tf([rate], [1.0, rate]), when[:60]).outputs
+    ends = [mapped_displacement(v, 400e3, part["position_map"]) for v in (1.0, 4.0)]
+    expected = ends[0] + (ends[1] - ends[0]) * response
+    assert np.abs(extension[:60] - expected).max() < 1e-6 * (ends[1] - ends[0])
+
+
+def test_the_map_passes_through_table_18_and_is_linear_between_its_rows():
+    p = load_model("cascade").parameters["position_map"]
+    for row in range(len(p.pressure)):
+        for voltage in (1.0, 3.0):
+            parabola = (p.square[row] * voltage + p.linear[row]) * voltage + p.constant[row]
+            found = mapped_displacement(voltage, p.pressure[row], p)
+            assert found == pytest.approx(max(0.0, parabola), rel=1e-12)
+    printed = load_table("18")
+    assert set(np.asarray(printed["pressure_kpa"]) * 1e3) <= set(p.pressure)
+    ends = [mapped_displacement(2.0, pressure, p) for pressure in (500e3, 550e3)]
+    assert mapped_displacement(2.0, 525e3, p) == pytest.approx(sum(ends) / 2.0)
+
+
+def test_the_map_gives_nothing_at_no_voltage_and_never_falls():
+    p = load_model("cascade").parameters["position_map"]
+    for pressure in np.linspace(100e3, 600e3, 11):
+        along = [mapped_displacement(v, pressure, p) for v in np.linspace(0.0, 10.0, 101)]
+        assert along[0] < 1e-3
+        assert np.all(np.diff(along) >= 0.0)
+
+
+def test_a_straight_or_rising_map_has_no_peak():
+    p = load_model("cascade").parameters["position_map"]
+    for square in (0.0, 1e-4):
+        bent = p._replace(square=tuple(square for _ in p.square))
+        expected = square * 81.0 + 9.0 * p.linear[0] + p.constant[0]
+        assert mapped_displacement(9.0, 100e3, bent) == pytest.approx(expected)

@@ -1,0 +1,259 @@
+"""Models: read, written, changed, copied; and what is said about a broken one."""
+
+import copy
+import pickle
+from types import MappingProxyType
+
+import numpy as np
+import pytest
+
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import (
+    Model,
+    ModelError,
+    Note,
+    dump_model,
+    load_model,
+    parse_model,
+    shipped_models,
+)
+
+SHIPPED = sorted(shipped_models())
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_model_survives_its_own_file(name, tmp_path):
+    model = load_model(name)
+    assert model.name == name
+    path = tmp_path / "copy.toml"
+    path.write_text(dump_model(model), encoding="utf-8")
+    again = load_model(path)
+    assert again.parameters == model.parameters
+    assert again.notes == model.notes
+    assert (again.name, again.title, again.plant) == (model.name, model.title, model.plant)
+    assert dump_model(again) == dump_model(model)
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_number_of_a_shipped_model_has_a_source(name):
+    model = load_model(name)
+    assert set(model.notes) == set(model.paths())
+    assert all(note.source for note in model.notes.values())
+    for note in model.notes.values():
+        assert (note.low is None) == (note.high is None)
+
+
+def test_intervals_contain_their_values():
+    model = load_model("station")
+    known = {path: note for path, note in model.notes.items() if note.low is not None}
+    assert known
+    for path, note in known.items():
+        effect, _, name = path.partition(".")
+        assert note.low < model.at_the_door(effect)[name] < note.high
+
+
+def test_the_literatures_models_differ_from_serres2008_in_the_muscle_alone():
+    base = load_model("serres2008")
+    for name in set(SHIPPED) - {"serres2008", "station", "cascade"}:
+        model = load_model(name)
+        for effect, values in model.parameters.items():
+            if CATALOGUE[effect].port not in ("muscle_force", "muscle_damping"):
+                kept = values._replace(**({"contraction": 0.07} if effect == "limits" else {}))
+                assert kept == base.parameters[effect]
+
+
+def test_copies_and_pickles_are_equal():
+    model = load_model("station")
+    for other in (copy.deepcopy(model), pickle.loads(pickle.dumps(model))):
+        assert other.parameters == model.parameters
+        assert dict(other.notes) == dict(model.notes)
+        assert other.name == model.name
+        assert isinstance(other.parameters, MappingProxyType)
+        np.testing.assert_array_equal(other.vector(), model.vector())
+
+
+def test_a_model_cannot_be_changed_in_place():
+    model = load_model("serres2008")
+    with pytest.raises(TypeError):
+        model.parameters["drive"] = None  # type: ignore[index]
+    with pytest.raises(AttributeError):
+        model.parameters["drive"].gain = 1.0
+    with pytest.raises(AttributeError):
+        model.name = "other"  # type: ignore[misc]
+
+
+def test_replace_changes_what_is_named_and_nothing_else():
+    model = load_model("station")
+    other = model.replace({"drive.gain_n_per_v": 100.0, "cable.slack_mm": 2.0}, name="tuned")
+    assert other.name == "tuned"
+    assert other.parameters["drive"].gain == 100.0
+    assert other.parameters["cable"].slack == pytest.approx(2e-3, rel=1e-15)
+    assert other.parameters["drive"].offset == model.parameters["drive"].offset
+    changed = {
+        name for name in model.parameters if model.parameters[name] != other.parameters[name]
+    }
+    assert changed == {"drive", "cable"}
+    assert "drive.gain_n_per_v" not in other.notes
+    assert other.notes["drive.offset_n"] == model.notes["drive.offset_n"]
+    assert model.replace({}).parameters == model.parameters
+
+
+def test_replace_refuses_what_it_does_not_know_or_may_not_be():
+    model = load_model("serres2008")
+    with pytest.raises(
+        ModelError, match=r"no parameter drive\.gain; did you mean drive.gain_n_per"
+    ):
+        model.replace({"drive.gain": 1.0})
+    with pytest.raises(ModelError, match=r"drive\.gain_n_per_v must lie in 1 to 1000 N/V, got 0"):
+        model.replace({"drive.gain_n_per_v": 0})
+    with pytest.raises(ModelError, match=r"must be a number in N/V, got 'strong'"):
+        model.replace({"drive.gain_n_per_v": "strong"})  # type: ignore[dict-item]
+
+
+def test_numbers_at_their_bounds_survive_replacement():
+    model = load_model("serres2008")
+    for effect in model.effects.values():
+        for stem, quantity in effect.quantities.items():
+            path = f"{effect.name}.{quantity.name(stem)}"
+            for bound in (quantity.lower, quantity.upper):
+                model = model.replace({path: bound})
+                assert model.replace({}).parameters == model.parameters
+
+
+def test_text_with_any_character_survives():
+    base = load_model("serres2008")
+    title = 'a "quoted" \\ title,\nof two lines, µ\t.'
+    notes = {"drive.offset_n": Note('by "hand"', -1.0, 2.5)}
+    model = Model(base.name, title, base.plant, base.parameters, notes)
+    import tomllib
+
+    again = parse_model(tomllib.loads(dump_model(model)))
+    assert again.title == title
+    assert again.notes["drive.offset_n"] == notes["drive.offset_n"]
+
+
+GOOD = dump_model(load_model("serres2008"))
+CASCADE = dump_model(load_model("cascade"))
+
+
+def without(text, table):
+    """The text of a model without one of its tables."""
+    begin = text.index(f"[{table}]")
+    end = text.find("\n[", begin)
+    return text[:begin] + text[end + 1 :]
+
+
+BROKEN = {
+    "not TOML": (GOOD.replace("[drive]", "[drive"), "is not valid TOML: .*line"),
+    "other schema": (GOOD.replace("schema = 1", "schema = 7"), "schema must be 1, got 7"),
+    "no schema": (GOOD.replace("schema = 1\n", ""), "schema must be 1, got None"),
+    "no head": (GOOD.replace('plant = "station"\n', ""), "a model needs .* missing: plant"),
+    "unknown plant": (GOOD.replace('"station"', '"rig"'), "one of station, cascade, got 'rig'"),
+    "unknown effect": (
+        GOOD.replace("[coulomb_friction]", "[coulomb_fricton]"),
+        r"unknown effect \[coulomb_fricton\]; did you mean \[coulomb_friction\]\?",
+    ),
+    "far from any effect": (
+        GOOD + "\n[zzz]\na = 1\n",
+        r"unknown effect \[zzz\]; known: contractile",
+    ),
+    "missing parameter": (
+        GOOD.replace("mass_kg", "weight_kg"),
+        r"\[slide\] takes mass_kg; unknown: weight_kg, missing: mass_kg",
+    ),
+    "out of bounds": (
+        GOOD.replace("value = 97.84", "value = 97840"),
+        r"drive.gain_n_per_v must lie in 1 to 1000 N/V, got 97840",
+    ),
+    "not a number": (
+        GOOD.replace("value = nan", "").replace("value = 97.84", "value = nan"),
+        r"drive.gain_n_per_v must lie in 1 to 1000 N/V, got nan",
+    ),
+    "text in a number": (
+        GOOD.replace("value = 97.84", 'value = "98 N/V"'),
+        r"drive.gain_n_per_v must be a number in N/V, got '98 N/V'",
+    ),
+    "truth in a number": (GOOD.replace("value = 97.84", "value = true"), "number in N/V, got True"),
+    "a list for a number": (
+        GOOD.replace("value = 97.84", "value = [97, 98]"),
+        r"drive.gain_n_per_v must be one number in N/V, got \[97, 98\]",
+    ),
+    "a number for a list": (
+        CASCADE.replace("pressure_kpa = { value = [", "pressure_kpa = { value = 1, x = ["),
+        r"position_map.pressure_kpa must be a number, or a table of value, low and high",
+    ),
+    "a row that falls": (
+        CASCADE.replace("[150, 200, 250", "[250, 200, 150"),
+        r"pressure of \[position_map\] must increase",
+    ),
+    "rows of two lengths": (
+        CASCADE.replace("[150, 200, 250", "[200, 250"),
+        r"rows of \[position_map\] must have one length, 2 or more; got pressure 10, square 11",
+    ),
+    "text for a bound": (
+        GOOD.replace("value = 97.84", 'value = 97.84, low = "90"'),
+        "table of value, low and high .numbers.",
+    ),
+    "a number for a table": ("drive = 3\n" + without(GOOD, "drive"), "drive = 3 is no table"),
+    "missing part": (
+        without(GOOD, "slide"),
+        r"a station needs \[slide\]; copy it from the shipped model serres2008",
+    ),
+    "missing port": (
+        without(GOOD, "drive"),
+        r"port drive of a station takes exactly one effect: load that .*; got none of drive",
+    ),
+    "no muscle": (
+        without(without(GOOD, "contractile_force"), "stiffness"),
+        "port muscle_force of a station takes 1 or more effects: .* got none of contractile_force",
+    ),
+    "foreign port": (
+        GOOD + "\n[servo]\nstiffness_n_m = 10\ndamping_n_m_s = 1e-3\nradius_mm = 25\n",
+        r"\[servo\] acts at port servo, which a station does not have; its ports: muscle_force",
+    ),
+    "an effect that a cascade would ignore": (
+        CASCADE
+        + "\n[repperger_spring]\nstiffness_n_per_mm = 1\nstiffening_n_per_mm_per_kpa = 0\n"
+        + "linear_n_per_mm2 = 0\nquadratic_n_per_mm3 = 0\n",
+        "port muscle_force of a cascade takes contractile_force and stiffness",
+    ),
+    "two dampings in a cascade": (
+        CASCADE + "\n[symmetric_damping]\nintercept_n_s_per_mm = 1\nslope_n_s_per_mm_per_kpa = 0\n",
+        "port muscle_damping of a cascade takes exactly one effect",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_file_is_refused_by_name_and_rule(case, tmp_path):
+    text, message = BROKEN[case]
+    path = tmp_path / "mine.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ModelError, match=message) as caught:
+        load_model(path)
+    assert str(path) in str(caught.value)
+
+
+def test_bytes_that_are_no_text_are_refused(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_bytes(b'schema = 1\nname = "\xff\xfe"')
+    with pytest.raises(ModelError, match="is not valid TOML"):
+        load_model(path)
+
+
+def test_no_such_model_names_the_nearest(tmp_path):
+    with pytest.raises(ModelError, match=r"no model 'stations': give .*; did you mean 'station'\?"):
+        load_model("stations")
+    missing = tmp_path / "nowhere.toml"
+    with pytest.raises(ModelError, match=r"nowhere\.toml.*or the path of a \.toml file"):
+        load_model(missing)
+
+
+def test_a_model_built_in_code_is_checked_as_a_file_is():
+    base = load_model("serres2008")
+    parameters = dict(base.parameters)
+    parameters["sarosi_forse"] = parameters["drive"]
+    with pytest.raises(
+        ModelError, match=r"unknown effect \[sarosi_forse\]; did you mean \[sarosi_"
+    ):
+        Model("mine", "", "station", parameters)

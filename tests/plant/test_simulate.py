@@ -1,0 +1,126 @@
+"""Whole trials through a plant: commands in, the station's log out."""
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.plant.plant import Plant
+
+
+def trial(time, **commands):
+    rows = len(time)
+    arrays = {name: np.broadcast_to(value, rows) for name, value in commands.items()}
+    return Trial(time=np.asarray(time), commands=arrays, provenance={"note": "mine"})
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return Plant("serres2008")
+
+
+WHEN = np.linspace(0.0, 1.0, 51)
+
+
+def test_a_simulated_trial_says_what_and_how(plant):
+    run = plant.simulate(trial(WHEN, motor_voltage=3.0, regulator_voltage=6.0), seed=4)
+    assert set(run.measurements) == {"contraction", "rotation", "load", "pressure"}
+    assert set(run.truth) == {*run.measurements, "extension"}
+    expected = {"note": "mine", "model": "serres2008", "noise": "True", "seed": "4"}
+    assert dict(run.provenance) == expected
+    assert len(run) == 51
+    np.testing.assert_array_equal(run.commands["motor_voltage"], np.full(51, 3.0))
+
+
+def test_loads_and_pressures_command_as_their_voltages_do(plant):
+    motor, regulator = 2.0 + np.sin(3.0 * WHEN), np.linspace(5.0, 6.0, 51)
+    volts = plant.simulate(trial(WHEN, motor_voltage=motor, regulator_voltage=regulator))
+    wishes = plant.simulate(
+        trial(
+            WHEN,
+            load_command=97.84 * motor - 2.0,
+            pressure_command=(59.9 * regulator - 20.4) * 1e3,
+        )
+    )
+    for name in volts.truth:
+        np.testing.assert_allclose(wishes.truth[name], volts.truth[name], rtol=1e-9, atol=1e-9)
+    both = plant.simulate(
+        trial(WHEN, motor_voltage=motor, load_command=0.0, regulator_voltage=regulator)
+    )
+    np.testing.assert_array_equal(both.truth["load"], volts.truth["load"])
+
+
+def test_uneven_times_lie_on_the_same_trajectory(plant):
+    every = np.linspace(0.0, 1.0, 101)
+    kept = np.sort(np.random.default_rng(1).choice(np.arange(1, 100), 30, replace=False))
+    few = np.concatenate([[0.0], every[kept], [1.0]])
+    motor = 1.0 + 2.0 * every
+    dense = plant.simulate(trial(every, motor_voltage=motor, regulator_voltage=6.0), noise=False)
+    sparse = plant.simulate(
+        trial(few, motor_voltage=1.0 + 2.0 * few, regulator_voltage=6.0), noise=False
+    )
+    rows = [0, *kept, 100]
+    for name, values in dense.truth.items():
+        away = np.abs(sparse.truth[name] - values[rows]).max()
+        assert away <= 1e-6 * np.ptp(values) + 1e-12 * abs(values[0])
+
+
+def test_held_commands_come_later_than_joined_ones(plant):
+    coarse = np.linspace(0.0, 1.0, 6)
+    ramp = trial(coarse, motor_voltage=1.0 + 3.0 * coarse, regulator_voltage=6.0)
+    joined, held = (plant.simulate(ramp, noise=False, joined=how) for how in (True, False))
+    assert np.all(held.truth["extension"][1:] < joined.truth["extension"][1:])
+    staircase = 1.0 + 3.0 * np.floor(np.linspace(0.0, 0.9999, 2001) * 5.0) / 5.0
+    fine = np.linspace(0.0, 1.0, 2001)
+    stepped = plant.simulate(
+        trial(fine, motor_voltage=staircase, regulator_voltage=6.0), noise=False, joined=False
+    )
+    np.testing.assert_allclose(
+        held.truth["extension"], stepped.truth["extension"][::400], atol=2e-5
+    )
+
+
+def test_a_trial_begins_settled_at_its_first_commands(plant):
+    run = plant.simulate(trial(WHEN, motor_voltage=3.0, regulator_voltage=6.0), noise=False)
+    for name in ("contraction", "rotation", "load", "pressure"):
+        assert np.ptp(run.truth[name]) < 1e-9 * abs(run.truth[name][0])
+        assert np.ptp(run.measurements[name]) < 1e-9 * abs(run.truth[name][0])
+
+
+def test_an_empty_cell_holds_the_last_command(plant):
+    motor = np.where(WHEN < 0.5, 2.0, 3.0)
+    gaps = motor.copy()
+    gaps[1:25], gaps[30:] = np.nan, np.nan
+    full, holey = (
+        plant.simulate(trial(WHEN, motor_voltage=volts, regulator_voltage=6.0))
+        for volts in (motor, gaps)
+    )
+    np.testing.assert_array_equal(full.truth["load"], holey.truth["load"])
+
+
+def test_missing_commands_are_named(plant):
+    with pytest.raises(ValueError, match="not command the motor: give motor_voltage_v or load_com"):
+        plant.simulate(trial(WHEN, regulator_voltage=6.0))
+    with pytest.raises(ValueError, match="the regulator: give regulator_voltage_v or pressure_com"):
+        plant.simulate(trial(WHEN, motor_voltage=3.0))
+    late = np.where(WHEN > 0.2, 3.0, np.nan)
+    with pytest.raises(ValueError, match="motor_voltage has no value in the first row"):
+        plant.simulate(trial(WHEN, motor_voltage=late, regulator_voltage=6.0))
+    cascade = Plant("cascade", compiled=False)
+    with pytest.raises(ValueError, match="not command the motor: give motor_voltage_v$"):
+        cascade.simulate(trial(WHEN, load_command=100.0, regulator_voltage=6.0))
+
+
+def test_what_ten_volts_cannot_give_is_refused(plant):
+    loads = np.where(WHEN > 0.5, 1200.0, 100.0)
+    message = r"load_command_n must lie in -2 to 976\.4 N, .*0 to 10 gives; sample 26 has 1200"
+    with pytest.raises(ValueError, match=message):
+        plant.simulate(trial(WHEN, load_command=loads, regulator_voltage=6.0))
+    with pytest.raises(ValueError, match=r"pressure_command_kpa must lie in -20\.4 to 578\.6 kPa"):
+        plant.simulate(trial(WHEN, motor_voltage=1.0, pressure_command=600e3))
+
+
+def test_beyond_the_tables_it_extrapolates(plant):
+    assert not plant.extrapolates(150e3)
+    assert not plant.extrapolates(575e3)
+    assert plant.extrapolates(149e3)
+    assert plant.extrapolates(576e3)
