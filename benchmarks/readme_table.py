@@ -1,0 +1,200 @@
+"""Puts a run's figures into README and documentation: `python -m benchmarks.readme_table`.
+
+A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figures -->`; nobody
+types one in. `--check` changes nothing and fails if a file is not as the run would have it.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from statistics import fmean
+from typing import Annotated, Any
+
+import typer
+
+from benchmarks.files import write_text
+from benchmarks.score import PHASES, UNITS
+
+ROOT = Path(__file__).resolve().parent.parent
+FILES = (ROOT / "README.md", ROOT / "docs" / "benchmark.md")
+SCORES = ROOT / "results" / "reproduction" / "scores.json"
+
+Run = Mapping[str, Any]
+"""What scores.json holds."""
+
+_BLOCK = re.compile(
+    r"(?P<start><!-- figures: (?P<name>\w+) -->\n).*?(?P<end><!-- end of figures -->)", re.DOTALL
+)
+_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse")
+
+
+class RunError(ValueError):
+    """A run whose figures are not for print; the message says why and what to do."""
+
+
+def displacement(run: Run) -> str:
+    """Table 22: RMSE in mm by pressure, measured and simulated."""
+    return _rmse_table(run, "displacement", "{:.3f}")
+
+
+def rotation(run: Run) -> str:
+    """Table 30: RMSE in deg of phases I / II / III by pressure, measured and simulated."""
+    return _rmse_table(run, "rotation", "{:.2f}")
+
+
+def setting(run: Run) -> str:
+    """What was run, in a sentence."""
+    suite = run["suite"]
+    noise = "with" if suite["noise"] else "without"
+    return (
+        f"Suite `{suite['name']}` version {suite['version']}, seed {suite['seed']}, on the model "
+        f"`{suite['models'][0]}`: control at {suite['control_rate_hz']:g} Hz {noise} sensor noise, "
+        "scored on the true motion at 384 Hz."
+    )
+
+
+def speed(run: Run) -> str:
+    """How long the run took."""
+    info = run["run"]
+    return (
+        f"This run: {len(run['scores'])} cases and the bounds in {info['wall_time_s']:.0f} s with "
+        f"{info['jobs']} processes; {info['environment_steps_per_second']:.0f} environment steps a "
+        "second in one process."
+    )
+
+
+def targets(run: Run) -> str:
+    """Targets, what was got, met or missed."""
+    rows = [
+        [
+            check["what"],
+            f"{'<' if check['strict'] else '≤'} {check['limit']:g} {check['unit']}",
+            "" if check["got"] is None else f"{check['got']:.3g} {check['unit']}",
+            check["verdict"],
+        ]
+        for check in run["targets"]
+    ]
+    return _table(["What", "Target", "This run", "Verdict"], rows, words=1)
+
+
+def replay(run: Run) -> str:
+    """Simulated less measured for the replay: mean and mean absolute errors by phase."""
+    rows = []
+    for task, phases in PHASES.items():
+        for phase in phases:
+            errors = [e for e in run["replay_errors"] if (e["task"], e["phase"]) == (task, phase)]
+            name = task if task == phase else f"{task}, phase {phase}"
+            values = [[error[column] for error in errors] for column in _REPLAY_COLUMNS]
+            cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
+            rows.append([f"{name} ({UNITS[task]})", *cells])
+    header = ["Simulated less measured", "slope (per s)", "intercept", "mean position", "RMSE"]
+    return _table(header, rows, words=1)
+
+
+def bound(run: Run) -> str:
+    """Least RMSE in phase III of rotation that any controller reaches, by pressure."""
+    bounds = run["achievable_rmse_phase_iii_deg"]
+    cells = [f"{value:.3f}" for value in bounds.values()]
+    header = ["Pressure (kPa)", *bounds]
+    return _table(header, [["Achievable RMSE, phase III (deg)", *cells]], words=1)
+
+
+FIGURES: dict[str, Callable[[Run], str]] = {
+    function.__name__: function
+    for function in (displacement, rotation, setting, speed, targets, replay, bound)
+}
+"""Blocks by name."""
+
+
+def refreshed(text: str, run: Run) -> str:
+    """A text with the run's figures in its blocks.
+
+    Raises:
+        RunError: a block that nobody renders, or figures that are missing.
+    """
+
+    def block(found: re.Match[str]) -> str:
+        if found["name"] not in FIGURES:
+            raise RunError(f"no figures {found['name']!r}; there are {', '.join(FIGURES)}")
+        return f"{found['start']}\n{FIGURES[found['name']](run)}\n\n{found['end']}"
+
+    return _BLOCK.sub(block, text)
+
+
+def load_run(scores: Path) -> Run:
+    """The run in a scores.json.
+
+    Raises:
+        RunError: there is none, or it is not the whole suite.
+    """
+    if not scores.is_file():
+        raise RunError(f"there is no file {scores}; run `python -m benchmarks` first")
+    run = json.loads(scores.read_text(encoding="utf-8"))
+    failed = [score for score in run["scores"] if score["failure"]]
+    if not run["complete"] or run["suite"]["selected"] or failed:
+        raise RunError(
+            f"{scores} is not a whole run of the suite ({len(failed)} cases failed); run "
+            "`python -m benchmarks` without a selection"
+        )
+    return run
+
+
+def main(
+    scores: Annotated[Path, typer.Argument(help="scores.json of a whole run.")] = SCORES,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; fail on a difference.")
+    ] = False,
+) -> None:
+    """Put a run's figures into README.md and docs/benchmark.md."""
+    try:
+        run = load_run(scores)
+        texts = {path: path.read_text(encoding="utf-8") for path in FILES}
+        found = {path: refreshed(text, run) for path, text in texts.items()}
+    except RunError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    changed = [path for path in FILES if found[path] != texts[path]]
+    for path in changed:
+        if not check:
+            write_text(path, found[path])
+        print(f"{path.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
+    if check and changed:
+        raise typer.Exit(1)
+
+
+def _rmse_table(run: Run, task: str, form: str) -> str:
+    """A row a pressure: RMSE of every phase, of the measured trial and of every controller."""
+    suite = run["suite"]
+    columns = {"Measured": _figures(run["measured"], task)}
+    for controller in suite["controllers"]:
+        own = [s for s in run["scores"] if s["controller"] == controller["name"]]
+        own = [score for score in own if score["model"] == suite["models"][0]]
+        columns[controller["title"] or controller["name"]] = _figures(own, task)
+    pressures = suite["pressures_kpa"][task]
+    rows = [
+        [f"{p:g}", *(" / ".join(map(form.format, column[p])) for column in columns.values())]
+        for p in pressures
+    ]
+    means = [[fmean(phase) for phase in zip(*c.values(), strict=True)] for c in columns.values()]
+    rows.append(["mean", *(" / ".join(map(form.format, mean)) for mean in means)])
+    return _table(["Pressure (kPa)", *columns], rows)
+
+
+def _figures(scores: Sequence[Mapping[str, Any]], task: str) -> dict[float, list[float]]:
+    """RMSE of every phase, by pressure."""
+    return {
+        score["pressure_kpa"]: [score["phases"][phase]["rmse"] for phase in PHASES[task]]
+        for score in scores
+        if score["task"] == task
+    }
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]], words: int = 0) -> str:
+    rules = [":--" if column < words else "--:" for column in range(len(header))]
+    return "\n".join(f"| {' | '.join(line)} |" for line in (header, rules, *rows))
+
+
+if __name__ == "__main__":
+    typer.run(main)

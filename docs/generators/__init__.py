@@ -1,0 +1,48 @@
+"""Parts of the documentation that are rendered from the code, so that they cannot be out of date.
+
+A page says `<!-- generate: NAME -->` or `<!-- generate: NAME ARGUMENT -->` on a line of its own;
+`expand` puts in Markdown instead, as far indented. GENERATORS lists the names.
+"""
+
+import re
+from collections.abc import Callable
+from textwrap import indent
+
+from generators.catalogue import effects, overview
+from generators.commands import commands
+from generators.environments import docstring, options, randomisations, rewards
+from generators.equations import equations, ports, written
+from generators.files import calibrations, columns, raw_columns, tables
+from generators.models import differences, identification, misfit, parameters, shipped
+from generators.source import misprints, rates, verdicts, wrong_in_print
+from generators.suite import controllers, example, targets, trials, tuning
+
+GENERATORS: dict[str, Callable[..., str]] = {
+    function.__name__: function
+    for function in (
+        *(effects, overview, commands, docstring, options, randomisations, rewards),
+        *(equations, ports, written, calibrations, columns, raw_columns, tables),
+        *(differences, identification, misfit, parameters, shipped),
+        *(misprints, rates, verdicts, wrong_in_print),
+        *(controllers, example, targets, trials, tuning),
+    )
+}
+"""Renderers by name; each takes the words after its name in the mark."""
+
+_MARK = re.compile(r"^( *)<!-- generate: (.+?) -->$", re.MULTILINE)
+
+
+def expand(markdown: str) -> str:
+    """A page's Markdown with its marks filled.
+
+    Raises:
+        KeyError: a mark names no generator.
+    """
+
+    def fill(mark: re.Match[str]) -> str:
+        name, *arguments = mark[2].split()
+        if name not in GENERATORS:
+            raise KeyError(f"no generator {name!r}; there are {', '.join(GENERATORS)}")
+        return indent(GENERATORS[name](*arguments), mark[1])
+
+    return _MARK.sub(fill, markdown)

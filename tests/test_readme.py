@@ -1,0 +1,175 @@
+"""README: its Python runs, its commands exist, its figures are a run's and nobody's."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+from statistics import fmean
+
+import pytest
+from typer.testing import CliRunner
+
+import benchmarks.__main__
+import pma_gym.cli
+from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
+from benchmarks.score import PHASES, measured_score
+from benchmarks.suite import load_suite
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+EXAMPLE = ROOT / "docs" / "examples" / "integral.py"
+
+
+def blocks(language):
+    return re.findall(rf"```{language}\n(.*?)\n```", README, re.DOTALL)
+
+
+def run(*command, cwd):
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "Agg"}
+    done = subprocess.run(
+        [sys.executable, *command], cwd=cwd, env=environment, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_ten_lines_print_the_rmse_of_a_pid(tmp_path):
+    (code,) = (block for block in blocks("python") if "gym.make" in block)
+    printed = run("-c", code, cwd=tmp_path)
+    rmse = re.fullmatch(r"RMSE (\d\.\d{3}) mm\n", printed)
+    assert rmse and float(rmse[1]) <= 0.10
+
+
+def test_example_of_a_controller_is_the_file():
+    assert EXAMPLE.read_text(encoding="utf-8").rstrip() in blocks("python")
+
+
+def test_example_of_a_controller_is_scored(tmp_path):
+    (command,) = (block for block in blocks("bash") if "--controllers" in block)
+    _, controllers, _, out = command.split("-m benchmarks ")[1].split()
+    mine = controllers.split(",")[1]
+    selection = ["--model", "station", "--task", "rotation", "--pressures", "400"]
+    run(*"-m benchmarks --controllers".split(), mine, *selection, "--out", tmp_path / out, cwd=ROOT)
+    (score,) = json.loads((tmp_path / out / "scores.json").read_text(encoding="utf-8"))["scores"]
+    assert score["controller"] == "Integral" and not score["failure"]
+    assert set(score["phases"]) == set(PHASES["rotation"])
+
+
+def test_make_targets_exist():
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    named = set(re.findall(r"`make (\w+)`", README))
+    assert {"bench", "test"} <= named
+    assert all(re.search(rf"^{target}:.*## ", makefile, re.MULTILINE) for target in named)
+
+
+@pytest.mark.parametrize(
+    ("app", "program"),
+    [(pma_gym.cli.app, "pma-gym"), (benchmarks.__main__.app, "python -m benchmarks")],
+)
+def test_commands_exist_with_their_options(app, program):
+    lines = re.findall(rf"^.*{program} (.+)$", "\n".join(blocks("bash")), re.MULTILINE)
+    lines += re.findall(rf"`{program} ([^`]+)`", README)
+    assert lines
+    for line in lines:
+        words = line.split()
+        called = [] if words[0].startswith("--") else words[:1]
+        shown = CliRunner().invoke(app, [*called, "--help"], env={"COLUMNS": "200"})
+        assert shown.exit_code == 0, line
+        options = [word for word in words if word.startswith("--")]
+        assert all(option in shown.output for option in options), line
+
+
+def test_files_that_it_names_exist():
+    links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link]
+    assert links and all((ROOT / link).is_file() for link in links)
+    (picture,) = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README)
+    assert (ROOT / picture).stat().st_size < 200_000
+
+
+def test_the_package_carries_it():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["readme"] == "README.md"
+
+
+def table(name):
+    """Header and rows of a block of figures."""
+    block = README.split(f"<!-- figures: {name} -->")[1].split("<!-- end of figures -->")[0]
+    lines = [line.strip("| ").split(" | ") for line in block.strip().splitlines()]
+    return lines[0], lines[2:]
+
+
+@pytest.mark.parametrize("task", ["displacement", "rotation"])
+def test_table_has_every_trial_and_the_measured_figures(task):
+    suite = load_suite()
+    header, rows = table(task)
+    assert header[:2] == ["Pressure (kPa)", "Measured"]
+    assert header[2:] == [controller.title for controller in suite.controllers]
+    assert [row[0] for row in rows] == [f"{p:g}" for p in suite.pressures_kpa[task]] + ["mean"]
+    figures = [[[float(x) for x in cell.split(" / ")] for cell in row[1:]] for row in rows]
+    for pressure, row in zip(suite.pressures_kpa[task], figures[:-1], strict=True):
+        measured = [measured_score(task, phase, pressure).rmse for phase in PHASES[task]]
+        assert row[0] == pytest.approx(measured, abs=0.006)
+    for column, means in enumerate(figures[-1]):
+        for phase, mean in enumerate(means):
+            assert mean == pytest.approx(
+                fmean(row[column][phase] for row in figures[:-1]), abs=0.011
+            )
+
+
+def small_run(**changed):
+    """A run of two trials with round figures."""
+    suite = {
+        **{"name": "reproduction", "version": 1, "selected": False, "seed": 2008},
+        **{"control_rate_hz": 100.0, "noise": True, "models": ["station", "cascade"]},
+        "controllers": [{"name": "pid", "title": "PID"}],
+        "pressures_kpa": {"displacement": [150], "rotation": [275]},
+    }
+    scores = []
+    for task, pressure in (("displacement", 150), ("rotation", 275)):
+        for model, rmse in (("station", 0.25), ("cascade", 9.0)):
+            phases = {phase: {"rmse": rmse} for phase in PHASES[task]}
+            case = {"model": model, "controller": "pid", "task": task, "pressure_kpa": pressure}
+            scores.append(case | {"failure": None, "phases": phases})
+    measured = [score | {"controller": None} for score in scores if score["model"] == "station"]
+    error = {"slope": -0.5, "intercept": 1.0, "mean": 0.0, "rmse": 0.25}
+    replay = [error | {"task": t, "phase": p} for t in PHASES for p in PHASES[t]]
+    check = {"what": "replay", "limit": 1.0, "got": 0.5, "unit": "mm", "strict": True}
+    info = {"wall_time_s": 60.0, "jobs": 2, "environment_steps_per_second": 1e4}
+    whole = {
+        **{"complete": True, "suite": suite, "scores": scores, "measured": measured, "run": info},
+        **{"replay_errors": replay, "targets": [check | {"verdict": "met"}]},
+        "achievable_rmse_phase_iii_deg": {"275": 0.03},
+    }
+    return whole | changed
+
+
+def test_figures_replace_what_stands_between_the_marks():
+    text = "before\n<!-- figures: displacement -->\nold\n<!-- end of figures -->\nafter\n"
+    found = refreshed(text, small_run())
+    assert "| 150 | 0.250 | 0.250 |" in found and "old" not in found
+    assert found.startswith("before\n") and found.endswith("after\n")
+    assert refreshed(found, small_run()) == found
+
+
+def test_every_kind_of_figures_can_be_written():
+    for name in FIGURES:
+        marks = f"<!-- figures: {name} -->\n<!-- end of figures -->"
+        assert len(refreshed(marks, small_run())) > len(marks) + 20
+
+
+def test_unknown_figures_are_refused():
+    with pytest.raises(RunError, match="no figures 'speeed'; there are"):
+        refreshed("<!-- figures: speeed -->\n<!-- end of figures -->", small_run())
+
+
+@pytest.mark.parametrize("changed", [{"complete": False}, {"scores": [{"failure": "no gains"}]}])
+def test_a_part_of_a_run_is_refused(tmp_path, changed):
+    scores = tmp_path / "scores.json"
+    with pytest.raises(RunError, match="there is no file"):
+        load_run(scores)
+    scores.write_text(json.dumps(small_run(**changed)), encoding="utf-8")
+    with pytest.raises(RunError, match="not a whole run of the suite"):
+        load_run(scores)
