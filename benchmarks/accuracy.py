@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
+from benchmarks.files import write_text
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.stiffness import spring_stiffness
 from pma_gym.plant.integrate import DEFAULT_STEP_S
@@ -352,7 +353,7 @@ def run_accuracy(console: Console | None = None, out: Path | None = None) -> boo
         place.print(checks)
         place.print(f"Default step {_milli(DEFAULT_STEP_S)}: limits {_verdict(kept)}")
     if out:
-        out.write_text(text.getvalue(), encoding="utf-8")
+        write_text(out, text.getvalue())
     return kept
 
 

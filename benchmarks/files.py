@@ -1,25 +1,22 @@
-"""Files written whole or not at all."""
+"""Results on disk: each file whole or not at all, in a folder made for it."""
 
-import os
-import tempfile
 from pathlib import Path
 
+from pma_gym.files import replace_file
 
-def write_text(path: Path, text: str) -> None:
-    """Write a text file atomically, creating its folder.
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file; an older one stays until the new one is complete.
 
     Args:
-        path: file to write; an older one stays until the new one is complete.
-        text: its content.
+        path: the file; its folder is made.
+        content: all of it.
     """
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "w", encoding="utf-8", newline="") as file:
-            file.write(text)
-        os.chmod(name, 0o644)
-        os.replace(name, path)
-    except BaseException:
-        os.unlink(name)
-        raise
+    replace_file(path, content)
+
+
+def write_text(path: Path, text: str) -> None:
+    """As `write_bytes`, for text in UTF-8."""
+    write_bytes(path, text.encode("utf-8"))

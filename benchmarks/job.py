@@ -21,10 +21,10 @@ from rich.progress import (
 from benchmarks.document import to_html, to_markdown
 from benchmarks.environment_info import environment_info
 from benchmarks.execution import Execution, compile_models, execute
-from benchmarks.files import write_text
+from benchmarks.files import write_bytes, write_text
 from benchmarks.replay import all_replay_errors
 from benchmarks.report import report_blocks, report_pictures
-from benchmarks.results import Results, csv_text, json_text, write_bytes
+from benchmarks.results import Results, csv_text, json_text
 from benchmarks.suite import Suite
 from benchmarks.summary import print_failures, print_summary
 from benchmarks.targets import check_targets

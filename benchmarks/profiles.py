@@ -2,10 +2,10 @@
 
 import csv
 import io
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.files import write_text
 from pma_gym.data.serres2008 import load_table
 from pma_gym.studies.recursion import PROFILES
 from pma_gym.studies.voltage_profile import voltage_profile
@@ -74,10 +74,4 @@ def write_csv(out: Path, columns: tuple[str, ...], rows: list[tuple[str, ...]]) 
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
     writer.writerows(rows)
-    out.parent.mkdir(parents=True, exist_ok=True)
-    partial = out.with_name(f"{out.name}.{os.getpid()}.part")
-    try:
-        partial.write_text(text.getvalue(), encoding="utf-8", newline="")
-        os.replace(partial, out)
-    finally:
-        partial.unlink(missing_ok=True)
+    write_text(out, text.getvalue())

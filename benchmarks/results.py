@@ -4,11 +4,9 @@ import csv
 import io
 import json
 import math
-import os
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 from benchmarks.execution import Execution
@@ -143,18 +141,6 @@ def json_text(results: Results, **more: object) -> str:
         "achievable_rmse_phase_iii_deg": {f"{p:g}": b for p, b in results.bounds.items()},
     }
     return json.dumps(_finite(document), indent=1, allow_nan=False) + "\n"
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """As `benchmarks.files.write_text`: a reader sees the old file or the new one, never a part."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # In the same folder, for only there is the final step a rename.
-    partial = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    try:
-        partial.write_bytes(content)
-        os.replace(partial, path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _entry(score: Score) -> dict[str, object]:

@@ -9,7 +9,6 @@ digits of the value at the door: within 4 ulp.
 
 import os
 import re
-import secrets
 import warnings
 from pathlib import Path
 
@@ -27,6 +26,7 @@ from pma_gym.data.trial_columns import (
     suggestion,
 )
 from pma_gym.data.trial_formats import DECODERS, ENCODERS, Table
+from pma_gym.files import replace_file
 
 _NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
 _COUNTS = "if the log is in raw DAQ counts, give [columns] a factor"
@@ -103,7 +103,7 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
     if path.is_dir() or not path.parent.is_dir():
         fault = f"{path} is a folder" if path.is_dir() else f"there is no folder {path.parent}"
         raise TrialError(f"cannot write {path}: {fault}; name a file in a folder that exists")
-    _put(path, ENCODERS[suffix](columns, trial.provenance))
+    replace_file(path, ENCODERS[suffix](columns, trial.provenance))
 
 
 def _load(path: Path) -> Table:
@@ -196,15 +196,3 @@ def _mend(source: Source, cell: object) -> str:
     if source.column.kind == "time":
         return "give seconds since the start of the trial"
     return "leave the cell empty where nothing was measured"
-
-
-def _put(path: Path, content: bytes) -> None:
-    """Write a file so that a reader sees the old one or the new one, never a part."""
-    # In the same folder, for only there is the final step a rename.
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
-    try:
-        partial.write_bytes(content)
-        os.replace(partial, path)
-    except BaseException:
-        partial.unlink(missing_ok=True)
-        raise

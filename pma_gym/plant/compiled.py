@@ -23,6 +23,8 @@ from typing import Any
 import numba
 from numba.extending import register_jitable
 
+from pma_gym.files import replace_file
+
 COMPILED = ("derivative", "observe", "advance", "simulate")
 """Functions of a generated module that are compiled for calls from Python."""
 
@@ -73,9 +75,7 @@ def import_text(text: str) -> types.ModuleType:
     path = cache_directory() / name / f"{name}.py"
     if not path.exists():
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
-            file.write(text)
-        os.replace(file.name, path)
+        replace_file(path, text.encode("utf-8"))
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)
