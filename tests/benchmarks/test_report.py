@@ -10,12 +10,12 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.contender import Contender
-from benchmarks.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
 from benchmarks.environment_info import git_state
 from benchmarks.execution import Execution
 from benchmarks.job import run_job
 from benchmarks.replay import ReplayError
-from benchmarks.replay_report import displacement_verdict
+from benchmarks.report.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
+from benchmarks.report.replay_blocks import displacement_verdict
 from benchmarks.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.suite import load_suite
 

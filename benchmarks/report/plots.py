@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from benchmarks.plot_style import (
+from benchmarks.report.plot_style import (
     MEASURED,
     REFERENCE,
     Style,

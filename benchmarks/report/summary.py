@@ -6,9 +6,9 @@ from statistics import fmean
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.report.tables import columns
 from benchmarks.results import Results
 from benchmarks.score import PHASES, UNITS
-from benchmarks.tables import columns
 from benchmarks.targets import check_targets
 
 _COLOURS = {"met": "green", "missed": "red", "no figure": "dim"}

@@ -3,16 +3,16 @@
 from collections.abc import Sequence
 from statistics import fmean
 
-from benchmarks.document import Block, Heading, Paragraph, Picture, TextTable
 from benchmarks.replay import (
     ReplayError,
     all_replay_errors,
     summarise,
     table_angle,
 )
+from benchmarks.report.document import Block, Heading, Paragraph, Picture, TextTable
+from benchmarks.report.tables import replay_table
 from benchmarks.results import Results
 from benchmarks.score import measured_score
-from benchmarks.tables import replay_table
 from pma_gym.plant.model import shipped_models
 
 _UNITS = {"slope": "mm/s", "intercept": "mm", "rmse": "mm"}

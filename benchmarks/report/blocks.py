@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from typing import Any
 
-from benchmarks.document import Block, Heading, Paragraph, Picture, TextTable
-from benchmarks.plots import actual_against_ideal_plot, tracking_plot
 from benchmarks.replay import all_replay_errors
-from benchmarks.replay_report import replay_blocks
+from benchmarks.report.document import Block, Heading, Paragraph, Picture, TextTable
+from benchmarks.report.plots import actual_against_ideal_plot, tracking_plot
+from benchmarks.report.replay_blocks import replay_blocks
+from benchmarks.report.summary_plots import replay_plot, rmse_plot
+from benchmarks.report.tables import regression_table, rmse_table, target_table
 from benchmarks.results import Results
 from benchmarks.score import PHASES
-from benchmarks.summary_plots import replay_plot, rmse_plot
-from benchmarks.tables import regression_table, rmse_table, target_table
 from benchmarks.targets import Check
 from pma_gym.plant.model import load_model
 

@@ -6,7 +6,8 @@ import numpy as np
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from benchmarks.plot_style import (
+from benchmarks.replay import QUANTITIES, all_replay_errors, summarise
+from benchmarks.report.plot_style import (
     BOUND,
     MEASURED,
     controller_styles,
@@ -14,7 +15,6 @@ from benchmarks.plot_style import (
     picture,
     png,
 )
-from benchmarks.replay import QUANTITIES, all_replay_errors, summarise
 from benchmarks.results import Results
 from benchmarks.score import PHASES, UNITS, measured_score
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean
 
-from benchmarks.document import TextTable
 from benchmarks.replay import QUANTITIES, ReplayError, summarise
+from benchmarks.report.document import TextTable
 from benchmarks.results import Results
 from benchmarks.score import UNITS, PhaseScore, measured_score
 from benchmarks.targets import Check
