@@ -46,7 +46,7 @@ def check_targets(results: Results) -> list[Check]:
     """Every target of the suite, on its first model."""
     targets = results.suite.targets
     wall = results.info.get("wall_time_s")
-    whole = results.complete and not results.suite.selected
+    whole = results.complete and not results.failures and not results.suite.selected
     return [
         *_replay_checks(results),
         *(
