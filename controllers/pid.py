@@ -1,0 +1,133 @@
+"""PID with gains scheduled on pressure, alone and on top of the improved feed-forward."""
+
+from typing import Protocol
+
+from controllers.controller import Reference
+from controllers.feedforward import ImprovedFeedforward
+from controllers.gains import Gains, scheduled_gains
+from pma_gym.envs import Reading, Station
+
+VOLTAGE_LIMIT = 10.0
+"""Largest motor voltage (V)."""
+
+
+class OpenLoop(Protocol):
+    """What gives a voltage by time alone, such as `ImprovedFeedforward`."""
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Prepare for a trial."""
+
+    def voltage(self, time: float) -> float:
+        """Motor voltage (V) at a time (s)."""
+        ...
+
+
+class PID:
+    """Proportional, integral and filtered derivative action on the measured position.
+
+        v = offset + feed-forward + k_p e + I + D
+        u = min(max(v, 0), 10 V)
+        D:  tau_f D' + D = k_d e'                         backward Euler
+        I:  I' = k_i e, or 0 where that would lead further beyond a limit   forward Euler
+
+    e is the reference `lead` seconds ahead less the measured position; `offset` the voltage at
+    which the nominal drive just begins to pull, so that the first step has no bump.
+
+    Anti-windup is conditional integration: at a limit the integral waits until the error turns.
+    Back-calculation would lift it at 0 V whenever the drive cuts off a proportional action.
+
+    On a ramp that needs the voltage to rise by V' the error e settles at V' / k_i. A lead of
+    1 / (g k_i), g the plant's static gain, makes the position lag by nothing there. It uses that
+    the reference is known ahead, and allows lower gains, which pass on less noise.
+
+    The derivative is of the error: on a ramp that of the measurement alone would push against
+    the motion all the time, which the integral would have to make good.
+
+    Gains come from `controllers/gains.json`, where `benchmarks/tune.py` wrote them: linear in
+    pressure between the pressures that it tuned at and constant beyond, and varying with the
+    reference (`Gains.scaled`). They are those under the model's name, else, for a model of one's
+    own, those of the shipped model of its plant (`station`, `cascade`).
+
+    Args:
+        gains: gains to use instead of the scheduled ones, in SI of the task.
+
+    Source:
+        K. J. Astrom and T. Hagglund 2006, "Advanced PID Control", sections 3.3 and 3.5.
+    """
+
+    name = "pid"
+
+    def __init__(self, gains: Gains | None = None) -> None:
+        self._given = gains
+        self.gains = gains or Gains(0.0, 0.0, 0.0, 0.0)
+        self._reference: Reference = lambda time: 0.0
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Take the gains of this model, task and pressure, and forget everything else.
+
+        Raises:
+            ValueError: nothing was tuned for this task, with how to do so.
+        """
+        self._reference = reference
+        self._position = 2 if station.task.protocol.quantity == "rotation" else 1
+        self._period = station.period
+        self._span = station.task.protocol.span
+        self.gains = self._given or scheduled_gains(self.name, station)
+        self._offset = nominal_offset(station)
+        self._integral = self._derivative = 0.0
+        self._last_error: float | None = None
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Motor voltage (V) to hold for the next control period."""
+        period, reference = self._period, self._reference(time + self.gains.lead)
+        gains = self.gains.scaled(reference / self._span)
+        error = reference - observation[self._position]
+        change = 0.0 if self._last_error is None else error - self._last_error
+        self._derivative = (gains.filter * self._derivative + gains.derivative * change) / (
+            gains.filter + period
+        )
+        action = gains.proportional * error + self._integral + self._derivative
+        wanted = self._offset + self.feedforward(time) + action
+        voltage = min(max(wanted, 0.0), VOLTAGE_LIMIT)
+        if voltage == wanted or (wanted > voltage) != (error > 0.0):
+            self._integral += gains.integral * period * error
+        self._last_error = error
+        return voltage
+
+    def feedforward(self, time: float) -> float:
+        """Voltage added to that of the feedback (V); none here."""
+        return 0.0
+
+
+class FeedforwardPID(PID):
+    """`ImprovedFeedforward` plus a PID on what error remains; gains of their own.
+
+    The integral need not carry the motion itself, only what the nominal model does not know. The
+    anti-windup sees the whole voltage.
+
+    Args:
+        gains: as `PID`.
+        open_loop: another feed-forward to add.
+    """
+
+    name = "feedforward_pid"
+
+    def __init__(self, gains: Gains | None = None, open_loop: OpenLoop | None = None) -> None:
+        super().__init__(gains)
+        self._open_loop = open_loop or ImprovedFeedforward()
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """As `PID.reset`, and compute the feed-forward, which holds the drive's offset itself."""
+        super().reset(reference, station)
+        self._open_loop.reset(reference, station)
+        self._offset = 0.0
+
+    def feedforward(self, time: float) -> float:
+        """Voltage of the feed-forward (V)."""
+        return self._open_loop.voltage(time)
+
+
+def nominal_offset(station: Station) -> float:
+    """Motor voltage (V) at which the nominal drive just begins to pull; 0 without a drive."""
+    drive = station.model.parameters.get("drive")
+    return max(0.0, -drive.offset / drive.gain) if drive else 0.0

@@ -1,0 +1,188 @@
+"""The PID against analytic responses, at its limits, and on the station."""
+
+import math
+
+import numpy as np
+import pytest
+
+from controllers import CONTROLLERS, PID, Controller, FeedforwardPID
+from controllers.gains import Gains, scheduled_gains
+from controllers.pid import nominal_offset
+from pma_gym.plant.model import load_model
+
+PERIOD = 0.01
+
+
+def begun(gains, station, reference=lambda time: 0.0, period=PERIOD):
+    controller = PID(gains)
+    controller.reset(reference, station(period=period))
+    return controller
+
+
+def close(controller, pole, gain, steps, reading, period=PERIOD, offset=0.0):
+    """Extension (m) of y[k+1] = pole y[k] + (1 - pole) gain (u[k] - offset) under control."""
+    position = [0.0]
+    for k in range(steps):
+        voltage = controller.act(reading(extension=position[-1]), k * period)
+        position.append(pole * position[-1] + (1.0 - pole) * gain * (voltage - offset))
+    return np.array(position)
+
+
+def test_proportional_control_of_a_first_order_plant(station, reading):
+    # Closed: y[k+1] = q y[k] + (pole's share) g k_p r, q = pole - (1 - pole) g k_p.
+    pole, gain, proportional, wanted = 0.9, 4e-3, 500.0, 1e-3
+    gains = Gains(proportional, 0.0, 0.0, 0.005)
+    controller = begun(gains, station, lambda time: wanted)
+    offset = nominal_offset(station())
+    got = close(controller, pole, gain, 40, reading, offset=offset)
+    loop = gain * proportional
+    q = pole - (1.0 - pole) * loop
+    analytic = wanted * loop / (1.0 + loop) * (1.0 - q ** np.arange(41))
+    assert got == pytest.approx(analytic, abs=1e-15)
+
+
+def test_pi_that_cancels_the_pole_leaves_a_first_order_loop(station, reading):
+    # k_p / k_i = tau: y = r (1 - exp(-t / lambda)), lambda = tau / (g k_p).
+    period, lag, gain, wanted, closed = 1e-4, 0.05, 4e-3, 1e-3, 0.02
+    proportional = lag / (gain * closed)
+    gains = Gains(proportional, proportional / lag, 0.0, 0.005)
+    controller = begun(gains, station, lambda time: wanted, period)
+    got = close(
+        controller, math.exp(-period / lag), gain, 1000, reading, period, nominal_offset(station())
+    )
+    times = period * np.arange(1001)
+    assert got == pytest.approx(wanted * (1.0 - np.exp(-times / closed)), abs=0.005 * wanted)
+
+
+def test_ramp_error_is_the_voltage_s_slope_over_the_integral_gain(station, reading):
+    pole, gain, speed = 0.9, 4e-3, 5e-3
+    gains = Gains(300.0, 6000.0, 0.0, 0.005)
+    controller = begun(gains, station, lambda time: speed * time)
+    got = close(controller, pole, gain, 500, reading, offset=nominal_offset(station()))
+    assert speed * 5.0 - got[-1] == pytest.approx(speed / gain / 6000.0, rel=1e-6)
+
+
+def test_lead_takes_that_error_away(station, reading):
+    pole, gain, speed = 0.9, 4e-3, 5e-3
+    gains = Gains(300.0, 6000.0, 0.0, 0.005, lead=1.0 / (gain * 6000.0))
+    controller = begun(gains, station, lambda time: speed * time)
+    got = close(controller, pole, gain, 500, reading, offset=nominal_offset(station()))
+    assert got[-1] == pytest.approx(speed * 5.0, rel=1e-6)
+
+
+def test_derivative_is_filtered(station, reading):
+    # A ramp of the error: D = k_d e' (1 - share^k), share = tau_f / (tau_f + T).
+    gains = Gains(0.0, 0.0, 2.0, 0.03)
+    controller = begun(gains, station, lambda time: 0.1 * time)
+    offset = nominal_offset(station())
+    got = [controller.act(reading(), k * PERIOD) - offset for k in range(20)]
+    share = 0.03 / (0.03 + PERIOD)
+    assert got == pytest.approx(2.0 * 0.1 * (1.0 - share ** np.arange(20)), abs=1e-12)
+
+
+def test_first_step_has_no_bump(station, reading):
+    # The drive of the station begins to pull at 2.0 N / 97.84 N/V.
+    controller = PID()
+    controller.reset(lambda time: 0.0, station())
+    assert controller.act(reading(), 0.0) == pytest.approx(2.0 / 97.84, abs=1e-3)
+    controller = FeedforwardPID()
+    controller.reset(lambda time: 5e-3 * time, station())
+    assert controller.act(reading(), 0.0) == controller.feedforward(0.0)
+
+
+@pytest.mark.parametrize("direction", [-1.0, 1.0])
+def test_anti_windup_recovers(direction, station, reading):
+    """3 s at a limit, then a small error the other way: the voltage leaves the limit at once.
+
+    Wound up, the integral would hold 240 V and give back 8 V/s.
+    """
+    gains = Gains(400.0, 8000.0, 0.0, 0.005)
+    controller = begun(gains, station, lambda time: direction * 10e-3 if time < 3.0 else 0.0)
+    limit = 10.0 if direction > 0.0 else 0.0
+    held = [controller.act(reading(), k * PERIOD) for k in range(300)]
+    assert held[100:] == [limit] * 200
+    back = reading(extension=direction * 1e-3)
+    after = [controller.act(back, (300 + k) * PERIOD) for k in range(10)]
+    assert all(voltage != limit for voltage in after)
+
+
+def test_voltage_stays_within_its_limits(station, reading):
+    generator = np.random.default_rng(0)
+    for name in ("pid", "feedforward_pid"):
+        controller = CONTROLLERS[name]()
+        controller.reset(lambda time: 5e-3 * time, station())
+        for k in range(500):
+            wild = reading(extension=float(generator.normal(0.0, 0.05)))
+            assert 0.0 <= controller.act(wild, k * PERIOD) <= 10.0
+
+
+def test_reset_forgets(station, reading):
+    controller = PID()
+    runs = []
+    for _ in range(2):
+        controller.reset(lambda time: 5e-3 * time, station())
+        runs.append([controller.act(reading(extension=1e-4), k * PERIOD) for k in range(50)])
+    assert runs[0] == runs[1]
+
+
+def test_gains_grow_towards_the_end_of_the_range():
+    gains = Gains(100.0, 10.0, 1.0, 0.005, end_factor=3.0)
+    assert gains.scaled(0.0) == gains._replace(end_factor=1.0)
+    assert gains.scaled(0.5).proportional == pytest.approx(150.0)
+    assert gains.scaled(1.0).integral == pytest.approx(30.0)
+    assert gains.scaled(1.3).derivative == pytest.approx(3.0)
+
+
+def test_gains_are_low_where_the_cable_may_be_slack():
+    gains = Gains(100.0, 10.0, 1.0, 0.005, start_factor=0.25)
+    assert gains.scaled(0.0)[:3] == pytest.approx((25.0, 5.0, 0.25))
+    assert gains.scaled(0.1).proportional == pytest.approx(62.5)
+    assert gains.scaled(0.2) == gains.scaled(1.0) == gains._replace(start_factor=1.0)
+
+
+def test_gains_are_linear_in_pressure(station):
+    low, middle, high = (
+        scheduled_gains("pid", station("displacement", p)) for p in (200.0, 225.0, 250.0)
+    )
+    assert middle == pytest.approx(0.5 * (np.array(low) + np.array(high)))
+
+
+def test_a_model_of_one_s_own_gets_the_gains_of_its_plant(station):
+    for name in ("station", "cascade"):
+        own = load_model(name).replace({}, name="mine")
+        where = station("rotation", 400, model=own)
+        known = station("rotation", 400, model=name)
+        assert scheduled_gains("pid", where) == scheduled_gains("pid", known)
+
+
+def test_missing_gains_say_how_to_tune_them(station, tmp_path):
+    path = tmp_path / "gains.json"
+    path.write_text('{"schema": 1, "models": {}}')
+    with pytest.raises(ValueError, match=r"no gains of pid for the rotation task.*tune --model"):
+        scheduled_gains("pid", station("rotation"), path)
+    path = tmp_path / "old.json"
+    path.write_text('{"schema": 0}')
+    with pytest.raises(ValueError, match=r"must have schema 1, got 0; write it anew"):
+        scheduled_gains("pid", station("rotation"), path)
+
+
+def test_all_controllers_are_controllers():
+    for name, make in CONTROLLERS.items():
+        controller = make()
+        assert isinstance(controller, Controller)
+        assert controller.name == name
+
+
+@pytest.mark.parametrize("kind", [PID, FeedforwardPID])
+@pytest.mark.parametrize("pressure", [150, 225, 550])
+def test_displacement_target(kind, pressure, drive):
+    got, _ = drive(kind(), "displacement", pressure)
+    assert got["displacement"] <= 0.10
+
+
+@pytest.mark.parametrize("kind", [PID, FeedforwardPID])
+@pytest.mark.parametrize("pressure", [275, 500])
+def test_rotation_targets(kind, pressure, drive):
+    got, _ = drive(kind(), "rotation", pressure)
+    assert max(got["I"], got["II"]) <= 0.4
+    assert got["III"] <= 0.3
