@@ -4,8 +4,8 @@ The drive pulls and cannot push. On the way back the muscle pulls the cable out,
 has left after hysteresis, dry friction and damping; at the end the rotor coasts into the cable's
 slack on its own, braked by its friction. Where the reference asks for more, every controller lags.
 
-The bound of a phase is the least RMSE of several ideal controllers on the noise-free plant, none
-of which could exist. They know the plant's equations, its true state and all memories:
+The bound of a phase is the least RMSE of several ideal controllers on the noise-free plant, all of
+which know its equations exactly, the first its true state and all memories too:
 
 - look-ahead, 384 times a second and without delay: tries voltages on a copy of the plant and holds
   the one of 0-10 V that brings the position onto the reference 1 step (2.6 ms) ahead; for
@@ -15,7 +15,7 @@ of which could exist. They know the plant's equations, its true state and all me
 
 Look-ahead leaves no error but where the voltage is at a limit. It does not prepare for a limit
 before it comes: the true optimum of phase III may lie some hundredths of a degree lower. No
-controller that is shipped comes as close; a test holds that.
+controller that is shipped comes closer; a test holds that.
 """
 
 from collections.abc import Iterator

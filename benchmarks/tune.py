@@ -68,7 +68,7 @@ FILTER_S = 0.005
 
 START_FACTOR = 0.3
 """Factor on the gains of the PID where the cable may go slack; see `Gains.scaled`. Set by hand: of
-16 trials of phase III at each of 275, 500 and 575 kPa the worst fell from 0.41 to 0.26 deg."""
+16 trials of phase III at each of 275, 500 and 575 kPa the worst fell from 0.41 to 0.29 deg."""
 VARIATION_WEIGHT_S_PER_V = 0.01
 HIGHEST_SENSITIVITY = 2.0
 SENSITIVITY_WEIGHT = 10.0
