@@ -174,9 +174,10 @@ def station_within_intervals(model: Model, generator: np.random.Generator) -> Mo
 
     A fit's parameters make up for each other: drawn one by one, those of a force law give muscles
     that no data allow (no-load contractions of 26 to 129 mm). So those of the muscle's force, and
-    those of the regulator's line, are brought back together, halfway to the nominal at a time,
-    until the force lies within 40 N of the nominal at the corners of table I3 and the regulator
-    reaches the trials' highest pressure.
+    those of the regulator's line and of the drive, are brought back together, halfway to the
+    nominal at a time, until the force lies within 40 N of the nominal at the corners of table I3,
+    the regulator reaches the trials' highest pressure, and the drive lets go at 0 V, as a trial
+    that begins with no load needs.
     """
     drawn: dict[str, Value] = {}
     for path, note in model.notes.items():
@@ -185,6 +186,7 @@ def station_within_intervals(model: Model, generator: np.random.Generator) -> Mo
             drawn[path] = _bounded(model, path, note.low + share * (note.high - note.low))
     drawn = _brought_back(model, drawn, "muscle_force", _pulls_alike)
     drawn = _brought_back(model, drawn, "regulator_line", _reaches_highest_pressure)
+    drawn = _brought_back(model, drawn, "drive", _lets_go)
     return model.replace(drawn)
 
 
@@ -211,6 +213,10 @@ def _pulls_alike(nominal: Model, drawn: Model) -> bool:
 def _reaches_highest_pressure(nominal: Model, drawn: Model) -> bool:
     line = drawn.parameters["regulator_line"]
     return all(10.0 * line.gain + line.offset >= task.highest_pressure for task in TASKS.values())
+
+
+def _lets_go(nominal: Model, drawn: Model) -> bool:
+    return drawn.parameters["drive"].offset <= 0.0
 
 
 VARIATION = 0.2

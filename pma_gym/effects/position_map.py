@@ -18,10 +18,15 @@ class PositionMap(NamedTuple):
     constant: Annotated[tuple[float, ...], Quantity("m", -0.1, 0.1, _TABLE_18)]
 
 
-def mapped_displacement(motor_voltage, pressure, p):
-    """Displacement that a motor voltage leads to at rest, never below zero.
+ONSET = 10.0
+"""How much steeper than `linear` the map may rise from 0 V: our assumption. At 150 kPa, the only
+row with a positive constant, it rises to the printed parabola within 10 mV."""
 
-        x_in = max(0, square V^2 + linear V + constant)
+
+def mapped_displacement(motor_voltage, pressure, p):
+    """Displacement that a motor voltage leads to at rest, never below zero; 0 V gives 0.
+
+        x_in = max(0, min(square V^2 + linear V + constant, 10 linear V))
 
     The coefficients are linear in pressure between rows and constant beyond them. Past its peak
     the parabola is held at the peak: more voltage never pulls less.
@@ -41,7 +46,9 @@ def mapped_displacement(motor_voltage, pressure, p):
     # Only a parabola that opens downwards has a peak to be held at.
     peak = where(square < 0.0, linear / (-2.0 * where(square < 0.0, square, -1.0)), motor_voltage)
     voltage = motor_voltage - positive(motor_voltage - peak)
-    return positive((square * voltage + linear) * voltage + constant)
+    parabola = (square * voltage + linear) * voltage + constant
+    onset = ONSET * linear * voltage
+    return positive(where(parabola < onset, parabola, onset))
 
 
 POSITION_MAP = Effect("position_map", "position_map", PositionMap, mapped_displacement)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from pma_gym.plant.compiled import compile_module, import_text
 from pma_gym.plant.compose import Equations
 from pma_gym.plant.integrate import DEFAULT_STEP_S, module_text
 from pma_gym.plant.model import PLANTS, Model, load_model
+
+if TYPE_CHECKING:
+    import control
+    import sympy
 
 NO_SAMPLES = np.zeros((0, 0))
 OUTPUTS = ("contraction", "rotation", "load", "pressure")
@@ -285,6 +290,21 @@ class Plant:
     def provenance(self, noise: bool, seed: int | None) -> dict[str, str]:
         """What to write beside a result, so that it can be made again."""
         return {"model": self.model.name, "noise": str(noise), "seed": str(seed)}
+
+    def linearize(
+        self, pressure: float, contraction: float, direction: str = "relaxing"
+    ) -> "control.StateSpace":
+        """The plant near rest as a linear system; see `pma_gym.plant.linear.linearize`."""
+        # Imported here: python-control takes longer to import than all of this package.
+        from pma_gym.plant.linear import linearize
+
+        return linearize(self, pressure, contraction, direction)
+
+    def symbolic(self) -> "dict[str, sympy.Expr]":
+        """The equations of motion; see `pma_gym.plant.symbolic.symbolic`."""
+        from pma_gym.plant.symbolic import symbolic
+
+        return symbolic(self)
 
     def extrapolates(self, pressure: float) -> bool:
         """Whether a pressure (Pa) lies outside what the model was identified on."""

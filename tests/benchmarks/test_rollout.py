@@ -173,6 +173,8 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        # A test run in the background ignores Ctrl-C, and its children would inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:
         deadline = time.monotonic() + 60
         while not marker.exists() and time.monotonic() < deadline and process.poll() is None:

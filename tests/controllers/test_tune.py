@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 from benchmarks import tune
-from benchmarks.tune import Cost, Job, Loop, gains_from, lambda_tuning, run_tune
+from benchmarks.tune import gains_from, run_tune
+from benchmarks.tuning.cost import UNSTABLE_COST, Cost
+from benchmarks.tuning.job import Job
+from benchmarks.tuning.loop import Loop, lambda_tuning
 from controllers.gains import GAINS_FILE, Gains, scheduled_gains
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import load_model
@@ -74,7 +77,7 @@ def test_cost_punishes_unstable_and_brittle_gains(job):
     cost = Cost(job)
     good = gains_from(np.log(lambda_tuning(job)))
     assert cost(good) == cost(good)
-    assert cost(Gains(5000.0, 1e5, 0.0, 0.005)) == tune.UNSTABLE_COST
+    assert cost(Gains(5000.0, 1e5, 0.0, 0.005)) == UNSTABLE_COST
 
 
 def test_same_seed_same_bytes_and_other_models_stay(tmp_path, monkeypatch):
@@ -93,17 +96,6 @@ def test_same_seed_same_bytes_and_other_models_stay(tmp_path, monkeypatch):
     assert row["pressure_kpa"] == [300]
     assert two["provenance"]["station"]["seed"] == 3
     assert not [p for p in tmp_path.iterdir() if p not in paths]
-
-
-def test_rows_whose_sensors_are_zeroed_off_zero_are_left_out(monkeypatch, tmp_path):
-    # Table 18's quadratic gives 0.6 mm at 0 V and 150 kPa.
-    monkeypatch.setattr(tune, "PRESSURES_KPA", {"displacement": (150, 200)})
-    monkeypatch.setattr(tune, "EVALUATIONS", 6)
-    monkeypatch.setattr(tune, "CONTROLLERS", ("pid",))
-    path = tmp_path / "gains.json"
-    run_tune(path, model="cascade", jobs=1)
-    table = json.loads(path.read_text())["models"]["cascade"]["displacement"]["pid"]
-    assert table["pressure_kpa"] == [200]
 
 
 def test_broken_file_of_gains_is_refused_before_the_work(tmp_path):

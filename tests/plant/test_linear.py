@@ -151,3 +151,11 @@ def test_the_equations_read_well():
     cascade = symbolic(Plant("cascade", compiled=False))
     assert "position_map_linear(pressure)" in str(cascade["servo"])
     assert not cascade["servo"].has(sympy.Symbol("position_map.linear[3]", real=True))
+
+
+def test_a_plant_gives_both_itself():
+    plant = Plant("station")
+    system = plant.linearize(300e3, 0.025)
+    np.testing.assert_array_equal(system.A, linearize(plant, 300e3, 0.025).A)
+    assert system.input_labels == ["motor_voltage", "regulator_voltage"]
+    assert list(plant.symbolic()) == plant.states

@@ -1,0 +1,1 @@
+"""How gains are found: rows of the table, the linearised loop, what a trial costs."""

@@ -1,0 +1,117 @@
+"""What gains cost: whole trials with sensor noise on several stations, and the loop's margin."""
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.tuning.job import CONTROL_RATE_HZ, Job
+from benchmarks.tuning.loop import Loop
+from controllers.controller import Reference
+from controllers.gains import Gains
+from controllers.inverse import inverse_of
+from controllers.pid import PID, FeedforwardPID
+from pma_gym.effects.effect import Value
+from pma_gym.envs import PMAEnv, Station
+from pma_gym.units import SI_FACTORS
+
+TARGETS = {"extension": 0.10 * SI_FACTORS["mm"], "rotation": 0.4 * SI_FACTORS["deg"]}
+VARIATION_WEIGHT_S_PER_V = 0.01
+HIGHEST_SENSITIVITY = 2.0
+SENSITIVITY_WEIGHT = 10.0
+UNSTABLE_COST = 1e3
+
+STATIONS = ((1.0, 1.0), (1.0, 1.0), (1.2, 0.8), (0.8, 1.2))
+"""Factors on the muscle's force and damping of the stations that a cost is averaged over."""
+
+
+class Cost:
+    """What gains cost; see `benchmarks.tune`."""
+
+    def __init__(self, job: Job) -> None:
+        self.job = job
+        self.loop = Loop(job)
+        self.environments = [_environment(job, *factors) for factors in STATIONS]
+        self.trials = [_Trial(job, env, job.seed + i) for i, env in enumerate(self.environments)]
+
+    def __call__(self, gains: Gains) -> float:
+        """Cost of gains (SI)."""
+        sensitivity = self.loop.sensitivity(gains)
+        if math.isinf(sensitivity):
+            return UNSTABLE_COST
+        excess = max(0.0, sensitivity - HIGHEST_SENSITIVITY)
+        trials = [trial.cost(gains) for trial in self.trials]
+        return float(np.mean(trials)) + SENSITIVITY_WEIGHT * excess
+
+
+class _Trial:
+    """A trial on one station, its feed-forward computed once."""
+
+    def __init__(self, job: Job, env: PMAEnv, seed: int) -> None:
+        self.job, self.env, self.seed = job, env, seed
+        env.reset(seed=seed)
+        self.station = replace(env.station, model=job.model)
+        steps = env.task.steps(CONTROL_RATE_HZ)
+        self.open_loop = _OpenLoop(inverse_of(job.model)(env.reference, self.station, steps))
+
+    def _controller(self, gains: Gains) -> PID:
+        if self.job.controller == FeedforwardPID.name:
+            return FeedforwardPID(gains, self.open_loop)
+        return PID(gains)
+
+    def cost(self, gains: Gains) -> float:
+        """Cost of a whole trial; that of an unstable loop if a limit of the rig ends it."""
+        env, controller = self.env, self._controller(gains)
+        env.reset(seed=self.seed)
+        controller.reset(env.reference, self.station)
+        ended, info = False, dict[str, Any]()
+        while not ended:
+            _, _, broken, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+            if broken:
+                return UNSTABLE_COST
+        by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
+        target = TARGETS[self.job.protocol.quantity] / SI_FACTORS[self.job.protocol.unit]
+        variation = float(np.abs(np.diff(env.motor_voltages)).sum()) / env.time
+        return float(np.mean(list(by_phase.values()))) / target + (
+            VARIATION_WEIGHT_S_PER_V * variation
+        )
+
+
+class _OpenLoop:
+    """A feed-forward computed before."""
+
+    def __init__(self, volts: np.ndarray) -> None:
+        self.volts = volts
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Nothing to compute."""
+
+    def voltage(self, time: float) -> float:
+        """Voltage (V) of the period at a time (s)."""
+        return float(self.volts[min(round(time * CONTROL_RATE_HZ), len(self.volts) - 1)])
+
+
+def _environment(job: Job, force: float, damping: float) -> PMAEnv:
+    """The task on a station whose muscle's force and damping are scaled."""
+    # The cascade's map is what its muscle's force is to the station; 20 % would leave its reach.
+    by_port = {"muscle_force": force, "muscle_damping": damping, "position_map": force**-0.5}
+    values = {}
+    for name, effect in job.model.effects.items():
+        factor = by_port.get(effect.port, 1.0)
+        stems = effect.names_at_the_door()
+        for door, value in job.model.at_the_door(name).items():
+            unit = effect.quantities[stems[door]].unit
+            # Forces and displacements by volts; not lengths, steepness and breakpoints.
+            if factor != 1.0 and (unit.startswith("N") or unit in ("m", "m/V", "m/V^2")):
+                values[f"{name}.{door}"] = _times(value, factor)
+    return PMAEnv(
+        job.task,
+        model=job.model.replace(values),
+        pressure_kpa=job.pressure_kpa,
+        control_rate_hz=CONTROL_RATE_HZ,
+    )
+
+
+def _times(value: Value, factor: float) -> Value:
+    return tuple(factor * v for v in value) if isinstance(value, tuple) else factor * value
