@@ -87,7 +87,7 @@ def studies(out: OptionalOut = None) -> None:
 
 @app.command()
 def identify(out: Out, jobs: Jobs = 2) -> None:
-    """Fit the station's model from tables I1, I2 and I3."""
+    """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
     from benchmarks.identify import run_identify
 
     run_identify(out, jobs)
