@@ -1,4 +1,4 @@
-"""`python -m benchmarks identify`: the station's model from tables I2 and I3, judged on I3 and I1."""
+"""`python -m benchmarks identify`: the station from tables I2 and I3, judged on I3 and I1."""
 
 import math
 from concurrent.futures import ProcessPoolExecutor
