@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 from scipy.integrate import solve_ivp
 
+from benchmarks.convergence import orders
 from benchmarks.files import write_text
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.stiffness import spring_stiffness
@@ -373,6 +374,13 @@ def _ladder_table(name: str, ladder: list[Error]) -> Table:
 
 def _checks_table() -> Table:
     table = Table(title="Limits and inertia", show_header=False)
+    # Where damping leaves the step's root small, finer steps than these reach the reference's floor.
+    for damping, steps in ((0.05, (8e-4, 4e-4, 2e-4)), (2.9, (2e-4, 1e-4, 5e-5))):
+        found = orders(damping, np.array(steps))[1].min(axis=1)
+        words = ", ".join(f"{order:.2f}" for order in found)
+        table.add_row(
+            f"order of convergence, damping {damping:g} N s/mm, {_milli(steps[0])} halved", words
+        )
     for stiffness in (1e4, 1e5, 1e6):
         error = f"{one_mass_error(stiffness) * 1e6:.2g} um"
         table.add_row(f"one-mass form, cable {stiffness:.0e} N/mm: contraction differs by", error)

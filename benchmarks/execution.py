@@ -96,7 +96,8 @@ def execute(
             on_done(name, bool(failure))
 
     complete = run_all(works, jobs, keep)
-    return Execution(tuple(outcomes[index] for index in sorted(outcomes)), bounds, complete)
+    in_order = {pressure: bounds[pressure] for pressure in pressures if pressure in bounds}
+    return Execution(tuple(outcomes[index] for index in sorted(outcomes)), in_order, complete)
 
 
 def run_case(case: Case, suite: Suite) -> Outcome:

@@ -66,8 +66,11 @@ def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
     if not execution.complete:
         info["wall_time_s"] = time.perf_counter() - began
         return _leave_partial(Results(suite, execution, info), out, console)
-    with console.status("writing the report"):
-        results = _write_results(Results(suite, execution, info), out, began)
+    try:
+        with console.status("writing the report"):
+            results = _write_results(Results(suite, execution, info), out, began)
+    except KeyboardInterrupt:
+        return _leave_partial(Results(suite, execution, info), out, console)
     print_summary(results, out / "report.html", console)
     return FAILED if results.failures else 0
 
@@ -123,7 +126,6 @@ def _speed(execution: Execution) -> dict[str, float]:
 
 def _write_results(results: Results, out: Path, began: float) -> Results:
     """Write everything; the results with the time that they took."""
-    write_text(out / "scores.csv", csv_text(results.scores))
     pictures = report_pictures(results)
     info = dict(results.info)
     # What is left to do takes a fraction of a second.
@@ -131,17 +133,24 @@ def _write_results(results: Results, out: Path, began: float) -> Results:
     results = replace(results, info=info)
     checks = check_targets(results)
     blocks = report_blocks(results, checks)
-    for name, image in pictures.items():
-        write_bytes(out / PLOTS / f"{name}.png", image)
-    write_text(out / "report.md", to_markdown(blocks, pictures, PLOTS))
-    write_text(out / "report.html", to_html(blocks, pictures))
+    texts = {
+        "report.md": to_markdown(blocks, pictures, PLOTS),
+        "report.html": to_html(blocks, pictures),
+        "scores.csv": csv_text(results.scores),
+    }
     replay = [
         asdict(error)
         for errors in all_replay_errors(results, results.suite.models[0]).values()
         for error in errors
     ]
     targets = [asdict(check) | {"verdict": check.verdict} for check in checks]
-    write_text(out / "scores.json", json_text(results, targets=targets, replay_errors=replay))
+    texts["scores.json"] = json_text(results, targets=targets, replay_errors=replay)
+    # All is computed before anything is replaced, so that no folder mixes two runs.
+    shutil.rmtree(out / PLOTS, ignore_errors=True)
+    for name, image in pictures.items():
+        write_bytes(out / PLOTS / f"{name}.png", image)
+    for name, text in texts.items():
+        write_text(out / name, text)
     shutil.rmtree(out / PARTIAL, ignore_errors=True)
     return results
 

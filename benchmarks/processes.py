@@ -35,7 +35,7 @@ def _run_here(works: Sequence[Work], jobs: int, on_done: OnDone) -> None:
     for index, work in enumerate(works):
         try:
             result = work()
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             result = error
         on_done(index, result)
 

@@ -63,9 +63,7 @@ def displacement_verdict(results: Results, errors: Sequence[ReplayError]) -> str
     if not worse:
         return "**The model predicts all three figures better than the simple prediction.**"
     if not better:
-        return (
-            "**The station predicts none of the three figures better than the simple prediction.**"
-        )
+        return "**The model predicts none of the three figures better than the simple prediction.**"
     return (
         f"**The model predicts the {' and the '.join(better)} better than the simple "
         f"prediction, the {' and the '.join(worse)} not.**"

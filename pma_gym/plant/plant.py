@@ -263,7 +263,8 @@ class Plant:
         Returns:
             The trial with measurements and truth filled in.
         Raises:
-            ValueError: a command that is missing or not measured at some row.
+            ValueError: a command that is missing, or not given in the first row; a later empty cell
+                holds the value before it.
         """
         motor, regulator = sensors.voltages(self.model, trial)
         states, zero = self.run(trial.time, motor, regulator, joined)

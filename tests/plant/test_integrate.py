@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from benchmarks.accuracy import (
     FRICTIONLESS,
@@ -16,6 +15,7 @@ from benchmarks.accuracy import (
     mass_effect,
     one_mass_error,
 )
+from benchmarks.convergence import orders
 from pma_gym.plant.integrate import DEFAULT_STEP_S
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -64,46 +64,6 @@ def test_a_decay_towards_a_constant_is_exact(share):
     state, target = 3.0, -2.0
     stepped = whole * state + (first + 4.0 * middle + last) * share * target
     assert stepped == pytest.approx(target + (state - target) * math.exp(-share), abs=1e-13)
-
-
-SMOOTH = {
-    "coulomb_friction.static_n": 0.0,
-    "coulomb_friction.dynamic_n": 0.0,
-    "damping.high_slope_n_s_per_mm_per_kpa": 0.0,
-}
-
-
-def smooth_errors(damping_n_s_per_mm, steps):
-    """Errors of contraction and angle under a quickly swinging motor, no kink anywhere."""
-    both = {
-        f"damping.{name}_n_s_per_mm": damping_n_s_per_mm
-        for name in ("contracting", "relaxing", "high_intercept")
-    }
-    model = load_model("sarosi").replace(SMOOTH | both)
-    plant = Plant(model, steps[0])
-    start, regulator = plant.settle(4.0, 400e3), plant.regulator_voltage(400e3)
-    # Joined linearly and stepped through node by node: the corners are never inside a step.
-    nodes = np.linspace(0.0, 0.2, 51)
-    motor = 4.0 + 0.5 * np.sin(60.0 * nodes)
-
-    def rate(time, state):
-        voltage = float(np.interp(time, nodes, motor))
-        return plant.derivative(state, voltage, regulator, start.zero_contraction)
-
-    state = start.state
-    for begin, end in zip(nodes[:-1], nodes[1:], strict=True):
-        state = solve_ivp(rate, (begin, end), state, "DOP853", rtol=1e-12, atol=1e-15).y[:, -1]
-    errors = []
-    for step in steps:
-        plant.step_limit = step
-        states, _ = plant.run(nodes, motor, np.full(51, regulator), condition=start)
-        errors.append(np.abs(states[-1] - state)[[0, 2]])
-    return np.array(errors)
-
-
-def orders(damping_n_s_per_mm, steps):
-    errors = smooth_errors(damping_n_s_per_mm, steps)
-    return errors, np.log2(errors[:-1] / errors[1:])
 
 
 def test_order_four():
