@@ -374,7 +374,7 @@ def _ladder_table(name: str, ladder: list[Error]) -> Table:
 
 def _checks_table() -> Table:
     table = Table(title="Limits and inertia", show_header=False)
-    # Where damping leaves the step's root small, finer steps than these reach the reference's floor.
+    # With little damping, finer steps than these reach the reference's floor.
     for damping, steps in ((0.05, (8e-4, 4e-4, 2e-4)), (2.9, (2e-4, 1e-4, 5e-5))):
         found = orders(damping, np.array(steps))[1].min(axis=1)
         words = ", ".join(f"{order:.2f}" for order in found)
