@@ -36,13 +36,13 @@ def simulated_protocol(plant, pressure, load):
 @pytest.mark.parametrize(("pressure", "load"), [(150e3, 300.0), (300e3, 600.0), (550e3, 825.0)])
 def test_formulas_of_i3_equal_the_simulated_protocol(station, pressure, load):
     frictionless = station.replace(
-        {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
+        {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0, "drive.offset_n": 0.0}
     )
     extension, returned, rotation, back = simulated_protocol(Plant(frictionless), pressure, load)
     predicted = statics.protocol(station, np.array([pressure]), np.array([load]))
     assert 1e3 * predicted.extension[0] == pytest.approx(extension, abs=0.02)
-    # The drive's offset of -2 N lets go of the cable up to 0.1 s before 15 s; the formula at 15 s.
-    assert 1e3 * predicted.returned[0] == pytest.approx(returned, abs=0.2)
+    # Without the drive's offset of -2 N, which lets go of the cable before 15 s (0.16 mm).
+    assert 1e3 * predicted.returned[0] == pytest.approx(returned, abs=0.1)
     parameters = station.parameters
     pulley = lines.Pulley(
         parameters["rotor"].radius, parameters["cable"].stiffness, parameters["cable"].slack
