@@ -12,6 +12,21 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 RESULTS = Path("results")
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+
+def _writable(out: Path | None) -> Path | None:
+    """Refuse a file that cannot be written before anything is computed for it."""
+    from pma_gym.files import OutputError, check_output
+
+    try:
+        if out is not None:
+            check_output(out)
+    except OutputError as error:
+        _refuse(ValueError(f"--out: {error}"))
+    return out
+
 
 app = typer.Typer(
     add_completion=False,
@@ -20,8 +35,9 @@ app = typer.Typer(
     invoke_without_command=True,
 )
 
-Out = Annotated[Path, typer.Option(help="File to write.")]
-OptionalOut = Annotated[Path | None, typer.Option(help="File to write.")]
+_OUT = typer.Option(help="File to write, in a folder that exists.", callback=_writable)
+Out = Annotated[Path, _OUT]
+OptionalOut = Annotated[Path | None, _OUT]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 
 
@@ -43,10 +59,22 @@ def reproduction(
     """Run every controller through every trial and write the report (the main job)."""
     if context.invoked_subcommand is not None:
         return
+    try:
+        code = _reproduce(out, controllers, model, task, pressures, jobs)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case: nothing is measured or written", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+def _reproduce(
+    out: Path, controllers: str, model: str, task: str, pressures: str, jobs: int
+) -> int:
+    """The main job; its exit code."""
     from rich.console import Console
 
     from benchmarks.contender import ControllerError, parse_contenders
-    from benchmarks.job import INTERRUPTED, run_job
+    from benchmarks.job import run_job
     from benchmarks.suite import SuiteError, load_suite
     from pma_gym.plant.model import ModelError, load_model
 
@@ -61,12 +89,7 @@ def reproduction(
             raise SuiteError(f"--out {out} is a file; name a folder for the results")
     except (ControllerError, ModelError, SuiteError) as error:
         _refuse(error)
-    try:
-        code = run_job(suite, out, jobs, Console())
-    except KeyboardInterrupt:
-        print("interrupted before or after the cases; the report was not written", file=sys.stderr)
-        code = INTERRUPTED
-    raise typer.Exit(code)
+    return run_job(suite, out, jobs, Console())
 
 
 @app.command()
@@ -90,7 +113,11 @@ def identify(out: Out, jobs: Jobs = 2) -> None:
     """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
     from benchmarks.identify import run_identify
 
-    run_identify(out, jobs)
+    try:
+        run_identify(out, jobs)
+    except KeyboardInterrupt:
+        print("Interrupted: nothing is written", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
 
 
 @app.command()
@@ -101,13 +128,18 @@ def tune(
     jobs: Jobs = 2,
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
-    from benchmarks.tune import GAINS_FILE, run_tune
+    from benchmarks.tune import GAINS_FILE, TuneError, run_tune
 
+    out = out or GAINS_FILE
+    _writable(out)
     try:
-        written = run_tune(out or GAINS_FILE, seed, model, jobs)
+        written = run_tune(out, seed, model, jobs)
     except ValueError as error:
         _refuse(error)
-    raise typer.Exit(0 if written else 130)
+    except TuneError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(1) from None
+    raise typer.Exit(0 if written else INTERRUPTED)
 
 
 @app.command()
@@ -116,6 +148,31 @@ def accuracy(out: OptionalOut = None) -> None:
     from benchmarks.accuracy import run_accuracy
 
     raise typer.Exit(0 if run_accuracy(out=out) else 1)
+
+
+@app.command()
+def speed(
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
+    ] = None,
+    check: Annotated[
+        bool,
+        typer.Option(help="Only what shows a loss of vectorisation; exit code 1 if so."),
+    ] = False,
+    only: Annotated[
+        str, typer.Option(help="Rows by commas, such as single or 'batch/own*'; all if empty.")
+    ] = "",
+    quick: Annotated[bool, typer.Option(help="A smoke run, whose figures say little.")] = False,
+) -> None:
+    """Measure this package's speed beside other simulators' (`make peers` installs them)."""
+    from benchmarks.speed.rows import RequestError
+    from benchmarks.speed.run import run_speed
+
+    try:
+        code = run_speed(json_file, check, only, quick)
+    except RequestError as error:
+        _refuse(error)
+    raise typer.Exit(code)
 
 
 def _listed(text: str) -> list[str]:

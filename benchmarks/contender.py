@@ -5,7 +5,7 @@ import importlib.util
 import inspect
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -22,8 +22,8 @@ class Contender:
     """A controller by its name; made anew for every case, in the process that runs the case.
 
     Attributes:
-        name: what the results call it.
-        title: what the report calls it.
+        name: what the results call it; the class for one of one's own.
+        title: what the report calls it; for a class of one's own, its attribute `name`.
         path: file of its class; empty for one of `controllers.CONTROLLERS`.
     """
 
@@ -84,9 +84,17 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
         if item.endswith(".py") or (colon and not name):
             raise ControllerError(f"{item} names no class; write {item.rstrip(':')}:ClassName")
         contender = Contender(name, path=path) if colon else titled.get(item, Contender(item))
-        contender.make()
+        made = contender.make()
+        if contender.path:
+            contender = replace(contender, title=_own_name(made))
         contenders.append(contender)
     return contenders
+
+
+def _own_name(controller: Controller) -> str:
+    """What a controller calls itself; nothing if it does not."""
+    name = getattr(controller, "name", "")
+    return name.strip() if isinstance(name, str) else ""
 
 
 def _class_of(contender: Contender) -> type:

@@ -1,12 +1,14 @@
 """`python -m benchmarks identify`: the station from tables I2 and I3, judged on I3 and I1."""
 
 import math
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 from rich.console import Console
-from rich.progress import track
+from rich.progress import Progress
 from rich.table import Table
 
 from benchmarks.files import write_text
@@ -14,6 +16,7 @@ from benchmarks.identification import judge
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
+from benchmarks.processes import run_all
 from pma_gym.plant.model import Model, Note, dump_model
 
 STUDENT_10 = 2.228
@@ -32,15 +35,15 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
         console: where to print.
     Returns:
         The model as written.
+    Raises:
+        KeyboardInterrupt: Ctrl-C, before anything is written.
     """
     console = console or Console()
     data, steps = station_limits(), pressure_steps()
     whole = identify(data, steps)
     start = fitted_parameters(whole)
-    tasks = [(data, steps, float(pressure), start) for pressure in data.pressures]
-    with ProcessPoolExecutor(jobs) as pool:
-        found = pool.map(_fold, tasks)
-        folds = list(track(found, "pressures left out", len(tasks), console=console))
+    works = [partial(_fold, data, steps, float(pressure), start) for pressure in data.pressures]
+    folds = _all_folds(works, jobs, console)
     model = _noted(whole, [fitted_parameters(fold) for fold, _ in folds])
     judged = [errors for _, errors in folds]
     words = judge.unexplained(whole, data, steps)
@@ -50,10 +53,30 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     return model
 
 
+Fold = tuple[Model, judge.LeftOut]
+
+
+def _all_folds(works: Sequence[partial[Fold]], jobs: int, console: Console) -> list[Fold]:
+    """The fits with one pressure left out, in order."""
+    folds: dict[int, Fold] = {}
+    with Progress(console=console) as progress:
+        bar = progress.add_task("pressures left out", total=len(works))
+
+        def keep(index: int, result: object) -> None:
+            if isinstance(result, BaseException):
+                raise result
+            folds[index] = cast("Fold", result)
+            progress.update(bar, advance=1)
+
+        if not run_all(works, jobs, keep):
+            raise KeyboardInterrupt
+    return [folds[index] for index in range(len(works))]
+
+
 def _fold(
-    task: tuple[StationLimits, PressureSteps, float, dict[str, float]],
-) -> tuple[Model, judge.LeftOut]:
-    data, steps, pressure, start = task
+    data: StationLimits, steps: PressureSteps, pressure: float, start: dict[str, float]
+) -> Fold:
+    """The station fitted without a pressure (Pa), and how it predicts that one."""
     model = identify(*leave_out(data, steps, pressure), start)
     return model, judge.left_out(model, data.rows(data.pressure == pressure))
 

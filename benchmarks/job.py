@@ -38,8 +38,8 @@ FAILED, INTERRUPTED = 1, 130
 def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
     """Run every case of a suite and write scores and report.
 
-    Files of an earlier run stay whole until this one ends and replaces them. Ctrl-C writes what is
-    done to `partial/` in the same folder.
+    Files of an earlier run stay whole until this one ends and replaces them. Ctrl-C drops the cases
+    in progress and writes those that are done to `partial/` in the same folder.
 
     Args:
         suite: what to run.
@@ -48,6 +48,8 @@ def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
         console: where to print.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
+    Raises:
+        KeyboardInterrupt: Ctrl-C before the cases began: nothing is written.
     """
     began = time.perf_counter()
     info = environment_info() | {
@@ -71,7 +73,11 @@ def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
             results = _write_results(Results(suite, execution, info), out, began)
     except KeyboardInterrupt:
         return _leave_partial(Results(suite, execution, info), out, console)
-    print_summary(results, out / "report.html", console)
+    try:
+        print_summary(results, out / "report.html", console)
+    except KeyboardInterrupt:
+        console.print(f"Interrupted when all was done: the report is in {out}.", highlight=False)
+        return INTERRUPTED
     return FAILED if results.failures else 0
 
 
@@ -158,6 +164,13 @@ def _write_results(results: Results, out: Path, began: float) -> Results:
 def _leave_partial(results: Results, out: Path, console: Console) -> int:
     """Write the scores of an interrupted run beside the last whole run's, and say so."""
     folder = out / PARTIAL
+    if not results.scores:
+        console.print(
+            "[yellow]Interrupted[/] before the first case was done: nothing was measured, and "
+            f"nothing is written to {out}. Run again for the whole.",
+            highlight=False,
+        )
+        return INTERRUPTED
     write_text(folder / "scores.csv", csv_text(results.scores))
     write_text(folder / "scores.json", json_text(results))
     total = len(list(results.suite.cases()))

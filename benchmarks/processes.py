@@ -1,11 +1,10 @@
 """Runs independent pieces of work on several processes; Ctrl-C leaves what is done."""
 
-import multiprocessing
-import signal
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager
+import pickle
+from collections import deque
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+from benchmarks.worker import ProcessDied, Worker, deaf_to_interrupt
 
 Work = Callable[[], object]
 """A piece of work; pickled to be run in another process."""
@@ -17,12 +16,15 @@ OnDone = Callable[[int, object], None]
 def run_all(works: Sequence[Work], jobs: int, on_done: OnDone) -> bool:
     """Run every piece of work, `jobs` at a time.
 
+    A piece whose process dies is run once more, alone, after the others; if that process dies too,
+    `ProcessDied` is its result. The others are not touched by it.
+
     Args:
         works: what to run; no piece may depend on another.
         jobs: number of processes; 1 runs in this one.
         on_done: called in this process as results come, in any order.
     Returns:
-        Whether all of it was run: Ctrl-C ends the run after the pieces in progress.
+        Whether all of it was run: Ctrl-C ends the run at once, with the pieces in progress.
     """
     try:
         (_run_here if jobs == 1 else _run_in_processes)(works, jobs, on_done)
@@ -41,39 +43,47 @@ def _run_here(works: Sequence[Work], jobs: int, on_done: OnDone) -> None:
 
 
 def _run_in_processes(works: Sequence[Work], jobs: int, on_done: OnDone) -> None:
-    # Spawned, not forked: the progress display has a thread, and numba may have some.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(jobs, mp_context=context) as pool:
-        with _deaf_to_interrupt():
-            waiting = {pool.submit(work): index for index, work in enumerate(works)}
+    packed: dict[int, bytes] = {}
+    for index, work in enumerate(works):
         try:
-            while waiting:
-                _collect(waiting, on_done)
-        except KeyboardInterrupt:
-            # Those in progress are let finish, for each takes a second or two.
-            pool.shutdown(wait=True, cancel_futures=True)
-            _collect(waiting, on_done)
-            raise
+            packed[index] = pickle.dumps(work)
+        except Exception as error:
+            on_done(index, error)
+    died = _attempt(packed, packed, jobs, on_done)
+    # Alone it has all of the memory, if that was the reason.
+    for index, error in _attempt(packed, sorted(died), 1, on_done).items():
+        on_done(index, ProcessDied(error.exit_code, again=True))
 
 
-def _collect(waiting: dict[Future[object], int], on_done: OnDone) -> None:
-    """Wait for a piece at least, and hand on what is done."""
-    done, _ = wait(waiting, return_when=FIRST_COMPLETED)
-    for future in done:
-        if not future.cancelled():
-            # A process that died has an exception for each piece that it leaves undone.
-            on_done(waiting[future], future.exception() or future.result())
-        del waiting[future]
-
-
-@contextmanager
-def _deaf_to_interrupt() -> Iterator[None]:
-    """Processes started inside inherit that Ctrl-C is not for them: this one ends them."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    usual = signal.signal(signal.SIGINT, signal.SIG_IGN)
+def _attempt(
+    packed: Mapping[int, bytes], order: Iterable[int], jobs: int, on_done: OnDone
+) -> dict[int, ProcessDied]:
+    """Run pieces of work, some at a time; those whose process died, and how."""
+    waiting, died = deque(order), dict[int, ProcessDied]()
+    workers, idle, busy = list[Worker](), list[Worker](), dict[Worker, int]()
     try:
-        yield
+        while waiting or busy:
+            while waiting and len(busy) < jobs:
+                if not idle:
+                    with deaf_to_interrupt():
+                        workers.append(Worker())
+                        idle.append(workers[-1])
+                worker, index = idle.pop(), waiting.popleft()
+                busy[worker] = index
+                worker.give(packed[index])
+            for worker in Worker.wait(busy):
+                index = busy.pop(worker)
+                try:
+                    result = worker.result()
+                except ProcessDied as error:
+                    died[index] = error
+                else:
+                    idle.append(worker)
+                    on_done(index, result)
     finally:
-        signal.signal(signal.SIGINT, usual)
+        with deaf_to_interrupt():
+            for worker in idle:
+                worker.dismiss()
+            for worker in workers:
+                worker.end()
+    return died

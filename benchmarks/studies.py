@@ -1,7 +1,7 @@
 """The dissertation's figures, recomputed beside the print: `python -m benchmarks studies`."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich.console import Console
@@ -29,7 +29,11 @@ def run_studies(out: Path | None = None, console: Console | None = None) -> list
     console = console or Console()
     rows = compare_all()
     for study, group in _by_study(rows).items():
-        console.print(study_table(study, group))
+        notes = _notes(group)
+        console.print(study_table(study, group, notes))
+        for note, number in notes.items():
+            console.print(f"{number}: {note}", markup=False, highlight=False)
+        console.print()
     console.print(counts_table(rows))
     if out is not None:
         write_csv(out, COLUMNS, [_cells(row) for row in rows])
@@ -45,16 +49,32 @@ def _by_study(rows: Sequence[Comparison]) -> dict[str, list[Comparison]]:
     return studies
 
 
-def study_table(study: str, rows: Sequence[Comparison]) -> Table:
-    """One study's comparisons as a table for the terminal."""
+def _notes(rows: Sequence[Comparison]) -> dict[str, int]:
+    """Each note once, numbered from 1."""
+    return {note: i for i, note in enumerate(dict.fromkeys(r.note for r in rows if r.note), 1)}
+
+
+def study_table(study: str, rows: Sequence[Comparison], notes: Mapping[str, int]) -> Table:
+    """One study's comparisons as a table for the terminal, as narrow as 80 columns.
+
+    Args:
+        study: its name.
+        rows: its comparisons.
+        notes: numbers of the notes, whose text stands below the table.
+    """
     table = Table(title=f"{study}: {_summary(rows)}", title_justify="left", expand=False)
     for name in COLUMNS[1:]:
-        right = name in ("printed", "recomputed")
-        table.add_column(name, justify="right" if right else "left", no_wrap=name != "note")
+        right = name in ("printed", "recomputed", "note")
+        table.add_column(
+            name,
+            justify="right" if right else "left",
+            no_wrap=name != "quantity",
+            overflow="fold",
+        )
     for row in rows:
         style = _STYLES[row.verdict]
         _, *cells, verdict, note = _cells(row)
-        table.add_row(*cells, f"[{style}]{verdict}[/]", note)
+        table.add_row(*cells, f"[{style}]{verdict}[/]", str(notes.get(note, "")))
     return table
 
 

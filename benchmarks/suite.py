@@ -2,6 +2,7 @@
 
 import hashlib
 import tomllib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,6 +13,9 @@ from pma_gym.tasks import TASKS
 
 SUITES = Path(__file__).parent / "suites"
 SCHEMA = 1
+
+MEASURED = "Measured"
+"""What the tables call the dissertation's own trials."""
 
 
 class SuiteError(ValueError):
@@ -189,7 +193,11 @@ def load_suite(name: str = "reproduction") -> Suite:
 
 
 def _distinct(controllers: Sequence[Contender]) -> tuple[Contender, ...]:
-    """The controllers once each; refuses two with one name, which no table could tell apart."""
+    """The controllers once each, every one with a label of its own.
+
+    Raises:
+        SuiteError: two with one name, which no results could tell apart.
+    """
     by_name: dict[str, Contender] = {}
     for controller in controllers:
         rival = by_name.setdefault(controller.name, controller)
@@ -198,7 +206,13 @@ def _distinct(controllers: Sequence[Contender]) -> tuple[Contender, ...]:
                 f"two controllers are called {controller.name}: {rival.source} and "
                 f"{controller.source}; rename one class"
             )
-    return tuple(by_name.values())
+    labels = Counter([MEASURED, *(controller.label for controller in by_name.values())])
+    return tuple(
+        replace(controller, title=f"{controller.label} ({controller.name})")
+        if controller.path and labels[controller.label] > 1
+        else controller
+        for controller in by_name.values()
+    )
 
 
 def _list(pressures: Sequence[float]) -> str:

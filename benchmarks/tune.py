@@ -20,11 +20,15 @@ For every task, controller and pressure of a small table:
    2 and the phase by 29 deg at least before the loop is unstable.
 
 The same seed gives the same bytes on the same machine and versions.
+
+Rows that are done are kept in a file beside that of the gains; after Ctrl-C the same command goes
+on from there.
 """
 
 import hashlib
 import json
 import platform
+import sys
 from functools import partial
 from importlib.metadata import version
 from pathlib import Path
@@ -38,7 +42,9 @@ from benchmarks.files import write_text
 from benchmarks.processes import run_all
 from benchmarks.tuning.cost import Cost
 from benchmarks.tuning.job import CONTROL_RATE_HZ, Job
+from benchmarks.tuning.kept import KeptRows, name_of
 from benchmarks.tuning.loop import lambda_tuning
+from benchmarks.worker import ProcessDied
 from controllers.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.pid import PID, FeedforwardPID
 from pma_gym.plant.model import Model, dump_model, load_model
@@ -57,6 +63,10 @@ SEARCH_WIDTH = 3.0
 """How far the search may leave its start, as the logarithm of a factor: 20 either way."""
 
 
+class TuneError(RuntimeError):
+    """A table of gains that could not be computed; the message says why and how to go on."""
+
+
 def run_tune(out: Path = GAINS_FILE, seed: int = 0, model: str = "station", jobs: int = 2) -> bool:
     """Tune on a model and write the gains; those of other models in the file stay.
 
@@ -66,8 +76,9 @@ def run_tune(out: Path = GAINS_FILE, seed: int = 0, model: str = "station", jobs
         model: name of a shipped model or path of a TOML file.
         jobs: number of processes.
     Returns:
-        Whether it was written: Ctrl-C leaves the file as it was.
+        Whether it was written: Ctrl-C leaves the file as it was, and says how to go on.
     Raises:
+        TuneError: the process of a row died.
         ModelError: no such model.
         ValueError: the file of gains is broken.
     """
@@ -78,32 +89,58 @@ def run_tune(out: Path = GAINS_FILE, seed: int = 0, model: str = "station", jobs
         for controller in CONTROLLERS
         for pressure in pressures
     ]
-    results = _all_tuned(rows, jobs)
-    if len(results) < len(rows):
+    kept = KeptRows(out, _provenance(known, seed) | {"evaluations": EVALUATIONS})
+    left = [row for row in rows if name_of(row) not in kept.rows]
+    if len(left) < len(rows):
+        print(
+            f"{len(rows) - len(left)} of {len(rows)} rows are taken from {kept.path}, which an "
+            "earlier run left; delete it to tune them anew"
+        )
+    if not _all_tuned(left, jobs, kept):
+        done = sum(name_of(row) in kept.rows for row in rows)
+        print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
-    document["models"][known.name] = _tables(rows, [results[i] for i in range(len(rows))])
+    document["models"][known.name] = _tables(rows, [kept.rows[name_of(row)] for row in rows])
     document["provenance"][known.name] = _provenance(known, seed)
     _write(out, document)
+    kept.forget()
     return True
 
 
-def _all_tuned(rows: list[Job], jobs: int) -> dict[int, tuple[Gains, float]]:
-    """Gains and cost by the row's place; fewer than there are rows after Ctrl-C."""
+def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
+    """What to say after Ctrl-C."""
+    if not done:
+        return f"Interrupted before the first of {total} rows was tuned; {out} is as it was."
+    return (
+        f"Interrupted: {done} of {total} rows are tuned and kept in {kept}; {out} is as it was. "
+        "Run the same command again to go on from there."
+    )
+
+
+def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
+    """Tune rows and keep each as it is done; false after Ctrl-C."""
     # Trials of rotation take three times as long: first, so that no process waits at the end.
-    order = sorted(range(len(rows)), key=lambda i: rows[i].task != "rotation")
-    Plant(rows[0].model)  # compiled here, once, so that the processes find it on disk
-    results: dict[int, tuple[Gains, float]] = {}
-    with Progress() as progress:
-        bar = progress.add_task("Tuning", total=len(rows))
+    order = sorted(rows, key=lambda row: row.task != "rotation")
+    try:
+        if order:
+            Plant(order[0].model)  # compiled here, once, so that the processes find it on disk
+        with Progress() as progress:
+            bar = progress.add_task("Tuning", total=len(rows))
 
-        def keep(index: int, result: object) -> None:
-            if isinstance(result, BaseException):
-                raise result
-            results[order[index]] = cast("tuple[Gains, float]", result)
-            progress.update(bar, advance=1)
+            def keep(index: int, result: object) -> None:
+                if isinstance(result, ProcessDied):
+                    raise TuneError(
+                        f"row {name_of(order[index])}: {result}; the rows that are done are kept "
+                        f"in {kept.path}: mend it and run again to go on"
+                    )
+                if isinstance(result, BaseException):
+                    raise result
+                kept.keep(order[index], cast("tuple[Gains, float]", result))
+                progress.update(bar, advance=1)
 
-        run_all([partial(tuned, rows[i]) for i in order], jobs, keep)
-    return results
+            return run_all([partial(tuned, row) for row in order], jobs, keep)
+    except KeyboardInterrupt:
+        return False
 
 
 def tuned(job: Job) -> tuple[Gains, float]:

@@ -16,7 +16,14 @@ from rich.markup import escape
 from rich.table import Table
 
 from pma_gym.data.trial import Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning, read_trial, write_trial
+from pma_gym.data.trial_columns import SampleError
+from pma_gym.data.trial_files import (
+    TrialWarning,
+    check_writable,
+    place_in_file,
+    read_trial,
+    write_trial,
+)
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import Value
 from pma_gym.envs import ENVIRONMENTS
@@ -50,7 +57,9 @@ class Hold(StrEnum):
 @app.command()
 def simulate(
     commands: Annotated[Path, typer.Argument(help="CSV, Parquet or XLSX with time and commands.")],
-    out: Annotated[Path, typer.Option(help="File to write: .csv, .parquet or .xlsx.")],
+    out: Annotated[
+        Path, typer.Option(help="File to write, in a folder that exists: .csv, .parquet or .xlsx.")
+    ],
     model: ModelOption = "station",
     noise: Annotated[bool, typer.Option(help="Sensor noise and quantisation.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
@@ -59,12 +68,15 @@ def simulate(
     ] = Hold.LINEAR,
 ) -> None:
     """Run a command file through a model and write the trial as the station's log would be."""
+    check_writable(out)
     if out.exists() and commands.exists() and out.samefile(commands):
         raise TrialError(f"--out {out} is the command file itself; name another file")
     plant = Plant(load_model(model))
     given = _read(commands)
     try:
         trial = plant.simulate(given, noise, seed, joined=hold is Hold.LINEAR)
+    except SampleError as error:
+        raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:
         raise TrialError(f"{commands.name}: {error}") from error
     write_trial(trial, out)

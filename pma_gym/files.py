@@ -1,8 +1,52 @@
-"""Files that are written whole or not at all."""
+"""Files that are written whole or not at all, and the rule on where one may be written."""
 
 import os
 import secrets
+import tempfile
 from pathlib import Path
+
+
+class OutputError(ValueError):
+    """A file that cannot be written; the message says which, why and the mend."""
+
+
+def check_output(path: Path) -> None:
+    """Refuse a file that could not be written, before anything is computed for it.
+
+    The one rule of all commands: the folder exists and lets files be made; the file is new, or an
+    ordinary file that may be written. Nothing is made or changed.
+
+    Args:
+        path: the file.
+    Raises:
+        OutputError: names the file, what is in the way and the mend.
+    """
+    fault = _fault(Path(path))
+    if fault:
+        raise OutputError(f"cannot write {path}: {fault}")
+
+
+def _fault(path: Path) -> str:
+    """What keeps a file from being written and what to do about it; nothing if nothing does."""
+    folder = path.parent
+    if path.is_dir():
+        return f"{path} is a folder; name a file in it"
+    if not folder.is_dir():
+        fault = f"{folder} is no folder" if folder.exists() else f"there is no folder {folder}"
+        return f"{fault}; name a file in a folder that exists, or make the folder"
+    if path.exists() and not path.is_file():
+        return "it is no ordinary file; name another"
+    if path.exists() and not os.access(path, os.W_OK):
+        return "the file is write-protected; name another, or allow writing to it"
+    try:
+        # Only trying tells: a full disk or a read-only one lets permissions look well.
+        with tempfile.TemporaryFile(dir=folder):
+            return ""
+    except OSError as error:
+        return (
+            f"no file can be made in the folder {folder} ({error.strerror}); name a file in "
+            "another, or allow writing to this one"
+        )
 
 
 def replace_file(path: Path, content: bytes) -> None:

@@ -80,6 +80,7 @@ class Quantity:
         upper: largest value that makes physical sense.
         source: where the bounds and the usual value come from; says "assumption" for one.
         neutral: value at which the parameter has no effect at all, or None.
+        instead: what to do for a value beyond the bounds; empty if the bounds are all.
     """
 
     unit: str
@@ -87,6 +88,7 @@ class Quantity:
     upper: float
     source: str
     neutral: float | None = None
+    instead: str = ""
 
     def __post_init__(self) -> None:
         """Refuse a unit without a factor and bounds in the wrong order."""
@@ -121,9 +123,10 @@ class Quantity:
         """Refuse a value at the door outside the bounds.
 
         Raises:
-            ValueError: names the parameter, the range, the unit and what came.
+            ValueError: names the parameter, the range, the unit, what came and the mend.
         """
         if not self.lower <= value <= self.upper:
             raise ValueError(
-                f"{name} must lie in {self.lower:g} to {self.upper:g} {self.unit}, got {value!r}"
+                f"{name} must lie in {self.lower:g} to {self.upper:g} {self.unit}, got {value!r}; "
+                f"{self.instead or 'check unit and decimal point'} (usual: {self.source})"
             )

@@ -13,6 +13,7 @@ from pma_gym.data.trial_files import read_trial, write_trial
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
 
 HEADER = "time_s,motor_voltage_v,regulator_voltage_v"
+WISHES = "time_s,motor_voltage_v,pressure_command_kpa"
 RAMP = f"{HEADER}\n0,0,5\n2,3,5\n4,3,5\n"
 
 
@@ -111,6 +112,29 @@ def test_unknown_columns_are_said(run, tmp_path):
             "give regulator_voltage_v or pressure_command_kpa",
         ),
         ("t,motor_voltage_v\n0,0\n", ["--out", "log.csv"], "has no column time_s"),
+        (
+            f"{WISHES}\n0,0,300\n\n1,0,700\n",
+            ["--out", "log.csv"],
+            "^error: pressure_command_kpa must lie in 0 to 578.6 kPa, .* row 4 of ramp.csv has "
+            "700; write gauge pressure in kPa: 1 bar is 100",
+        ),
+        (f"{WISHES}\n0,0,-1\n", ["--out", "log.csv"], "must lie in 0 to .* row 2 of .* has -1;"),
+        (
+            f"{WISHES}\n0,0,\n1,0,300\n",
+            ["--out", "log.csv"],
+            "pressure_command_kpa has no value in row 2 of ramp.csv, the first, .*; fill it in",
+        ),
+        (
+            f"{HEADER}\n0,0,5\n1e9,0,5\n",
+            ["--out", "log.csv"],
+            "time_s must span 86400 s .*, from row 2 of ramp.csv to row 3 of ramp.csv it is "
+            r"1e\+09 s; write seconds: divide milliseconds by 1000",
+        ),
+        (
+            f"{HEADER}\n0,0,5\n1e-9,0,5\n",
+            ["--out", "log.csv"],
+            "samples must lie 1e-06 s or more apart in time_s, .* it is 1e-09 s on average; write",
+        ),
     ],
 )
 def test_what_cannot_be_simulated_ends_in_one_message(run, tmp_path, content, options, message):
@@ -123,6 +147,46 @@ def test_what_cannot_be_simulated_ends_in_one_message(run, tmp_path, content, op
     assert re.search(message, err)
     assert {path.name for path in tmp_path.iterdir()} == {"ramp.csv"}
     assert (tmp_path / "ramp.csv").read_text() == content
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_run(run, ramp, tmp_path, monkeypatch):
+    monkeypatch.setattr("pma_gym.cli.Plant", None)
+    (tmp_path / "log.csv").mkdir()
+    for out, message in (("log.csv", "log.csv is a folder"), ("none/log.csv", "no folder none;")):
+        code, _, err = run("simulate", "ramp.csv", "--out", out)
+        assert code == 2
+        assert re.search(f"^error: cannot write {out}: .*{message}", err)
+
+
+def test_a_folder_is_no_command_file(run, ramp):
+    for command in (["simulate", ".", "--out", "log.csv"], ["evaluate", ".", "--task", "rotation"]):
+        code, _, err = run(*command)
+        assert (code, err) == (
+            2,
+            "error: . is a folder; name a .csv or .parquet or .xlsx file in it\n",
+        )
+
+
+def test_an_empty_command_cell_holds_the_value_before_it(run, tmp_path):
+    """As docs/data.md says, even where commands are joined linearly."""
+    (tmp_path / "gap.csv").write_text(f"{WISHES}\n0,0,300\n1,,\n2,3,\n")
+    (tmp_path / "full.csv").write_text(f"{WISHES}\n0,0,300\n1,0,300\n2,3,300\n")
+    loads = {}
+    for name in ("gap", "full"):
+        assert run("simulate", f"{name}.csv", "--no-noise", "--out", "log.csv")[0] == 0
+        loads[name] = read_trial(tmp_path / "log.csv").measurements["load"]
+    np.testing.assert_array_equal(loads["gap"], loads["full"])
+
+
+def test_a_trial_begins_settled_at_its_first_row(run, tmp_path):
+    """As docs/data.md says: an episode that began at rest needs a first row of 0 V."""
+    extensions = {}
+    for name, first in (("pulled", ""), ("rest", "-0.01,0,300\n")):
+        (tmp_path / f"{name}.csv").write_text(f"{WISHES}\n{first}0,3,300\n1,3,300\n")
+        assert run("simulate", f"{name}.csv", "--no-noise", "--out", "log.csv")[0] == 0
+        extensions[name] = read_trial(tmp_path / "log.csv").extension
+    assert np.abs(extensions["pulled"]).max() < 1e-6
+    assert extensions["rest"][-1] > 5e-3
 
 
 def displacement_log(path, slope=5.2561355, intercept=-0.823263):

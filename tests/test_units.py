@@ -57,9 +57,11 @@ def test_bounds_belong_to_the_range():
 
 @pytest.mark.parametrize("value", [149.9, 576.0, math.nan])
 def test_a_value_out_of_range_is_refused(value):
-    message = f"pressure_kpa must lie in 150 to 575 kPa, got {value!r}"
-    with pytest.raises(ValueError, match=message):
+    message = f"pressure_kpa must lie in 150 to 575 kPa, got {value!r}; "
+    with pytest.raises(ValueError, match=message + r"check unit and .* \(usual: test\)"):
         Quantity("kPa", 150, 575, "test").check("pressure_kpa", value)
+    with pytest.raises(ValueError, match=message + r"leave it out \(usual: test\)"):
+        Quantity("kPa", 150, 575, "test", instead="leave it out").check("pressure_kpa", value)
 
 
 def test_a_quantity_refuses_an_unknown_unit_and_reversed_bounds():

@@ -7,6 +7,7 @@ from benchmarks.replay import QUANTITIES, ReplayError, summarise
 from benchmarks.report.document import TextTable
 from benchmarks.results import Results
 from benchmarks.score import UNITS, PhaseScore, measured_score
+from benchmarks.suite import MEASURED
 from benchmarks.targets import Check
 
 RULE = [""]
@@ -20,7 +21,7 @@ Figures = Callable[[float], PhaseScore | None]
 
 def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Figures]:
     """Who stands in a table, measured first, and the figures of each by pressure."""
-    found: dict[str, Figures] = {"Measured": lambda p: measured_score(task, phase, p)}
+    found: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
     for controller in results.suite.controllers:
         name = controller.name
         found[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)

@@ -28,8 +28,18 @@ def check_commanded(quantities: Iterable[str], owner: str) -> None:
         raise TrialError(f"{owner} needs at least one command, {names}; it has none")
 
 
+_ROUNDING = 1e-6
+"""Share by which a step in floating point may fall short."""
+
+LONGEST_S = 86_400.0
+"""Longest trial (s): a day, two minutes of simulation."""
+
+SHORTEST_STEP_S = 1e-6
+"""Shortest time between samples, on average (s); two rows may be closer, for a jump."""
+
+
 def check_time(time: NDArray[np.float64], place: Place) -> None:
-    """Refuse times (s) that are not finite or do not strictly increase.
+    """Refuse times (s) that are not finite, do not strictly increase or are no seconds.
 
     Raises:
         TrialError: says where, and both times.
@@ -47,6 +57,19 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
         raise TrialError(
             f"time_s must increase strictly, {place(int(later[0]))} has {after!r} s after "
             f"{before!r} s; sort the rows, or split the file where a new trial begins"
+        )
+    steps, span = time.size - 1, float(time[-1] - time[0])
+    ends = f"from {place(0)} to {place(steps)} it is"
+    if span > LONGEST_S:
+        raise TrialError(
+            f"time_s must span {LONGEST_S:g} s (a day) at most, {ends} {span:g} s; write seconds: "
+            "divide milliseconds by 1000, and sample numbers by the samples per second"
+        )
+    if steps and span < SHORTEST_STEP_S * (1.0 - _ROUNDING) * steps:
+        raise TrialError(
+            f"samples must lie {SHORTEST_STEP_S:g} s or more apart in time_s, {ends} "
+            f"{span / steps:.3g} s on average; write seconds: multiply hours by 3600, and a "
+            "spreadsheet's days by 86400"
         )
 
 

@@ -22,6 +22,28 @@ class TrialError(ValueError):
     """A trial, or its file, that cannot be used; the message says where, why and the mend."""
 
 
+class SampleError(TrialError):
+    """A trial of which one sample cannot be used.
+
+    Attributes:
+        sample: its index.
+    """
+
+    def __init__(self, words: str, sample: int) -> None:
+        """Take the message, in which `{place}` stands for where the sample is."""
+        self._words = words
+        self.sample = sample
+        super().__init__(self.at(f"sample {sample}"))
+
+    def at(self, place: str) -> str:
+        """The message, with another name of the place: `row 3 of ramp.csv`."""
+        return self._words.replace("{place}", place)
+
+    def __reduce__(self) -> tuple[type["SampleError"], tuple[object, ...]]:
+        """Send to other processes by construction."""
+        return SampleError, (self._words, self.sample)
+
+
 @dataclass(frozen=True)
 class Column:
     """One column.

@@ -26,9 +26,12 @@ from pma_gym.data.trial_columns import (
     suggestion,
 )
 from pma_gym.data.trial_formats import DECODERS, ENCODERS, Table
-from pma_gym.files import replace_file
+from pma_gym.files import OutputError, check_output, replace_file
 
 _NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
+USUAL_S = 600.0
+"""Longest trial (s) whose time is not doubted; the dissertation's last 15 s."""
+
 _COUNTS = "if the log is in raw DAQ counts, give [columns] a factor"
 
 
@@ -53,7 +56,8 @@ def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
     Raises:
         TrialError: the file cannot be used; names file, row, column, rule and mend.
     Warns:
-        TrialWarning: unknown columns, which are passed over.
+        TrialWarning: unknown columns, which are passed over; a time of over ten minutes, which may
+            be no seconds.
     """
     path = Path(path)
     table = _load(path)
@@ -61,6 +65,7 @@ def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
     found = _match(table, mapping)
     arrays = {source.column.quantity: _door_values(source, table) for source in found}
     check_time(arrays["time"], table.place)
+    _doubt_time(arrays["time"], table)
     check_commanded(arrays, table.file)
     inside = {
         source.column.quantity: source.column.to_si(arrays[source.column.quantity])
@@ -78,6 +83,26 @@ def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
     )
 
 
+def check_writable(path: str | os.PathLike[str]) -> None:
+    """Refuse a file that `write_trial` could not write, before there is a trial.
+
+    Raises:
+        TrialError: unknown suffix, a folder, no such folder, or no leave to write.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        _suffix(path)
+    try:
+        check_output(path)
+    except OutputError as error:
+        raise TrialError(str(error)) from None
+
+
+def place_in_file(path: str | os.PathLike[str], sample: int) -> str:
+    """Where a sample of a trial stands in the file that it was read from: `row 3 of ramp.csv`."""
+    return _load(Path(path)).place(sample)
+
+
 def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
     """Write a trial as the station's log would be: time, commands and measurements.
 
@@ -89,25 +114,25 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
         trial: what to write.
         path: a name that ends in .csv, .parquet or .xlsx; replaced if it exists.
     Raises:
-        TrialError: unknown suffix, no such folder, or a library of `pma-gym[files]` is missing.
+        TrialError: unknown suffix, no such folder, no leave to write, or a library of
+            `pma-gym[files]` is missing.
         OSError: the disk refuses.
     """
     path = Path(path)
-    suffix = _suffix(path)
+    check_writable(path)
     held = {"time": trial.time, **trial.commands, **trial.measurements}
     columns = {
         column.name: column.from_si(held[column.quantity])
         for column in COLUMNS
         if column.quantity in held
     }
-    if path.is_dir() or not path.parent.is_dir():
-        fault = f"{path} is a folder" if path.is_dir() else f"there is no folder {path.parent}"
-        raise TrialError(f"cannot write {path}: {fault}; name a file in a folder that exists")
-    replace_file(path, ENCODERS[suffix](columns, trial.provenance))
+    replace_file(path, ENCODERS[_suffix(path)](columns, trial.provenance))
 
 
 def _load(path: Path) -> Table:
     """The file's table, which has a header and a row."""
+    if path.is_dir():
+        raise TrialError(f"{path} is a folder; name a {' or '.join(DECODERS)} file in it")
     decode = DECODERS[_suffix(path)]
     if not path.is_file():
         raise TrialError(f"there is no file {path}; check the name and the folder")
@@ -150,6 +175,17 @@ def _match(table: Table, mapping: ColumnMap) -> list[Source]:
     if absent:
         _warn(f"{table.file} lacks columns that [columns] maps: {', '.join(absent)}")
     return found
+
+
+def _doubt_time(time: NDArray[np.float64], table: Table) -> None:
+    """Warn of a trial so long that its time may not be in seconds."""
+    span, steps = float(time[-1] - time[0]), time.size - 1
+    if span > USUAL_S:
+        _warn(
+            f"{table.file}: time_s spans {span:g} s, {span / steps:.3g} s from row to row on "
+            f"average; trials last up to {USUAL_S:g} s as a rule. If the column holds "
+            "milliseconds or sample numbers, divide it by 1000 or by the samples per second"
+        )
 
 
 def _warn(message: str) -> None:

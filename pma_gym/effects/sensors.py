@@ -6,34 +6,41 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 _ASSUMED = "assumption"
-_TABLE_1 = "Serres 2008, table 1"
+
+
+def _bandwidth(usual: float) -> Quantity:
+    """Bounds of a sensor's bandwidth, with its usual value (Hz)."""
+    return Quantity(
+        *("Hz", 1, 1e5, f"{_ASSUMED}: {usual:g}"),
+        instead="a sensor without lag and noise is one without its table: leave that out",
+    )
 
 
 class Lvdt(NamedTuple):
     """Displacement of the muscle (contraction)."""
 
-    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 100")]
+    bandwidth: Annotated[float, _bandwidth(100)]
     noise: Annotated[float, Quantity("mm", 0, 10, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0)]
 
 
 class LoadCell(NamedTuple):
     """Tension of the cable."""
 
-    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 500")]
+    bandwidth: Annotated[float, _bandwidth(500)]
     noise: Annotated[float, Quantity("N", 0, 100, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0)]
 
 
 class PressureTransducer(NamedTuple):
     """Gauge pressure in the muscle."""
 
-    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 50")]
+    bandwidth: Annotated[float, _bandwidth(50)]
     noise: Annotated[float, Quantity("kPa", 0, 100, f"{_ASSUMED}: 0.3 (standard deviation)", 0.0)]
 
 
 class Potentiometer(NamedTuple):
     """Angle of the pulley."""
 
-    bandwidth: Annotated[float, Quantity("Hz", 1, 1e5, f"{_ASSUMED}: 200")]
+    bandwidth: Annotated[float, _bandwidth(200)]
     noise: Annotated[float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.1 (standard deviation)", 0.0)]
 
 

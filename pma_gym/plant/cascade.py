@@ -32,6 +32,14 @@ PORTS: dict[str, Port] = {
 }
 """Ports of the cascade: how many effects each takes, and what becomes of their results."""
 
+REFUSED: dict[str, str] = {
+    "repperger_damping": (
+        "its damping grows with the velocity, of which a cascade knows only the sign; take "
+        "[damping] or [symmetric_damping], or plant = 'station'"
+    ),
+}
+"""Effects that would fit a port and mean nothing there, and why."""
+
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 

@@ -1,8 +1,6 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
-import json
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -16,6 +14,7 @@ from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.plant import cascade, station
 from pma_gym.plant.compose import Port
+from pma_gym.plant.toml import TOMLError, read_toml, toml_text
 
 SCHEMA = 1
 PLANTS = {"station": station, "cascade": cascade}
@@ -160,11 +159,9 @@ def load_model(source: "str | Path | Model") -> Model:
 
 def _read(path: Path) -> Model:
     try:
-        document = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path} is not valid TOML: {error}") from error
-    try:
-        return parse_model(document)
+        return parse_model(read_toml(path))
+    except TOMLError as error:
+        raise ModelError(str(error)) from error
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from error
 
@@ -176,7 +173,11 @@ def parse_model(document: Mapping[str, Any]) -> Model:
         ModelError: as `load_model`.
     """
     if document.get("schema") != SCHEMA:
-        raise ModelError(f"schema must be {SCHEMA}, got {document.get('schema')!r}")
+        came = f"got {document['schema']!r}" if "schema" in document else "there is none"
+        raise ModelError(
+            f"schema must be {SCHEMA}, the only form of model files that this version reads, "
+            f"{came}; write schema = {SCHEMA} as the first line"
+        )
     missing = [key for key in _HEAD if key not in document]
     if missing:
         raise ModelError(f"a model needs {', '.join(_HEAD)}; missing: {', '.join(missing)}")
@@ -237,6 +238,9 @@ def _check_ports(model: Model) -> None:
                 f"[{name}] acts at port {effect.port}, which a {model.plant} does not have; "
                 f"its ports: {', '.join(plant.PORTS)}"
             )
+        refused = getattr(plant, "REFUSED", {})
+        if name in refused:
+            raise ModelError(f"a {model.plant} cannot have [{name}]: {refused[name]}")
     for part in plant.PARTS:
         if part not in model.parameters:
             raise ModelError(
@@ -260,7 +264,7 @@ def _check_port(model: Model, name: str, port: Port) -> None:
 def dump_model(model: Model) -> str:
     """The model as TOML text; the same model gives the same bytes."""
     lines = [f"schema = {SCHEMA}"]
-    lines += [f"{key} = {_text(getattr(model, key))}" for key in ("name", "title", "plant")]
+    lines += [f"{key} = {toml_text(getattr(model, key))}" for key in ("name", "title", "plant")]
     for effect in model.parameters:
         lines += ["", f"[{effect}]"]
         for name, value in model.at_the_door(effect).items():
@@ -270,15 +274,5 @@ def dump_model(model: Model) -> str:
 
 def _entry(value: Value, note: Note) -> str:
     known = {"value": value, "low": note.low, "high": note.high, "source": note.source or None}
-    parts = [f"{key} = {_text(part)}" for key, part in known.items() if part is not None]
+    parts = [f"{key} = {toml_text(part)}" for key, part in known.items() if part is not None]
     return f"{{ {', '.join(parts)} }}"
-
-
-def _text(value: str | Value) -> str:
-    if isinstance(value, str):
-        # The escapes of JSON are those of TOML.
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, tuple):
-        return "[" + ", ".join(_text(one) for one in value) + "]"
-    # Nine digits: below every interval, and free of the last bits that unit factors leave.
-    return f"{value:.9g}"

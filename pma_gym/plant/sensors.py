@@ -4,13 +4,19 @@ import numpy as np
 
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE
+from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.effect import Parameters
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
 """Volts by which a conversion may miss the range."""
+
+_MENDS = {
+    "load_command": "the drive pulls and cannot push; write newtons",
+    "pressure_command": "write gauge pressure in kPa: 1 bar is 100, 1 psi 6.895, 1000 Pa 1",
+}
+"""What to do about a command out of range."""
 
 SENSORS = {
     "lvdt": ("contraction", calibration.LVDT),
@@ -62,7 +68,8 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """Motor and regulator voltages of a trial, from loads and pressures if it commands those.
 
     Raises:
-        ValueError: a command is missing, or asks for more than 0-10 V give.
+        TrialError: a command is missing, or is less than 0 or more than 0-10 V give; a
+            `SampleError` where it is one sample's.
     """
     line = model.parameters["regulator_line"]
     return (
@@ -79,23 +86,20 @@ def _voltage(trial: Trial, voltage: str, wish: str, line: Parameters | None) -> 
     wished = _command(trial, wish)
     if wished is None or line is None:
         choice = f"{voltage}_v or {BY_QUANTITY[wish].name}" if line else f"{voltage}_v"
-        raise ValueError(f"the trial does not command the {voltage.split('_')[0]}: give {choice}")
+        raise TrialError(f"the trial does not command the {voltage.split('_')[0]}: give {choice}")
     found = (wished - line.offset) / line.gain
     lowest, highest = VOLTAGE_RANGE
-    outside = np.flatnonzero((found < lowest - _ROUNDING) | (found > highest + _ROUNDING))
+    # Neither a load nor a gauge pressure goes below 0, whatever the line gives at 0 V.
+    low, high = max(0.0, line.gain * lowest + line.offset), line.gain * highest + line.offset
+    margin = _ROUNDING * line.gain
+    outside = np.flatnonzero((wished < low - margin) | (wished > high + margin))
     if outside.size:
-        column, at = BY_QUANTITY[wish], outside[0]
-        low, high, came = (
-            value / SI_FACTORS[column.unit]
-            for value in (
-                line.gain * lowest + line.offset,
-                line.gain * highest + line.offset,
-                wished[at],
-            )
-        )
-        raise ValueError(
-            f"{column.name} must lie in {low:g} to {high:g} {column.unit}, what {voltage}_v of "
-            f"{lowest:g} to {highest:g} gives; sample {at} has {came:g}"
+        column, at = BY_QUANTITY[wish], int(outside[0])
+        least, most, came = (v / SI_FACTORS[column.unit] for v in (low, high, float(wished[at])))
+        raise SampleError(
+            f"{column.name} must lie in {least:g} to {most:g} {column.unit}, what {voltage}_v of "
+            f"up to {highest:g} V gives; {{place}} has {came:g}; {_MENDS[wish]}",
+            at,
         )
     return np.clip(found, *VOLTAGE_RANGE)
 
@@ -106,7 +110,11 @@ def _command(trial: Trial, name: str) -> np.ndarray | None:
     if values is None or np.all(np.isnan(values)):
         return None
     if np.isnan(values[0]):
-        raise ValueError(f"{name} has no value in the first row, so there is nothing to settle at")
+        raise SampleError(
+            f"{BY_QUANTITY[name].name} has no value in {{place}}, the first, so there is nothing "
+            "to settle at; fill it in (a later empty cell holds the value before it)",
+            0,
+        )
     last = np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))
     return values[last]
 

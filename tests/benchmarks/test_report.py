@@ -9,13 +9,14 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.contender import Contender
+from benchmarks.contender import Contender, parse_contenders
 from benchmarks.environment_info import git_state
 from benchmarks.execution import Execution
 from benchmarks.job import run_job
 from benchmarks.replay import ReplayError
 from benchmarks.report.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
 from benchmarks.report.replay_blocks import displacement_verdict
+from benchmarks.report.tables import columns
 from benchmarks.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.suite import load_suite
 
@@ -65,6 +66,18 @@ def test_a_failed_case_is_told_and_costs_the_exit_code(run, rows):
     failed = [row for row in rows if row["failure"]]
     assert [(row["controller"], row["pressure_kpa"]) for row in failed] == [("Half", "550")]
     assert failed[0]["rmse"] == ""
+
+
+def test_columns_are_headed_by_the_controllers_own_names(tmp_path):
+    path = tmp_path / "half.py"
+    path.write_text(CONTROLLER)
+    (half,) = parse_contenders(f"{path}:Half")
+    suite = load_suite().select(["serres2008"], [half], ["displacement"], [350])
+    results = Results(suite, Execution((), {}, True), {})
+    assert list(columns(results, "serres2008", "displacement", "displacement")) == [
+        "Measured",
+        "half",
+    ]
 
 
 def test_csv_and_json_hold_the_same_figures(rows, document):

@@ -185,5 +185,6 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     assert "Interrupted" in output and "of 9 cases are done" in " ".join(output.split())
     assert "Traceback" not in errors
     rows = (out / "partial" / "scores.csv").read_text().splitlines()[1:]
-    assert 3 <= len(rows) < 9
+    # The cases in progress are dropped: two are done when the fourth begins.
+    assert 2 <= len(rows) < 9
     assert (out / "scores.csv").read_text() == "earlier\n"

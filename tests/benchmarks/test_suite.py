@@ -105,8 +105,20 @@ def test_a_file_of_ones_own_is_scored_beside_the_shipped(mine):
     suite = load_suite()
     replay, own = parse_contenders(f"serres_replay, {mine}:Mine", suite.controllers)
     assert replay == suite.controllers[0]
-    assert (own.name, own.label, own.source) == ("Mine", "Mine", f"{mine}:Mine")
+    # Its column is headed by what it calls itself.
+    assert (own.name, own.label, own.source) == ("Mine", "mine", f"{mine}:Mine")
     assert own.make().act(None, 0.0) == 1.0
+
+
+def test_columns_that_would_have_one_name_are_told_apart(mine):
+    mine.write_text(
+        MINE + "\n\nclass Heir(Mine):\n    pass\n\n\nclass Bold(Mine):\n    name = 'Measured'\n"
+        "\n\nclass Nameless(Mine):\n    name = None\n"
+    )
+    text = ",".join(f"{mine}:{name}" for name in ("Mine", "Heir", "Bold", "Nameless"))
+    suite = load_suite().select(controllers=parse_contenders(text))
+    labels = [controller.label for controller in suite.controllers]
+    assert labels == ["mine (Mine)", "mine (Heir)", "Measured (Bold)", "Nameless"]
 
 
 @pytest.mark.parametrize(

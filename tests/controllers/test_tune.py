@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from benchmarks import tune
-from benchmarks.tune import gains_from, run_tune
+from benchmarks.tune import TuneError, gains_from, run_tune
 from benchmarks.tuning.cost import UNSTABLE_COST, Cost
 from benchmarks.tuning.job import Job
+from benchmarks.tuning.kept import KeptRows
 from benchmarks.tuning.loop import Loop, lambda_tuning
+from benchmarks.worker import ProcessDied
 from controllers.gains import GAINS_FILE, Gains, scheduled_gains
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import load_model
@@ -107,3 +109,42 @@ def test_broken_file_of_gains_is_refused_before_the_work(tmp_path):
     with pytest.raises(ValueError, match=r"must have schema 1; delete it"):
         run_tune(path)
     assert path.read_text() == '{"schema": 7}'
+
+
+def test_finished_rows_survive_an_interrupt_and_are_not_tuned_again(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(tune, "PRESSURES_KPA", {"displacement": (300, 400)})
+    monkeypatch.setattr(tune, "CONTROLLERS", ("pid",))
+    made, interrupted = [], True
+
+    def tuned(row):
+        if interrupted and made:
+            raise KeyboardInterrupt
+        made.append(row.pressure_kpa)
+        return Gains(row.pressure_kpa / 3.0, 2.0, 3.0, 0.005), 0.1
+
+    monkeypatch.setattr(tune, "tuned", tuned)
+    out = tmp_path / "gains.json"
+    assert not run_tune(out, model="cascade", jobs=1)
+    assert "1 of 2 rows are tuned and kept in" in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["gains.partial.json"]
+    interrupted = False
+    # Another seed takes none of them.
+    other = KeptRows(out, {"seed": 1})
+    assert not other.rows
+    assert run_tune(out, model="cascade", jobs=1)
+    assert made == [300, 400]
+    assert "1 of 2 rows are taken from" in capsys.readouterr().out
+    resumed = out.read_bytes()
+    assert run_tune(tmp_path / "whole.json", model="cascade", jobs=1)
+    assert (tmp_path / "whole.json").read_bytes() == resumed
+    assert {path.name for path in tmp_path.iterdir()} == {"gains.json", "whole.json"}
+
+
+def test_a_row_whose_process_dies_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr(tune, "PRESSURES_KPA", {"displacement": (300,)})
+    monkeypatch.setattr(tune, "CONTROLLERS", ("pid",))
+    monkeypatch.setattr(
+        tune, "run_all", lambda works, jobs, on_done: on_done(0, ProcessDied(-9, again=True))
+    )
+    with pytest.raises(TuneError, match=r"row displacement/pid/300: its process died.*kept in"):
+        run_tune(tmp_path / "gains.json", model="cascade")

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from pma_gym.data.trial import Trial, TrialError
+from pma_gym.data.trial_columns import SampleError
 
 TIME = np.array([0.0, 0.5, 1.0])
 VOLTS = {"motor_voltage": [0.0, 1.0, 2.0]}
@@ -73,6 +74,11 @@ def test_replacing_a_part_keeps_the_rest():
         ),
         ({"time": [0.0, np.nan, 1.0]}, "time_s must be a finite number .*, sample 1 has none"),
         ({"time": [0.0, 1.0, np.inf]}, "time_s must be a finite number .*, sample 2 has inf"),
+        (
+            {"time": [0.0, 1.0, 1e9]},
+            r"time_s must span 86400 s .*, from sample 0 to sample 2 it is 1e\+09 s; write seconds",
+        ),
+        ({"time": [0.0, 1e-9, 3e-9]}, "samples must lie 1e-06 s or more apart .* 1.5e-09 s on av"),
         ({"commands": {}}, "needs at least one command, motor_voltage_v or .*pressure_command_kpa"),
         (
             {"commands": {"motor_volts": TIME}},
@@ -99,6 +105,17 @@ def test_replacing_a_part_keeps_the_rest():
 def test_a_trial_refuses(changes, message):
     with pytest.raises(TrialError, match=message):
         trial(**changes)
+
+
+def test_two_samples_may_lie_close_for_a_jump():
+    assert len(trial(time=[0.0, 1.0, 1.0 + 1e-9])) == 3
+    assert len(trial(time=[0.0, 1e-6, 2e-6])) == 3
+
+
+def test_the_error_of_a_sample_travels_between_processes():
+    error = pickle.loads(pickle.dumps(SampleError("load is 3 in {place}", 7)))
+    assert (str(error), error.sample) == ("load is 3 in sample 7", 7)
+    assert error.at("row 9 of a.csv") == "load is 3 in row 9 of a.csv"
 
 
 def test_extension_needs_a_contraction_at_the_start():

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from pma_gym.data import trial_files
 from pma_gym.data.trial import COMMANDS, MEASUREMENTS, Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning, read_trial, write_trial
+from pma_gym.data.trial_files import TrialWarning, place_in_file, read_trial, write_trial
 
 SUFFIXES = [".csv", ".parquet", ".xlsx"]
 GOOD = "time_s,motor_voltage_v,contraction_mm\n0,0,40\n0.5,1,\n1,2,25.3\n"
@@ -25,7 +25,7 @@ measured = magnitude | magnitude.map(lambda value: -value) | st.sampled_from([0.
 @st.composite
 def trials(draw):
     rows = draw(st.integers(1, 6))
-    steps = draw(arrays(float, rows, elements=st.floats(1e-4, 1e3)))
+    steps = draw(arrays(float, rows, elements=st.floats(1e-4, 100)))
     commands = draw(st.sets(st.sampled_from(COMMANDS), min_size=1))
     volts = st.floats(0, 10) | st.just(np.nan)
     return Trial(
@@ -155,6 +155,20 @@ def test_unknown_columns_are_named_and_ignored(tmp_path):
     with pytest.warns(TrialWarning, match=message):
         trial = read_trial(written(tmp_path, text))
     assert not trial.measurements
+
+
+def test_a_time_that_may_not_be_seconds_is_doubted(tmp_path):
+    rows = "".join(f"{k},{k}\n" for k in range(1923))
+    message = r"ramp.csv: time_s spans 1922 s, 1 s from row to row .*; trials last up to 600 s"
+    with pytest.warns(TrialWarning, match=message + ".* milliseconds or sample numbers, divide"):
+        read_trial(written(tmp_path, "time_s,load_command_n\n" + rows))
+    mapping = {"time_s": {"name": "time_s", "factor": 1 / 384}}
+    assert len(read_trial(written(tmp_path, "time_s,load_command_n\n" + rows), mapping)) == 1923
+
+
+def test_a_place_is_counted_as_the_file_counts(tmp_path):
+    path = written(tmp_path, "# a log\n" + GOOD.replace("1,2,25.3", "\n1,2,25.3"))
+    assert place_in_file(path, 2) == "row 6 of ramp.csv"
 
 
 def test_a_mapped_column_that_is_not_there_is_named(tmp_path):

@@ -144,9 +144,20 @@ def without(text, table):
 
 
 BROKEN = {
-    "not TOML": (GOOD.replace("[drive]", "[drive"), "is not valid TOML: .*line"),
-    "other schema": (GOOD.replace("schema = 1", "schema = 7"), "schema must be 1, got 7"),
-    "no schema": (GOOD.replace("schema = 1\n", ""), "schema must be 1, got None"),
+    "not TOML": (
+        GOOD.replace("[drive]", "[drive"),
+        r"is not valid TOML: line \d+, '\[drive': Expected .*; a line is a table, \[effect\], or",
+    ),
+    "no value of TOML": ("schema = None\n", "line 1, 'schema = None': .*the value a number 1.5, a"),
+    "unended text": ('schema = 1\nname = """x\n', 'line 2, \'name = """x\': Unterminated string'),
+    "other schema": (
+        GOOD.replace("schema = 1", "schema = 7"),
+        "schema must be 1, .*, got 7; write schema = 1 as the first line",
+    ),
+    "no schema": (
+        GOOD.replace("schema = 1\n", ""),
+        "schema must be 1, .*, there is none; write schema = 1 as the first line",
+    ),
     "no head": (GOOD.replace('plant = "station"\n', ""), "a model needs .* missing: plant"),
     "unknown plant": (GOOD.replace('"station"', '"rig"'), "one of station, cascade, got 'rig'"),
     "unknown effect": (
@@ -163,7 +174,8 @@ BROKEN = {
     ),
     "out of bounds": (
         GOOD.replace("value = 97.84", "value = 97840"),
-        r"drive.gain_n_per_v must lie in 1 to 1000 N/V, got 97840",
+        r"drive.gain_n_per_v must lie in 1 to 1000 N/V, got 97840; check unit and decimal point "
+        r"\(usual: Serres 2008",
     ),
     "not a number": (
         GOOD.replace("value = nan", "").replace("value = 97.84", "value = nan"),
@@ -217,6 +229,17 @@ BROKEN = {
         + "linear_n_per_mm2 = 0\nquadratic_n_per_mm3 = 0\n",
         "port muscle_force of a cascade takes contractile_force and stiffness",
     ),
+    "no bandwidth": (
+        GOOD.replace("bandwidth_hz = { value = 100", "bandwidth_hz = { value = 0"),
+        r"lvdt.bandwidth_hz must lie in 1 to 100000 Hz, got 0; a sensor without lag and noise is "
+        "one without its table: leave that out",
+    ),
+    "a damping by speed in a cascade": (
+        without(CASCADE, "damping")
+        + "\n[repperger_damping]\nviscous_n_s_per_mm = 1\nstiffening_n_s_per_mm_per_kpa = 0\n"
+        + "speed_slope_n_s2_per_mm2 = 0.1\n",
+        r"a cascade cannot have \[repperger_damping\]: .* only the sign; take \[damping\] or",
+    ),
     "two dampings in a cascade": (
         CASCADE + "\n[symmetric_damping]\nintercept_n_s_per_mm = 1\nslope_n_s_per_mm_per_kpa = 0\n",
         "port muscle_damping of a cascade takes exactly one effect",
@@ -237,7 +260,7 @@ def test_a_broken_file_is_refused_by_name_and_rule(case, tmp_path):
 def test_bytes_that_are_no_text_are_refused(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_bytes(b'schema = 1\nname = "\xff\xfe"')
-    with pytest.raises(ModelError, match="is not valid TOML"):
+    with pytest.raises(ModelError, match=r"not UTF-8 text \(byte \d+\); save it as UTF-8"):
         load_model(path)
 
 

@@ -100,3 +100,21 @@ def test_readings_stay_within_the_daqs_range():
     far = np.array([[1.0, 50.0, 1e5, 1e7], [-1.0, -50.0, -1e5, -1e7]])
     readings = sensors.read(far, np.zeros(4), np.zeros((2, 4)))
     assert np.all(np.abs(readings) < np.abs(far))
+
+
+@pytest.mark.parametrize(
+    ("command", "value", "message"),
+    [
+        ("pressure_command", 700e3, "must lie in 0 to 578.6 kPa, .* sample 1 has 700; write ga"),
+        ("pressure_command", -1e3, "must lie in 0 to 578.6 kPa, .* sample 1 has -1; write gauge"),
+        ("load_command", 2e3, "must lie in 0 to 976.4 N, .* sample 1 has 2000; the drive pulls"),
+        ("load_command", -1.0, "must lie in 0 to 976.4 N, .* sample 1 has -1; the drive pulls"),
+    ],
+)
+def test_commands_that_no_voltage_gives_are_refused(command, value, message):
+    good = {"pressure_command": [300e3, 300e3], "load_command": [0.0, 100.0]}
+    trial = Trial(time=[0.0, 1.0], commands=good | {command: [good[command][0], value]})
+    with pytest.raises(ValueError, match=message):
+        sensors.voltages(load_model("serres2008"), trial)
+    volts = sensors.voltages(load_model("serres2008"), Trial(time=[0.0, 1.0], commands=good))
+    assert all(np.all((0.0 <= one) & (one <= 10.0)) for one in volts)

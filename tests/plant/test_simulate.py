@@ -103,7 +103,7 @@ def test_missing_commands_are_named(plant):
     with pytest.raises(ValueError, match="the regulator: give regulator_voltage_v or pressure_com"):
         plant.simulate(trial(WHEN, motor_voltage=3.0))
     late = np.where(WHEN > 0.2, 3.0, np.nan)
-    with pytest.raises(ValueError, match="motor_voltage has no value in the first row"):
+    with pytest.raises(ValueError, match="motor_voltage_v has no value in sample 0, the f.*; fill"):
         plant.simulate(trial(WHEN, motor_voltage=late, regulator_voltage=6.0))
     cascade = Plant("cascade", compiled=False)
     with pytest.raises(ValueError, match="not command the motor: give motor_voltage_v$"):
@@ -112,10 +112,10 @@ def test_missing_commands_are_named(plant):
 
 def test_what_ten_volts_cannot_give_is_refused(plant):
     loads = np.where(WHEN > 0.5, 1200.0, 100.0)
-    message = r"load_command_n must lie in -2 to 976\.4 N, .*0 to 10 gives; sample 26 has 1200"
+    message = r"load_command_n must lie in 0 to 976\.4 N, .* up to 10 V gives; sample 26 has 1200;"
     with pytest.raises(ValueError, match=message):
         plant.simulate(trial(WHEN, load_command=loads, regulator_voltage=6.0))
-    with pytest.raises(ValueError, match=r"pressure_command_kpa must lie in -20\.4 to 578\.6 kPa"):
+    with pytest.raises(ValueError, match=r"pressure_command_kpa must lie in 0 to 578\.6 kPa"):
         plant.simulate(trial(WHEN, motor_voltage=1.0, pressure_command=600e3))
 
 
