@@ -21,7 +21,7 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench test lint style types layers pages docs clean distclean
+.PHONY: help bench peers test lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -30,6 +30,9 @@ help: ## Show this list.
 
 bench: $(CORE) ## Run the benchmark (python -m benchmarks); its report goes to results/.
 	$(BIN)/python -m benchmarks $(BENCH_ARGS)
+
+peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gigabytes).
+	$(BIN)/python -m benchmarks.speed.install
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
@@ -52,12 +55,12 @@ pages: $(FULL)
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
-clean: ## Remove what the tools generated, but neither .venv nor results/.
+clean: ## Remove what the tools generated, but neither .venv, .peers nor results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## Remove .venv too.
-	rm -rf $(VENV)
+distclean: clean ## Remove .venv and .peers too.
+	rm -rf $(VENV) .peers
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
 $(BIN)/pip:

@@ -1,0 +1,110 @@
+"""Installs the peers: `make peers`, or `python -m benchmarks.speed.install [NAME...]`.
+
+Each in a virtual environment of its own, with every version pinned. One that cannot be installed
+here is named with pip's reason and left out; the others go on.
+"""
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from benchmarks.speed.peers import PEERS, ROOT, Peer, executable
+
+_PIP = ("-m", "pip", "install", "--disable-pip-version-check", "--no-input", "--quiet")
+INTERRUPTED = 130
+
+
+class InstallError(RuntimeError):
+    """An installation that failed; the message is pip's reason."""
+
+
+def install(peer: Peer) -> None:
+    """Make a peer's environment anew.
+
+    Raises:
+        InstallError: pip, or the making of the environment, failed.
+    """
+    shutil.rmtree(peer.home, ignore_errors=True)
+    peer.home.parent.mkdir(exist_ok=True)
+    _run(sys.executable, "-m", "venv", str(peer.home))
+    python = str(executable(peer.home))
+    for arguments in steps(peer):
+        _run(python, *_PIP, *arguments)
+    peer.stamp.write_text(peer.wanted, encoding="utf-8")
+
+
+def steps(peer: Peer) -> list[list[str]]:
+    """Arguments of pip, one list a call."""
+    constrained = ["-c", str(ROOT / "constraints.txt")]
+    calls = []
+    if peer.project is not None:
+        # As `make test` does: PyTorch first, so that its pin decides which build comes.
+        calls += [[*constrained, "torch"]] if peer.project else []
+        calls += [[*constrained, "-e", f"{ROOT}[{peer.project}]" if peer.project else str(ROOT)]]
+    if peer.pins:
+        # The pins are complete; what a package asks for beyond them, the worker does not use.
+        calls += [["--no-deps", "-r", str(peer.pins)]]
+    return calls
+
+
+def _run(*command: str) -> None:
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    if done.returncode:
+        raise InstallError(reason(done.stderr or done.stdout))
+
+
+def reason(printed: str) -> str:
+    """The last error that pip printed; the last line, if it named none."""
+    lines = [line.strip() for line in printed.splitlines() if line.strip()]
+    errors = [line for line in lines if line.startswith("ERROR")]
+    return (errors or lines or ["no reason given"])[-1]
+
+
+def main(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Peers to install; all if none is named.")
+    ] = None,
+) -> None:
+    """Install what the speed of this package is compared with, into .peers/."""
+    known = [name for name, peer in PEERS.items() if peer.installed]
+    for name in names or ():
+        if name not in known:
+            print(f"error: unknown peer {name!r}; known: {', '.join(known)}", file=sys.stderr)
+            raise typer.Exit(2)
+    chosen = [PEERS[name] for name in names or known]
+    failed = []
+    for peer in chosen:
+        try:
+            print(f"{peer.title}: {_installed(peer)}", flush=True)
+        except InstallError as error:
+            failed.append(peer.title)
+            print(f"{peer.title}: left out, it could not be installed: {error}", flush=True)
+        except KeyboardInterrupt:
+            print(f"interrupted; {peer.title} is not installed", file=sys.stderr)
+            raise typer.Exit(INTERRUPTED) from None
+    if failed:
+        print(f"Left out: {', '.join(failed)}. The benchmark runs without them.")
+    raise typer.Exit(1 if len(failed) == len(chosen) else 0)
+
+
+def _installed(peer: Peer) -> str:
+    """Install a peer if need be; what was done."""
+    if peer.is_here:
+        return "this environment has it"
+    if peer.is_ready:
+        return f"is installed in {_shown(peer.home)}"
+    print(f"{peer.title}: installing (some minutes)", flush=True)
+    install(peer)
+    return f"installed in {_shown(peer.home)}"
+
+
+def _shown(path: Path) -> str:
+    return str(path.relative_to(ROOT))
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,197 @@
+"""Rounds over all rows: each round measures every row once, in another order.
+
+So a slow minute of the machine falls on all rows alike, and a ratio of two rows is taken within a
+round. One worker works at a time; the others wait for their input.
+"""
+
+import os
+import random
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from statistics import median, quantiles
+from typing import Any, Protocol
+
+from benchmarks.speed.client import Client, StartError, WorkerError
+from benchmarks.speed.loops import Missing
+from benchmarks.speed.peers import PEERS, Peer
+from benchmarks.speed.rows import Row
+
+SEED = 2008
+_PAUSE_S = 0.02
+"""Between measurements (s): threads of the last worker that still spin go to sleep."""
+
+OnDone = Callable[[str], None]
+"""Called after each row that was prepared or measured, with its title."""
+
+
+class Asked(Protocol):
+    """What measures: a `client.Client`, or a test's stand-in."""
+
+    versions: dict[str, str]
+
+    def prepare(self, key: str, row: str, settings: Mapping[str, Any]) -> None:
+        """Make a row ready."""
+        ...
+
+    def measure(self, key: str, seconds: float) -> dict[str, Any]:
+        """Measure a row."""
+        ...
+
+    def end(self) -> None:
+        """End the process."""
+        ...
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How long to measure.
+
+    Attributes:
+        rounds: number of rounds.
+        seconds: least time of a measurement (s).
+    """
+
+    rounds: int = 7
+    seconds: float = 0.5
+
+
+QUICK = Plan(rounds=2, seconds=0.05)
+"""To see that all works; its figures say little."""
+
+
+@dataclass
+class Measured:
+    """What was measured of a row.
+
+    Attributes:
+        row: the row.
+        rates: steps per second by the number of the round.
+        facts: what the worker told beside, at the last measurement.
+        absence: why the row was left out or given up, if it was.
+        broke: whether it failed, in place of being impossible here.
+    """
+
+    row: Row
+    rates: dict[int, float] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)
+    absence: str = ""
+    broke: bool = False
+
+    @property
+    def right_hand_sides(self) -> float | None:
+        """Evaluations of the right-hand side in a step, if anybody knows."""
+        known = self.row.right_hand_sides
+        return self.facts.get("right_hand_sides") if known is None else known
+
+    def give_up(self, why: str, broke: bool) -> None:
+        """Leave the row out from here on."""
+        self.absence, self.broke = why, broke
+
+
+def spread(values: Sequence[float]) -> tuple[float, float, float]:
+    """Lower quartile, median and upper quartile.
+
+    >>> spread([4.0, 1.0, 2.0, 3.0, 5.0])
+    (2.0, 3.0, 4.0)
+    """
+    if len(values) == 1:
+        return values[0], values[0], values[0]
+    low, _, high = quantiles(values, n=4, method="inclusive")
+    return low, median(values), high
+
+
+class Measurement:
+    """A run over rows; Ctrl-C leaves what was measured so far in `rows`.
+
+    Args:
+        rows: what to measure.
+        plan: for how long.
+        clients: gives a peer's worker, or None if it is not installed.
+
+    Attributes:
+        rows: what was measured, by the row's key.
+        versions: of each worker that started, by its name.
+        complete: whether every round was finished.
+    """
+
+    def __init__(
+        self,
+        rows: Sequence[Row],
+        plan: Plan,
+        clients: Callable[[Peer], Asked | None] | None = None,
+    ) -> None:
+        self.rows = {row.key: Measured(row) for row in rows}
+        self.plan = plan
+        self.versions: dict[str, dict[str, str]] = {}
+        self.complete = False
+        self._make = clients or client_of
+        self._clients: dict[str, Asked] = {}
+
+    @property
+    def work(self) -> int:
+        """How often `on_done` is called, if no row is left out."""
+        return len(self.rows) * (1 + self.plan.rounds)
+
+    def run(self, on_done: OnDone = lambda title: None) -> None:
+        """Prepare every row, then measure them round after round."""
+        order = random.Random(SEED)
+        try:
+            self._each(list(self.rows.values()), self._prepare, on_done)
+            for number in range(self.plan.rounds):
+                shuffled = order.sample(list(self.rows.values()), len(self.rows))
+                self._each(shuffled, lambda one, n=number: self._measure(one, n), on_done)
+            self.complete = True
+        finally:
+            for client in self._clients.values():
+                client.end()
+
+    def _each(self, rows: list[Measured], act: Callable[[Measured], None], on_done: OnDone) -> None:
+        for one in rows:
+            if not one.absence:
+                self._safely(one, act)
+            on_done(one.row.title)
+
+    def _safely(self, one: Measured, act: Callable[[Measured], None]) -> None:
+        try:
+            act(one)
+        except Missing as reason:
+            one.give_up(str(reason), broke=False)
+        except StartError as error:
+            for other in self.rows.values():
+                if other.row.worker == one.row.worker and not other.absence:
+                    other.give_up(f"cannot be started: {error}", broke=True)
+        except WorkerError as error:
+            one.give_up(str(error), broke=True)
+
+    def _prepare(self, one: Measured) -> None:
+        if (os.cpu_count() or 1) < one.row.cores:
+            raise Missing(f"needs {one.row.cores} cores")
+        client = self._client(one.row)
+        client.prepare(one.row.key, one.row.row, one.row.settings)
+        self.versions[one.row.worker] = client.versions
+
+    def _measure(self, one: Measured, number: int) -> None:
+        client = self._client(one.row)
+        # Again only if the process had to be started anew.
+        client.prepare(one.row.key, one.row.row, one.row.settings)
+        time.sleep(_PAUSE_S)
+        answer = client.measure(one.row.key, self.plan.seconds)
+        one.rates[number] = answer["steps"] / answer["seconds"]
+        one.facts = answer["facts"]
+
+    def _client(self, row: Row) -> Asked:
+        if row.worker not in self._clients:
+            peer = PEERS[row.worker]
+            made = self._make(peer)
+            if made is None:
+                raise Missing(peer.absence)
+            self._clients[row.worker] = made
+        return self._clients[row.worker]
+
+
+def client_of(peer: Peer) -> Client | None:
+    """A peer's worker; None if it is not installed."""
+    if peer.python is None:
+        return None
+    return Client(peer.python, f"benchmarks.speed.workers.serve_{peer.name}")

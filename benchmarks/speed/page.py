@@ -1,0 +1,93 @@
+"""Puts a run's figures into docs/speed.md: `python -m benchmarks.speed.page [FILE]`.
+
+A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figures -->`; nobody
+types one in. `--check` changes nothing and fails if the page is not as the run would have it.
+"""
+
+import json
+import re
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from benchmarks.files import write_text
+from benchmarks.speed.measure import Plan
+from benchmarks.speed.views import View, sentences, views
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "speed.md"
+RUN = ROOT / "results" / "speed.json"
+ABSENT = "Not measured in this run."
+
+_BLOCK = re.compile(
+    r"(?P<start><!-- figures: (?P<name>\w+) -->\n).*?(?P<end><!-- end of figures -->)", re.DOTALL
+)
+
+
+class RunError(ValueError):
+    """A run whose figures are not for print; the message says why and what to do."""
+
+
+def load_run(path: Path) -> Mapping[str, Any]:
+    """The whole run in a file.
+
+    Raises:
+        RunError: there is none, or it is a part, or a smoke run.
+    """
+    advice = "run `python -m benchmarks speed --json results/speed.json`"
+    if not path.is_file():
+        raise RunError(f"there is no file {path}; {advice} first")
+    run = json.loads(path.read_text(encoding="utf-8"))
+    whole, made = Plan(), run["run"]
+    if not run["complete"] or made["rounds"] < whole.rounds or made["seconds"] < whole.seconds:
+        raise RunError(f"{path} is no whole run; {advice} without --quick and let it finish")
+    return run
+
+
+def refreshed(text: str, run: Mapping[str, Any]) -> str:
+    """A text with the run's figures in its blocks.
+
+    A table that the run has not becomes a sentence that says so.
+    """
+    blocks = {view.name: _markdown(view) for view in views(run)}
+    blocks["setting"] = "\n".join(f"- {sentence}" for sentence in sentences(run))
+
+    def block(found: re.Match[str]) -> str:
+        return f"{found['start']}\n{blocks.get(found['name'], ABSENT)}\n\n{found['end']}"
+
+    return _BLOCK.sub(block, text)
+
+
+def main(
+    file: Annotated[Path, typer.Argument(help="JSON of a whole run.")] = RUN,
+    check: Annotated[
+        bool, typer.Option("--check", help="Change nothing; fail on a difference.")
+    ] = False,
+) -> None:
+    """Put a run's figures into docs/speed.md."""
+    try:
+        run = load_run(file)
+    except RunError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    text = PAGE.read_text(encoding="utf-8")
+    found = refreshed(text, run)
+    if found == text:
+        return
+    if not check:
+        write_text(PAGE, found)
+    print(f"{PAGE.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
+    raise typer.Exit(1 if check else 0)
+
+
+def _markdown(view: View) -> str:
+    rules = [":--" if column < view.words else "--:" for column in range(len(view.header))]
+    lines: Sequence[Sequence[str]] = (view.header, rules, *view.rows)
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+if __name__ == "__main__":
+    typer.run(main)

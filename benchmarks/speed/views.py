@@ -1,0 +1,198 @@
+"""A run's document as tables of words, for the terminal and for the documentation."""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class View:
+    """One table.
+
+    Attributes:
+        name: short name, for the documentation's marks.
+        title: what it shows.
+        header: names of the columns.
+        rows: cells.
+        words: leading columns that hold words; the others hold numbers.
+    """
+
+    name: str
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    words: int = 1
+
+
+def views(document: Mapping[str, Any]) -> list[View]:
+    """The tables that have rows."""
+    known = [row for row in document["rows"] if row["rounds"]]
+    made = (
+        _single(_of(known, "single", "plant")),
+        _batches(_of(known, "batch")),
+        _right_hand_sides(known),
+        _substeps(_of(known, "substeps")),
+        _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
+        _fits(_of(known, "fits")),
+        _ratios(document["ratios"]),
+        _left_out(document["rows"]),
+    )
+    return [view for view in made if view.rows]
+
+
+def rate(value: float) -> str:
+    """A rate in three digits.
+
+    >>> rate(1234567.0), rate(20000.0), rate(950.0), rate(0.066)
+    ('1.23 M', '20.0 k', '950', '0.0660')
+    """
+    for factor, letter in ((1e9, " G"), (1e6, " M"), (1e3, " k")):
+        if value >= 0.9995 * factor:
+            return three(value / factor) + letter
+    return three(value)
+
+
+def three(value: float) -> str:
+    """A positive number in three digits, without an exponent.
+
+    >>> three(1000.0), three(99.96), three(1.8), three(0.0987654)
+    ('1000', '100', '1.80', '0.0988')
+    """
+    if not value > 0.0:
+        return f"{value:g}"
+    # Of what three digits leave, for 99.96 has three before the point.
+    digits = 2 - math.floor(math.log10(float(f"{value:.2e}")))
+    return f"{value:.{max(0, digits)}f}"
+
+
+def spread(row: Row) -> str:
+    """Half of what lies between the quartiles, in percent of the median."""
+    half = 0.5 * (row["upper_quartile"] - row["lower_quartile"])
+    return f"{100.0 * half / row['median']:.0f} %"
+
+
+def _of(rows: Iterable[Row], *groups: str) -> list[Row]:
+    return [row for row in rows if row["group"] in groups]
+
+
+def _single(rows: Sequence[Row]) -> View:
+    cells = []
+    for row in rows:
+        error = row["facts"].get("position_error")
+        told = f"{row['step']}; position within {error:.0e}" if error else row["step"]
+        cells.append([row["title"], told, rate(row["median"]), spread(row)])
+    header = ["One environment", "One step", "Steps/s", "±"]
+    return View("single", "Steps per second of one environment", header, cells, words=2)
+
+
+def _batches(rows: Sequence[Row]) -> View:
+    counts = sorted({row["number"] for row in rows})
+    cells = []
+    for title, own in _by_title(rows).items():
+        at = {row["number"]: rate(row["median"]) for row in own}
+        widest = max(own, key=lambda row: _relative(row))
+        cells.append([title, *(at.get(count, "") for count in counts), spread(widest)])
+    header = ["Environments", *map(str, counts), "±"]
+    return View("batches", "Steps per second of batches, all together", header, cells)
+
+
+def _relative(row: Row) -> float:
+    return (row["upper_quartile"] - row["lower_quartile"]) / row["median"]
+
+
+def _right_hand_sides(rows: Sequence[Row]) -> View:
+    """Each contender's fastest row whose right-hand sides are known."""
+    cells = []
+    counted = [row for row in rows if row["right_hand_sides_per_step"]]
+    for title, own in _by_title(counted).items():
+        best = max(own, key=lambda row: row["median"])
+        each = best["right_hand_sides_per_step"]
+        number = str(best["number"] or 1)
+        cells.append([title, number, f"{each:.4g}", rate(each * best["median"]), spread(best)])
+    header = ["At its fastest", "Environments", "A step", "Right-hand sides/s", "±"]
+    return View("evaluations", "Evaluations of the right-hand side per second", header, cells)
+
+
+def _substeps(rows: Sequence[Row]) -> View:
+    cells = [
+        [
+            str(row["number"]),
+            f"{10.0 / row['number']:g} ms",
+            f"{row['facts']['position_error']:.1e}",
+            f"{row['facts']['worst_error']:.1e}",
+            f"{1e6 / row['median']:.3g} us",
+            spread(row),
+        ]
+        for row in rows
+    ]
+    header = ["Internal steps in 10 ms", "Each", "Position", "Worst state", "Time", "±"]
+    title = "What internal steps cost and buy: errors as shares of the range, time of 10 ms"
+    return View("substeps", title, header, cells, words=0)
+
+
+def _others(rows: Sequence[Row], name: str, title: str) -> View:
+    cells = [[row["title"], rate(row["median"]), spread(row)] for row in rows]
+    return View(name, title, ["What", "Steps/s", "±"], cells)
+
+
+def _fits(rows: Sequence[Row]) -> View:
+    cells = [[row["title"], f"{1.0 / row['median']:.3g} s", spread(row)] for row in rows]
+    return View("fits", "Fits", ["What", "Time", "±"], cells)
+
+
+def _ratios(ratios: Sequence[Row]) -> View:
+    cells = []
+    for one in ratios:
+        sign, unit = ("≤", " s") if one["at_most"] else ("≥", "" if one["ratio"] else " /s")
+        limit = f"{sign} {one['limit']:g}{unit}"
+        if one["median"] is None:
+            cells.append([one["title"], limit, "", "", one["verdict"]])
+            continue
+        low, got, high = (rate(one[key]) for key in ("lower_quartile", "median", "upper_quartile"))
+        cells.append([one["title"], limit, f"{got}{unit}", f"{low} to {high}", one["verdict"]])
+    header = ["This package against", "Target", "This run", "Quartiles", "Verdict"]
+    return View("ratios", "Targets: median of the ratios within rounds", header, cells)
+
+
+def _left_out(rows: Sequence[Row]) -> View:
+    """Reasons, each with what it left out, numbers of environments together."""
+    reasons: dict[tuple[str, str], list[int]] = {}
+    for row in rows:
+        if row["left_out"]:
+            why = f"failed: {row['left_out']}" if row["failed"] else row["left_out"]
+            numbers = reasons.setdefault((row["title"], why), [])
+            numbers += [row["number"]] if row["number"] else []
+    cells = [[f"{title}{_listed(numbers)}", why] for (title, why), numbers in reasons.items()]
+    return View("absent", "Left out", ["What", "Why"], cells, words=2)
+
+
+def _listed(numbers: Sequence[int]) -> str:
+    return f" ({', '.join(map(str, numbers))})" if numbers else ""
+
+
+def _by_title(rows: Iterable[Row]) -> dict[str, list[Row]]:
+    grouped: dict[str, list[Row]] = {}
+    for row in rows:
+        grouped.setdefault(row["title"], []).append(row)
+    return grouped
+
+
+def sentences(document: Mapping[str, Any]) -> Iterator[str]:
+    """How the run was made, in sentences."""
+    run = document["run"]
+    git = run["git"]
+    changed = " with changes" if git["dirty"] else ""
+    yield (
+        f"{run['processor']}, {run['processors']} cores; commit {git['commit'][:12]}{changed}; "
+        f"{run['started'][:10]}."
+    )
+    yield (
+        f"{run['rounds']} rounds of {run['seconds']:g} s a row, {run['wall_time_s'] / 60:.0f} min "
+        "in all; a figure is the median over the rounds, ± half of what lies between the quartiles."
+    )
+    for worker in document["workers"].values():
+        versions = ", ".join(f"{name} {version}" for name, version in worker["versions"].items())
+        yield f"{worker['title']}: {versions}."

@@ -1,0 +1,101 @@
+"""This package: single environments, batches, its integrator's steps, fits, the GPU.
+
+What differs between versions of the package is in `hooks`.
+"""
+
+from functools import cache
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+import pma_gym.envs  # noqa: F401 - registers the environments
+from benchmarks.accuracy import (
+    CONTROL_PERIOD,
+    Commands,
+    Error,
+    demanding_commands,
+    error_ladder,
+    simulated,
+)
+from benchmarks.speed.loops import ACTIONS, BATCHES, Missing, Prepared, single, vector
+from benchmarks.speed.workers import hooks
+from pma_gym.plant.plant import Plant
+
+PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy")
+
+HELD = -0.4
+"""The action of rows that glide: 3 V, held."""
+
+
+def actions(shape: tuple[int, ...], held: bool) -> np.ndarray:
+    """Actions drawn beforehand, uniform in the action space; or one and the same."""
+    if held:
+        return np.full(shape, HELD, np.float32)
+    return np.random.default_rng(0).uniform(-1.0, 1.0, shape).astype(np.float32)
+
+
+def one(name: str, held: bool = False) -> Prepared:
+    """An environment as `gym.make` gives it: sensors, noise, reward, checks of Gymnasium."""
+    environment = gym.make(name)
+    environment.reset(seed=0)
+    prepared = single(environment, list(actions((ACTIONS, 1), held)))
+    return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
+
+
+def kernel(name: str) -> Prepared:
+    """Control steps of one environment without Python between them."""
+    return hooks.single_kernel(name)
+
+
+def batch(name: str, count: int, threads: int, held: bool = False) -> Prepared:
+    """Many environments as `gym.make_vec` gives them."""
+    if gym.spec(name).vector_entry_point is None:
+        raise Missing("this version has no vector environment")
+    environment = gym.make_vec(
+        name, num_envs=count, vectorization_mode="vector_entry_point", threads=threads
+    )
+    environment.reset(seed=0)
+    prepared = vector(environment, actions((BATCHES, count, 1), held), count)
+    return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
+
+
+def substeps(model: str, count: int) -> Prepared:
+    """Control steps of the plant alone in a demanding trial, in so many internal steps each."""
+    step = CONTROL_PERIOD / count
+    plant, rest = Plant(model, step), Plant(model).settle(0.0, 350e3)
+    commands: Commands = demanding_commands(plant, 350e3)
+    steps = len(commands.time) - 1
+
+    def chunk() -> int:
+        simulated(plant, rest, commands)
+        return steps
+
+    return Prepared(chunk, lambda: _told(_error(model, step)))
+
+
+@cache
+def _error(model: str, step: float) -> Error:
+    return error_ladder(model, (step,))[0]
+
+
+def _told(error: Error) -> dict[str, Any]:
+    return {
+        "position_error": error.position,
+        "worst_state": error.worst_state,
+        "worst_error": error.states[error.worst_state],
+    }
+
+
+def _evaluations(environment: Any) -> dict[str, float]:  # noqa: ANN401 - of either kind
+    return {"right_hand_sides": hooks.right_hand_sides_per_step(environment)}
+
+
+ROWS = {
+    "one": one,
+    "kernel": kernel,
+    "batch": batch,
+    "substeps": substeps,
+    "fits": hooks.joint_fits,
+    "gpu": hooks.gpu,
+}
