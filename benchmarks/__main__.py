@@ -151,6 +151,14 @@ def accuracy(out: OptionalOut = None) -> None:
 
 
 @app.command()
+def integrators(out: OptionalOut = None) -> None:
+    """Compare methods of integration at equal error; --out takes their curves as CSV."""
+    from benchmarks.integrators import run_integrators
+
+    run_integrators(out=out)
+
+
+@app.command()
 def speed(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")

@@ -82,11 +82,15 @@ def _inverted(plant: Plant, station: Station, rate: float) -> np.ndarray:
     volts = np.clip(volts, 0.0, VOLTAGE_LIMIT)
     condition = plant.settle(0.0, pressure=station.pressure)
     regulator = np.full(len(volts) + 1, plant.regulator_voltage(station.pressure))
-    states = np.empty((_samples(station), len(plant.states)))
-    states[0] = condition.state
-    time, held = period * np.arange(len(volts) + 1), np.append(volts, volts[-1])
-    plant.run(time, held, regulator, False, condition, STEP_S, states)
-    return plant.observe(states, condition.zero_contraction)[protocol.quantity]
+    controlled, sampled = period * np.arange(len(volts) + 1), STEP_S * np.arange(_samples(station))
+    # Where a command and a sample fall together but for rounding, the command's time is taken.
+    near = np.abs(sampled - period * np.round(sampled / period)) < 1e-9
+    sampled = np.where(near, period * np.round(sampled / period), sampled)
+    time = np.union1d(controlled, sampled)
+    row = np.minimum(np.searchsorted(controlled, time, side="right") - 1, len(volts) - 1)
+    states, zero = plant.run(time, volts[row], regulator[row], False, condition)
+    states = states[np.searchsorted(time, sampled)]
+    return plant.observe(states, zero)[protocol.quantity]
 
 
 def _look_ahead(plant: Plant, station: Station, horizon: int) -> np.ndarray:

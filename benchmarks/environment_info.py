@@ -7,7 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = ("numpy", "scipy", "numba", "gymnasium", "pma_gym")
+PACKAGES = ("numpy", "scipy", "llvmlite", "gymnasium", "pma_gym")
 
 
 def environment_info() -> dict[str, object]:

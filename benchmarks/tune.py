@@ -199,7 +199,7 @@ def _provenance(model: Model, seed: int) -> dict[str, Any]:
         "versions": {
             "python": platform.python_version(),
         }
-        | {name: version(name) for name in ("numpy", "scipy", "numba")},
+        | {name: version(name) for name in ("numpy", "scipy", "llvmlite")},
     }
 
 

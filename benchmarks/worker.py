@@ -30,7 +30,7 @@ class Worker:
     """A process of its own, deaf to Ctrl-C: the process that made it ends it."""
 
     def __init__(self) -> None:
-        # Spawned, not forked: the progress display has a thread, and numba may have some.
+        # Spawned, not forked: the progress display has a thread, and kernels may have some.
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs,))

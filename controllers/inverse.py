@@ -163,7 +163,15 @@ class Muscle:
         self.mass = plant.model.parameters["slide"].mass
         states = plant.states
         self._x, self._v = states.index("contraction"), states.index("velocity")
-        self._memories = [i for i, name in enumerate(states) if name.startswith("memory_")]
+        effects = plant.model.effects
+        # Memories of the way travelled are known exactly after it; the others have rates.
+        self._paths = {
+            states.index(f"memory_{name}"): (effect.path, plant.model.parameters[name])
+            for name, effect in effects.items()
+            if effect.path
+        }
+        memories = (i for i, name in enumerate(states) if name.startswith("memory_"))
+        self._memories = [i for i in memories if i not in self._paths]
 
     def _rates(self) -> np.ndarray:
         # With the zero at the contraction itself the cable is exactly untensioned.
@@ -177,7 +185,7 @@ class Muscle:
     def remember(self, extension: float, speed: float, duration: float) -> None:
         """Let the memories go on for a while (s) at an extension (m) and speed y' (m/s).
 
-        Exponential Rosenbrock-Euler: bristles of dry friction relax within a millisecond.
+        Exponential Rosenbrock-Euler for those that have rates.
         """
         self.state[self._x], self.state[self._v] = self.zero - extension, -speed
         rates = self._rates()
@@ -190,6 +198,10 @@ class Muscle:
             turn = slope * duration
             share = math.expm1(turn) / turn if abs(turn) > 1e-9 else 1.0
             after[at] = value + duration * share * rates[at]
+        travel = -speed * duration
+        for at, (path, parameters) in self._paths.items():
+            direction = 1.0 if travel > 0.0 else -1.0
+            after[at] = path(float(self.state[at]), travel, direction, parameters)
         for at, value in after.items():
             self.state[at] = value
 

@@ -39,7 +39,7 @@ app = typer.Typer(
     help="A pneumatic muscle's test station, simulated.",
 )
 
-_PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "numba", "control")
+_PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
 _PRESSURE_TOLERANCE = 1.0
 """Rounding of a settled pressure (Pa) that is no extrapolation."""

@@ -3,13 +3,16 @@
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.protocol import DISPLACEMENT, ROTATION, Protocol
 from pma_gym.effects import Effect
+from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import Value
+from pma_gym.kernels.generic import where
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, phase_times, rmse
 from pma_gym.plant.model import Model
 from pma_gym.plant.statics import muscle_force
@@ -94,29 +97,36 @@ def phase_rmse(protocol: Protocol, position: NDArray[np.float64]) -> dict[str, f
     return known | {"all": rmse(np.concatenate(list(begun.values())))}
 
 
-def absolute_reward(error_percent: float, change: float) -> float:
+def absolute_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
     """Minus the absolute error in percent of the range: -|e|."""
     return -abs(error_percent)
 
 
-def quadratic_reward(error_percent: float, change: float) -> float:
+def quadratic_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
     """Minus the squared error in percent of the range: -e^2."""
     return -error_percent * error_percent
 
 
-def gaussian_reward(error_percent: float, change: float) -> float:
-    """exp(-e^2) of the error in percent of the range, between 0 and 1."""
-    return math.exp(-error_percent * error_percent)
+def gaussian_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
+    """exp(-e^2) of the error in percent of the range, between 0 and 1; 0 beyond e^2 = 12."""
+    square = error_percent * error_percent
+    near = square < GAUSSIAN_END
+    return where(near, exponential(-where(near, square, 0.0)), 0.0)
 
 
-def smooth_reward(error_percent: float, change: float) -> float:
+def smooth_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401
     """The absolute reward less a tenth of the action's change: -|e| - 0.1 |da|."""
     return -abs(error_percent) - 0.1 * abs(change)
 
 
-Reward = Callable[[float, float], float]
+GAUSSIAN_END = 12.0
+"""Squared error beyond which the gaussian reward is 0, where it would be 6e-6."""
+
+
+Reward = Callable[[Any, Any], Any]
 """Reward of a step: of the true error at its end (percent of range), and of the largest change
-of an action (which runs from -1 to 1) since the step before."""
+of an action (which runs from -1 to 1) since the step before. Written in the arithmetic of laws, so
+that kernels compute it too."""
 
 REWARDS: dict[str, Reward] = {
     "absolute": absolute_reward,
@@ -135,6 +145,29 @@ def missed_reward(reward: Reward) -> float:
     return reward(100.0, 0.0)
 
 
+LIMITS: tuple[tuple[str, str, float], ...] = (
+    ("contraction", "contraction", 1.0),
+    ("contraction", "stretch", -1.0),
+    ("load", "tension", 1.0),
+    ("pressure", "pressure", 1.0),
+)
+"""What breaks the rig: output, the field of `[limits]` that bounds it, and its sign."""
+
+
+def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
+    """Which of `LIMITS` a state breaks, counted from 1; 0.0 for none. Numbers or traced values.
+
+    Args:
+        limits: the rig's parameters of `[limits]` (SI).
+        truth: contraction (m), load (N), pressure (Pa).
+    """
+    found = 0.0
+    # A state that is no number keeps no limit. The first of several counts.
+    for i, (output, limit, sign) in reversed(list(enumerate(LIMITS, 1))):
+        found = where(sign * truth[output] <= getattr(limits, limit), found, float(i))
+    return found
+
+
 def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
     """Which physical limit of the rig a state breaks, in words; None if none.
 
@@ -142,18 +175,20 @@ def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
         model: the rig's model, with its limits.
         truth: contraction (m), load (N), pressure (Pa).
     """
+    return limit_in_words(model, broken(model.parameters["limits"], truth))
+
+
+def limit_in_words(model: Model, code: float) -> str | None:
+    """The limit of `LIMITS` that `broken` found, in words; None for 0."""
     limits = model.parameters["limits"]
-    contraction = truth["contraction"]
-    # `not <=`: a state that is no number breaks every limit.
-    if not contraction <= limits.contraction:
-        return f"contraction above {limits.contraction * 1e3:g} mm"
-    if not -contraction <= limits.stretch:
-        return f"muscle stretched over {limits.stretch * 1e3:g} mm beyond its resting length"
-    if not truth["load"] <= limits.tension:
-        return f"cable tension above {limits.tension:g} N"
-    if not truth["pressure"] <= limits.pressure:
-        return f"pressure above {limits.pressure / 1e3:g} kPa"
-    return None
+    words = (
+        "",
+        f"contraction above {limits.contraction * 1e3:g} mm",
+        f"muscle stretched over {limits.stretch * 1e3:g} mm beyond its resting length",
+        f"cable tension above {limits.tension:g} N",
+        f"pressure above {limits.pressure / 1e3:g} kPa",
+    )
+    return words[int(code)] or None
 
 
 def nominal_station(model: Model, generator: np.random.Generator) -> Model:
@@ -184,38 +219,44 @@ def station_within_intervals(model: Model, generator: np.random.Generator) -> Mo
         share = float(generator.random())
         if note.low is not None and note.high is not None:
             drawn[path] = _bounded(model, path, note.low + share * (note.high - note.low))
-    drawn = _brought_back(model, drawn, "muscle_force", _pulls_alike)
+    drawn = _brought_back(model, drawn, "muscle_force", _pulling_as(model))
     drawn = _brought_back(model, drawn, "regulator_line", _reaches_highest_pressure)
     drawn = _brought_back(model, drawn, "drive", _lets_go)
     return model.replace(drawn)
 
 
 def _brought_back(
-    model: Model, drawn: dict[str, Value], port: str, holds: Callable[[Model, Model], bool]
+    model: Model, drawn: dict[str, Value], port: str, holds: Callable[[Model], bool]
 ) -> dict[str, Value]:
     names = [name for name, effect in model.effects.items() if effect.port == port]
     paths = [path for path in drawn if path.partition(".")[0] in names]
     nominal = {f"{n}.{door}": value for n in names for door, value in model.at_the_door(n).items()}
     for _ in range(10 if paths else 0):
-        if holds(model, model.replace({path: drawn[path] for path in paths})):
+        if holds(model.replace({path: drawn[path] for path in paths})):
             break
         drawn = drawn | {path: 0.5 * (drawn[path] + nominal[path]) for path in paths}  # type: ignore[operator]
     return drawn
 
 
-def _pulls_alike(nominal: Model, drawn: Model) -> bool:
+def _pulling_as(nominal: Model) -> Callable[[Model], bool]:
+    """Whether a model's muscle pulls about as a nominal one's."""
     pressure, contraction = CORNERS.T
-    difference = muscle_force(drawn)(pressure, contraction)
-    difference = difference - muscle_force(nominal)(pressure, contraction)
-    return bool(np.all(np.abs(difference) <= FORCE_TOLERANCE))
+    # A muscle without an interval is asked for nothing: a cascade has none at all.
+    usual = muscle_force(nominal)(pressure, contraction)
+
+    def holds(drawn: Model) -> bool:
+        difference = muscle_force(drawn)(pressure, contraction) - usual
+        return bool(np.all(np.abs(difference) <= FORCE_TOLERANCE))
+
+    return holds
 
 
-def _reaches_highest_pressure(nominal: Model, drawn: Model) -> bool:
+def _reaches_highest_pressure(drawn: Model) -> bool:
     line = drawn.parameters["regulator_line"]
     return all(10.0 * line.gain + line.offset >= task.highest_pressure for task in TASKS.values())
 
 
-def _lets_go(nominal: Model, drawn: Model) -> bool:
+def _lets_go(drawn: Model) -> bool:
     return drawn.parameters["drive"].offset <= 0.0
 
 

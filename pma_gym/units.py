@@ -6,6 +6,7 @@ the code computes in SI. `Quantity` joins the two for one physical parameter.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 SI_FACTORS: dict[str, float] = {
     "1": 1.0,
@@ -57,6 +58,7 @@ SI_FACTORS: dict[str, float] = {
 """Value in SI of one of each unit."""
 
 
+@cache
 def suffix(unit: str) -> str:
     """The ending that says a unit in a name: `N/mm` gives `n_per_mm`; `1` gives nothing.
 

@@ -233,7 +233,7 @@ def test_a_simulated_log_can_be_evaluated(run, tmp_path):
 def test_info_names_models_and_environments(run):
     code, out, _ = run("info")
     assert code == 0
-    for name in ("numba", "serres2008", "cascade", "pma_gym/IsokineticRotation-v0"):
+    for name in ("llvmlite", "serres2008", "cascade", "pma_gym/IsokineticRotation-v0"):
         assert name in out
 
 

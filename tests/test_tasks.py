@@ -12,7 +12,9 @@ from pma_gym.tasks import (
     REWARDS,
     TASKS,
     TRIAL_TAIL_S,
+    broken,
     broken_limit,
+    limit_in_words,
     missed_reward,
     phase_errors,
     phase_rmse,
@@ -93,3 +95,21 @@ SAFE = {"contraction": 0.04, "load": 300.0, "pressure": 300e3}
 )
 def test_limits_are_named(change, words):
     assert broken_limit(load_model("serres2008"), SAFE | change) == words
+
+
+def test_the_first_limit_that_is_broken_counts():
+    model = load_model("serres2008")
+    limits = model.parameters["limits"]
+    assert broken(limits, SAFE) == 0.0 and limit_in_words(model, 0.0) is None
+    all_of_them = {"contraction": 0.08, "load": 2000.0, "pressure": 700e3}
+    assert broken(limits, all_of_them) == 1.0
+    assert broken(limits, all_of_them | {"contraction": 0.04}) == 3.0
+    assert broken(limits, SAFE | {"pressure": 700e3}) == 4.0
+    assert limit_in_words(model, 4.0) == "pressure above 600 kPa"
+
+
+def test_the_gaussian_reward_ends_where_next_to_nothing_is_left():
+    reward = REWARDS["gaussian"]
+    assert reward(1.0, 0.0) == pytest.approx(math.exp(-1.0))
+    assert reward(3.46, 0.0) == pytest.approx(math.exp(-(3.46**2)), rel=1e-12)
+    assert reward(3.47, 0.0) == reward(100.0, 0.0) == 0.0

@@ -11,11 +11,14 @@ ROTATION = "pma_gym/IsokineticRotation-v0"
 COUNTS = tuple(4**power for power in range(10))
 """Numbers of environments: 1 to 262144."""
 
+PAIR_COUNTS = (64, 1024, 16384)
+"""Where two threads, and a voltage that is held, are measured too."""
+
 SYNC_COUNTS = (64, 1024)
 """The same for copies in a Python loop, which are no cheaper by the dozen."""
 
-SUBSTEPS = (25, 50, 100, 200, 400)
-"""Internal steps of a control step of 10 ms."""
+TOLERANCES = (1000, 500, 150, 50, 15)
+"""Tolerances of an internal step, in millionths of the states' scales; 150 is the default."""
 
 ENVPOOL_MOST = 16384
 """EnvPool's largest batch here: it holds every environment as an object of its own."""
@@ -61,14 +64,14 @@ class Row:
 
     @property
     def number(self) -> int | None:
-        """The number that the key ends in, of environments or substeps."""
+        """The number that the key ends in, of environments or millionths."""
         last = self.key.rpartition("/")[2]
         return int(last) if last.isdigit() else None
 
 
 def all_rows() -> list[Row]:
     """Every row, in the order of the tables."""
-    parts = (_single(), _same_plant(), _batches(), _substeps(), _learning(), _once())
+    parts = (_single(), _same_plant(), _batches(), _tolerances(), _learning(), _once())
     return [row for part in parts for row in part]
 
 
@@ -146,9 +149,10 @@ def _batches() -> Iterator[Row]:
     for count in COUNTS:
         one, two = (own | {"count": count, "threads": threads} for threads in (1, 2))
         yield _batch("own", f"{title}, 1 thread", "own", one, step=_OWN)
-        yield _batch("own_two", f"{title}, 2 threads", "own", two, step=_OWN, cores=2)
-        held = one | {"held": True}
-        yield _batch("own_held", f"{title}, voltage held, 1 thread", "own", held, step=_OWN)
+        if count in PAIR_COUNTS:
+            yield _batch("own_two", f"{title}, 2 threads", "own", two, step=_OWN, cores=2)
+            held = one | {"held": True}
+            yield _batch("own_held", f"{title}, voltage held, 1 thread", "own", held, step=_OWN)
     for toy, step in _STEPS.items():
         told: dict[str, Any] = {"right_hand_sides": 1, "step": step}
         for count in COUNTS:
@@ -172,11 +176,11 @@ def _batch(
     return Row(f"batch/{name}/{settings['count']}", title, worker, row, settings, **rest)
 
 
-def _substeps() -> Iterator[Row]:
-    for count in SUBSTEPS:
-        settings = {"model": "station", "count": count}
-        title = "pma-gym's plant"
-        yield Row(f"substeps/own/{count}", title, "own", "substeps", settings, step=_PLANT)
+def _tolerances() -> Iterator[Row]:
+    for millionths in TOLERANCES:
+        settings = {"model": "station", "millionths": millionths}
+        title, key = "pma-gym's plant", f"tolerances/own/{millionths}"
+        yield Row(key, title, "own", "tolerances", settings, step=_PLANT)
 
 
 def _learning() -> Iterator[Row]:

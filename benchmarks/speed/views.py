@@ -34,7 +34,7 @@ def views(document: Mapping[str, Any]) -> list[View]:
         _single(_of(known, "single", "plant")),
         _batches(_of(known, "batch")),
         _right_hand_sides(known),
-        _substeps(_of(known, "substeps")),
+        _tolerances(_of(known, "tolerances")),
         _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
         _fits(_of(known, "fits")),
         _ratios(document["ratios"]),
@@ -116,11 +116,11 @@ def _right_hand_sides(rows: Sequence[Row]) -> View:
     return View("evaluations", "Evaluations of the right-hand side per second", header, cells)
 
 
-def _substeps(rows: Sequence[Row]) -> View:
+def _tolerances(rows: Sequence[Row]) -> View:
     cells = [
         [
-            str(row["number"]),
-            f"{10.0 / row['number']:g} ms",
+            f"{row['number'] * 1e-6:.2g}",
+            f"{row['facts']['attempts']:.1f}",
             f"{row['facts']['position_error']:.1e}",
             f"{row['facts']['worst_error']:.1e}",
             f"{1e6 / row['median']:.3g} us",
@@ -128,9 +128,9 @@ def _substeps(rows: Sequence[Row]) -> View:
         ]
         for row in rows
     ]
-    header = ["Internal steps in 10 ms", "Each", "Position", "Worst state", "Time", "±"]
-    title = "What internal steps cost and buy: errors as shares of the range, time of 10 ms"
-    return View("substeps", title, header, cells, words=0)
+    header = ["Tolerance", "Attempts in 10 ms", "Position", "Worst state", "Time", "±"]
+    title = "What exactness costs: errors as shares of the range, time of 10 ms"
+    return View("tolerances", title, header, cells, words=0)
 
 
 def _others(rows: Sequence[Row], name: str, title: str) -> View:

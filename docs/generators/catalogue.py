@@ -48,6 +48,10 @@ def _effect(effect: Effect, common: str) -> str:
     if effect.rate:
         label = "Its memory" if effect.law else "Its lag"
         parts.append(f"{label}: {_law(effect.rate)}")
+    if effect.path:
+        parts.append(f"Its memory, by the way travelled: {_law(effect.path)}")
+    if effect.switch:
+        parts.append(f"Steps end where this is 0: {_law(effect.switch)}")
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]

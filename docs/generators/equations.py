@@ -1,10 +1,13 @@
 """The plants' balances, and the equations that a model makes of them."""
 
-import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
 
 from generators.text import code, sections, table
-from pma_gym.plant.compose import Equations
-from pma_gym.plant.model import PLANTS, load_model
+from pma_gym.effects.effect import Effect, signals
+from pma_gym.plant.model import PLANTS, Model, load_model
+from pma_gym.plant.notation import Names, Notation
 
 
 def equations(plant: str) -> str:
@@ -20,16 +23,92 @@ def ports(plant: str) -> str:
 
 def written(model: str) -> str:
     """A model's right-hand side, as it is compiled: assignments, then the rate of each state."""
-    loaded = load_model(model)
-    text = Equations(effects=loaded.effects)
-    PLANTS[loaded.plant].write_equations(text)
-    lines = [*text.lines, ""]
-    for state in text.states:
-        decay = f" - {state.decay} * {state.name}" if state.decay else ""
-        lines.append(f"d({state.name})/dt = {state.source}{decay}")
-    return "```text\n" + "\n".join(_readable(line) for line in lines) + "\n```"
+    words = _Words(load_model(model))
+    paths = [words.path(name, effect) for name, effect in words.roads.items()]
+    lines = [*words.lines, "", *words.rates, *([""] if paths else []), *paths]
+    return "```text\n" + "\n".join(lines) + "\n```"
 
 
-def _readable(line: str) -> str:
-    """Parameters as `effect.name` instead of `p_effect.name`."""
-    return re.sub(r"\bp_(\w+)", r"\1", line)
+@dataclass(frozen=True)
+class _Text:
+    """A piece of text that can be calculated with.
+
+    Attributes:
+        text: the text.
+        binds: how strongly it holds together: 1 a sum, 2 a product, 3 a name.
+    """
+
+    text: str
+    binds: int = 3
+
+    def within(self, binds: int) -> str:
+        """The text as a part of what binds so strongly."""
+        return self.text if self.binds >= binds else f"({self.text})"
+
+    def __add__(self, other: Any) -> "_Text":  # noqa: ANN401
+        return _Text(f"{self.text} + {_text(other).within(1)}", 1)
+
+    def __sub__(self, other: Any) -> "_Text":  # noqa: ANN401
+        return _Text(f"{self.text} - {_text(other).within(2)}", 1)
+
+    def __mul__(self, other: Any) -> "_Text":  # noqa: ANN401
+        return _Text(f"{self.within(2)} * {_text(other).within(2)}", 2)
+
+    def __truediv__(self, other: Any) -> "_Text":  # noqa: ANN401
+        return _Text(f"{self.within(2)} / {_text(other).within(3)}", 2)
+
+
+def _text(given: Any) -> _Text:  # noqa: ANN401
+    return given if isinstance(given, _Text) else _Text(repr(given))
+
+
+class _Words(Notation):
+    """A model's equations as lines of text."""
+
+    def __init__(self, model: Model) -> None:
+        self.lines: list[str] = []
+        self.rates: list[str] = []
+        super().__init__(model, Names(_Text, _text))
+
+    def apply(self, law: Callable, *arguments: Any) -> _Text:  # noqa: ANN401
+        """The law's call."""
+        return _Text(f"{law.__name__}({', '.join(map(_argument, arguments))})")
+
+    def product(self, port: str) -> _Text:
+        """The product over the effects at a port, without a factor 1 before it."""
+        factors = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
+        return _Text(" * ".join(factor.text for factor in factors) or "1.0", 2)
+
+    def let(self, name: str, value: Any) -> _Text:  # noqa: ANN401
+        """An assignment."""
+        self.lines.append(f"{name} = {_text(value).text}")
+        self.named[name] = _Text(name)
+        return self.named[name]
+
+    def add_state(self, name: str, rate: Any, scale: float | None) -> None:  # noqa: ANN401
+        """The rate of a state."""
+        self.rates.append(f"d({name})/dt = {_text(rate).text}")
+
+    def add_decaying(self, name: str, rate: Any, scale: float | None) -> None:  # noqa: ANN401
+        """The rate of a state whose law gives its source and its decay."""
+        self.lines.append(f"source_{name}, decay_{name} = {_text(rate).text}")
+        self.rates.append(f"d({name})/dt = source_{name} - decay_{name} * {name}")
+
+    def path(self, name: str, effect: Effect) -> str:
+        """A memory of the way travelled, from where a step began."""
+        law = effect.path
+        assert law is not None
+        way = self.travelled[0].text
+        start = {"memory": f"{name}_0", "travel": f"{way} - {way}_0", "p": effect.name}
+        names = ", ".join(start.get(signal, signal) for signal in signals(law))
+        return f"{name} = {law.__name__}({names})"
+
+
+def _argument(given: Any) -> str:  # noqa: ANN401
+    """An argument of a law: a text, or an effect's parameters by the effect's name."""
+    if isinstance(given, _Text):
+        return given.text
+    first = given[0]
+    while isinstance(first, tuple):
+        first = first[0]
+    return first.text.partition(".")[0]

@@ -1,11 +1,12 @@
 """Sensor volts to units and back, by table 1 of the dissertation: the only such conversion."""
 
 from dataclasses import dataclass
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.kernels.generic import floor, where
 from pma_gym.units import SI_FACTORS
 
 DAQ_LIMIT = 10.0
@@ -83,13 +84,14 @@ Its zero is the protractor's, not the trial's: `Trial.rotation` counts from the 
 """
 
 
-def quantise(volts: NDArray[np.float64]) -> NDArray[np.float64]:
+def quantise(volts: Any) -> Any:  # noqa: ANN401
     """Voltages as the DAQ records them.
 
     Args:
-        volts: voltages at its inputs (V), any shape.
+        volts: voltages at its inputs (V): a number, an array of any shape, or traced values.
     Returns:
-        The nearest of its 4096 levels, -10 to 9.995 V, same shape; NaN stays NaN.
+        The nearest of its 4096 levels, -10 to 9.995 V; NaN stays NaN.
     """
-    held = np.clip(volts, -DAQ_LIMIT, DAQ_LIMIT - DAQ_STEP)
-    return np.round(held / DAQ_STEP) * DAQ_STEP
+    highest = DAQ_LIMIT - DAQ_STEP
+    held = where(volts < -DAQ_LIMIT, -DAQ_LIMIT, where(volts > highest, highest, volts))
+    return floor(held * (1.0 / DAQ_STEP) + 0.5) * DAQ_STEP

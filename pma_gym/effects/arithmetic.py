@@ -40,26 +40,24 @@ def smoothstep(value):
 
 
 def exponential(value):
-    """exp(value) by a Pade quotient of order 4/4 at value/64, squared six times.
+    """exp(value) by Taylor's series at value/128, squared seven times.
 
     Relative error below 1e-12 for |value| <= 12, which covers what the force laws ask. A library
-    exp would neither vectorise nor give the same bits on every machine.
+    exp would neither vectorise nor give the same bits on every machine, and a quotient (Pade) costs
+    a division, which is as slow as eight products.
 
     >>> import math
     >>> abs(exponential(-8.0) / math.exp(-8.0) - 1.0) < 1e-12
     True
     """
-    z = value / 64.0
-    z2 = z * z
-    even = 1680.0 + z2 * (180.0 + z2)
-    odd = z * (840.0 + 20.0 * z2)
-    root = (even + odd) / (even - odd)
-    root = root * root
-    root = root * root
-    root = root * root
-    root = root * root
-    root = root * root
-    return root * root
+    z = value * (1.0 / 128.0)
+    root = 1.0 + z * (1.0 / 7.0) * (1.0 + z * (1.0 / 8.0))
+    root = 1.0 + z * (1.0 / 5.0) * (1.0 + z * (1.0 / 6.0) * root)
+    root = 1.0 + z * (1.0 / 3.0) * (1.0 + z * (1.0 / 4.0) * root)
+    root = 1.0 + z * (1.0 + z * (1.0 / 2.0) * root)
+    for _ in range(7):
+        root = root * root
+    return root
 
 
 def interpolate(value, knots, heights):

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import positive
+from pma_gym.effects.arithmetic import positive, smoothstep
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -25,7 +25,7 @@ class Cable(NamedTuple):
 def tension(stretch, stretch_rate, p):
     """Tension of the cable, which the load cell reads.
 
-        T = max(0, F + damping s' F / (F + 20 N)),   F = stiffness max(0, s - slack)
+        T = max(0, F + damping s' smoothstep(F / 40 N)),   F = stiffness max(0, s - slack)
 
     The damper comes in with the spring, so that the cable tightens without a jump of its tension,
     which no integrator would take in its stride.
@@ -40,8 +40,20 @@ def tension(stretch, stretch_rate, p):
         Our model of a cable; stiffness and slack are identified from Serres 2008, table I3.
     """
     spring = p.stiffness * positive(stretch - p.slack)
-    taut = spring / (spring + TIGHT_FORCE)
+    taut = smoothstep(spring * (0.5 / TIGHT_FORCE))
     return positive(spring + taut * p.damping * stretch_rate)
+
+
+def tightness(stretch, p):
+    """How far the cable is wound in beyond its slack; the tension has a kink at 0.
+
+    Args:
+        stretch: cable wound in less the way of the slide (m).
+        p: Cable.
+    Returns:
+        Way (m), negative while the cable hangs slack.
+    """
+    return stretch - p.slack
 
 
 CABLE = Effect(
@@ -49,5 +61,6 @@ CABLE = Effect(
     port="cable",
     parameters=Cable,
     law=tension,
+    switch=tightness,
     signature="potentiometer minus LVDT proportional to tension; dead travel at low tension",
 )

@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import smoothstep, where
+from pma_gym.effects.arithmetic import clip, positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -23,48 +23,52 @@ class CoulombFriction(NamedTuple):
     ]
 
 
-def friction_force(memory, p):
+def friction_force(velocity, memory, p):
     """Force of the bristles on the slide.
 
-        F = -z,  z in newton: deflection times bristle stiffness
+        F = -f(v) z,   f(v) = dynamic + (static - dynamic) / (1 + (v / stribeck_speed)^2)
 
     Args:
-        memory: bristle force z (N).
+        velocity: rate of contraction v (m/s).
+        memory: deflection z of the bristles, between -1 and 1.
         p: CoulombFriction: static, dynamic (N), stribeck_speed (m/s), presliding (m).
     Returns:
         Force (N); positive in the direction of contraction.
     Source:
         Serres 2008, section 2.1.1.1 gives 1.96 N static and 1.47 N dynamic. The state is that of
-        Dupont et al. 2002 (elasto-plastic friction), which neither creeps nor drifts while stuck.
+        Dupont et al. 2002 (elasto-plastic friction), which neither creeps nor drifts while stuck;
+        the fall of the force with speed (Stribeck) multiplies it.
     """
-    return -memory
+    ratio = velocity / p.stribeck_speed
+    return -(p.dynamic + (p.static - p.dynamic) / (1.0 + ratio * ratio)) * memory
 
 
-def friction_rate(velocity, memory, p):
-    """Rate of the bristle force.
+def friction_path(memory, travel, direction, p):
+    """Deflection of the bristles after the slide has travelled on without turning.
 
-        z' = k v - a(z, v) |v| k z / f(v),   k = static / presliding
-        f(v) = dynamic + (static - dynamic) / (1 + (v / stribeck_speed)^2)
-
-    a is 0 while |z| is under 0.7 f (purely elastic, so stuck) or the motion unloads the bristle,
-    and 1 once |z| reaches f. A constant load under static holds for ever, and so does one that
-    swings under 0.7 static; one that swings above it creeps a little at each swing. At static = 0
-    there is no bristle and the law is absent.
+    Under 0.7 of the full deflection the bristles are elastic, so the slide is stuck: z grows by
+    travel / presliding, forwards and back on the same line. Above, they begin to slip: z bends over
+    as a parabola of the travel and reaches 1 after 1.3 presliding distances, whatever the speed. A
+    constant load under static holds for ever, and so does one that swings under 0.7 static; one
+    that swings above it creeps a little at each swing.
 
     Args:
-        velocity: rate of contraction v (m/s).
-        memory: z (N).
+        memory: z where the travel began.
+        travel: displacement since then (m), in the direction of contraction.
+        direction: 1 where the slide moves in the direction of contraction, else -1.
         p: CoulombFriction.
     Returns:
-        (source, decay) with z' = source - decay * z.
+        z after it.
     """
-    stiffness = p.static / p.presliding
-    ratio = velocity / p.stribeck_speed
-    level = p.dynamic + (p.static - p.dynamic) / (1.0 + ratio * ratio) + 1e-12
-    elastic = BREAKAWAY_SHARE * level
-    plastic = smoothstep((abs(memory) - elastic) / (level - elastic))
-    plastic = where(velocity * memory > 0.0, plastic, 0.0)
-    return stiffness * velocity, plastic * stiffness * abs(velocity) / level
+    start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
+    rest = positive(1.0 - start) * (1.0 / slipping)
+    begun = where(
+        start > BREAKAWAY_SHARE, BREAKAWAY_SHARE + 2.0 * slipping * (1.0 - rest**0.5), start
+    )
+    reached = begun + direction * travel / p.presliding
+    slip = clip((reached - BREAKAWAY_SHARE) * (1.0 / slipping), 0.0, 2.0)
+    elastic = where(reached < BREAKAWAY_SHARE, reached, BREAKAWAY_SHARE)
+    return direction * (elastic + slipping * slip * (1.0 - 0.25 * slip))
 
 
 COULOMB_FRICTION = Effect(
@@ -72,6 +76,6 @@ COULOMB_FRICTION = Effect(
     port="slide_force",
     parameters=CoulombFriction,
     law=friction_force,
-    rate=friction_rate,
+    path=friction_path,
     signature="odd step of force at zero speed; the slide sticks under small changes of load",
 )

@@ -3,8 +3,9 @@
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, get_type_hints
 
 from pma_gym.units import Quantity
@@ -28,8 +29,13 @@ class Effect:
         parameters: NamedTuple class whose fields are Annotated with a `Quantity` each.
         law: what the effect contributes at its port; None for a part that the plant reads.
         rate: rate law of the memory, returning (source, decay) for memory' = source - decay *
-            memory; None without memory. The decay is integrated exactly, so it may be fast.
+            memory; None without memory. It may be fast: the integrator is implicit.
+        path: law of a memory that depends on the way travelled alone, not on time: its value after
+            `travel` without turning, from `memory`, `travel`, `direction` and `p`. Exact, so it
+            costs the integrator nothing; instead of `rate`.
+        switch: a signal at whose zero the law has a kink; steps end there.
         signature: what sets the effect apart in measured data.
+        memory_scale: what an error of the memory is counted against, roughly its range.
     """
 
     name: str
@@ -37,7 +43,10 @@ class Effect:
     parameters: Any
     law: Callable | None = None
     rate: Callable | None = None
+    path: Callable | None = None
+    switch: Callable | None = None
     signature: str = ""
+    memory_scale: float = 1.0
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
@@ -63,9 +72,14 @@ class Effect:
         hints = get_type_hints(self.parameters)
         return tuple(name for name, hint in hints.items() if hint is not float)
 
-    def names_at_the_door(self) -> dict[str, str]:
+    def names_at_the_door(self) -> Mapping[str, str]:
         """Field name by its name in files, which ends in the unit: slope_n_per_kpa -> slope."""
-        return {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
+        return self._doors
+
+    @cached_property
+    def _doors(self) -> Mapping[str, str]:
+        doors = {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
+        return MappingProxyType(doors)
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:
         """Parameters in SI from values by their names at the door.
@@ -140,9 +154,11 @@ class Effect:
 
     def laws(self) -> Iterator[Callable]:
         """The law and the rate law, where there are any."""
-        yield from (law for law in (self.law, self.rate) if law is not None)
+        every = (self.law, self.rate, self.path, self.switch)
+        yield from (law for law in every if law is not None)
 
 
-def signals(law: Callable) -> list[str]:
+@cache
+def signals(law: Callable) -> tuple[str, ...]:
     """Names of a law's arguments, in order."""
-    return list(inspect.signature(law).parameters)
+    return tuple(inspect.signature(law).parameters)

@@ -40,19 +40,19 @@ def commanded_pressure(regulator_voltage, p):
 
 
 def regulator_rate(pressure_command, regulator_pace, p):
-    """Rate of the pressure: tau P' = P_command - P.
+    """Rate of the pressure: tau P' = (P_command - P) pace.
 
     Args:
         pressure_command: gauge pressure asked for (Pa).
-        regulator_pace: factor on the time constant, 1 unless an effect changes it.
+        regulator_pace: factor on the rate, 1 unless an effect changes it.
         p: RegulatorLag: time_constant tau (s).
     Returns:
         (source, decay) with P' = source - decay * P.
     Source:
         First order is our reading of the response time in Serres 2008, section 2.1.2.3.
     """
-    time_constant = p.time_constant * regulator_pace
-    return pressure_command / time_constant, 1.0 / time_constant
+    decay = regulator_pace / p.time_constant
+    return decay * pressure_command, decay
 
 
 REGULATOR_LINE = Effect("regulator_line", "regulator_line", RegulatorLine, commanded_pressure)

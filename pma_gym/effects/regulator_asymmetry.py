@@ -16,7 +16,7 @@ class RegulatorAsymmetry(NamedTuple):
 
 
 def regulator_asymmetry(pressure, pressure_command, p):
-    """Factor on the regulator's time constant: 1 while it fills, vent_ratio while it vents.
+    """Factor on the regulator's rate: 1 while it fills, 1 / vent_ratio while it vents.
 
     Args:
         pressure: gauge pressure (Pa).
@@ -27,7 +27,7 @@ def regulator_asymmetry(pressure, pressure_command, p):
     Source:
         Serres 2008, section 6.1 says that filling and venting differ.
     """
-    return where(pressure_command < pressure, p.vent_ratio, 1.0)
+    return where(pressure_command < pressure, 1.0 / p.vent_ratio, 1.0)
 
 
 REGULATOR_ASYMMETRY = Effect(

@@ -5,6 +5,7 @@ import gymnasium as gym
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.vector import PMAVectorEnv
 
 ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
@@ -15,6 +16,11 @@ ENVIRONMENTS = {
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.
     if _name not in gym.registry:
-        gym.register(_name, entry_point="pma_gym.envs.pma_env:PMAEnv", kwargs={"task": _task})
+        gym.register(
+            _name,
+            entry_point="pma_gym.envs.pma_env:PMAEnv",
+            vector_entry_point="pma_gym.envs.vector:PMAVectorEnv",
+            kwargs={"task": _task},
+        )
 
-__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "Reading", "Station"]
+__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "PMAVectorEnv", "Reading", "Station"]

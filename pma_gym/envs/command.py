@@ -1,8 +1,6 @@
 """From actions to volts: what the agent asks for, checked, and how late the station hears it."""
 
 import math
-from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -14,70 +12,48 @@ HIGHEST_VOLTAGE = 10.0
 """What an action of 1 stands for (V); -1 stands for 0 V."""
 
 
-class Volts(NamedTuple):
-    """What the station is commanded for one control step (V, 0-10)."""
-
-    motor: float
-    regulator: float
-
-
 class CommandLine:
-    """The wire from the agent to the station, `action_delay_s` long.
+    """What an agent may ask for, and how it asks for volts.
 
     Args:
         options: the environment's options.
 
     Attributes:
         space: the action space.
-        action: the last action, held to -1 to 1; at the start the action of the settled station.
-        change: how far the last action moved an entry, at most (0 to 2).
     """
 
     def __init__(self, options: Options) -> None:
         """Size the action space."""
         self._size = 2 if options.regulator_action else 1
-        self._delay = options.action_delay
         self.space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
         self.begin(0.0)
 
-    def begin(self, regulator_voltage: float) -> Volts:
-        """Start a trial from a settled station: no motor voltage, this regulator voltage (V)."""
-        self._rest = Volts(0.0, regulator_voltage)
-        self._wire = deque([self._rest] * self._delay)
-        self.action = self._scaled(self._rest)
-        self.change = 0.0
-        return self._rest
-
-    def send(self, action: object) -> Volts:
-        """Take an action; return what the station hears in this control step.
-
-        Raises:
-            ValueError: an action of the wrong shape or kind, or not finite.
-        """
-        asked = self._checked(action)
-        held = [min(max(value, -1.0), 1.0) for value in asked]
-        self.change = max(abs(new - old) for new, old in zip(held, self.action, strict=True))
-        self.action = held
-        volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
-        self._wire.append(Volts(volts[0], volts[1] if self._size == 2 else self._rest.regulator))
-        return self._wire.popleft()
+    def begin(self, regulator_voltage: float) -> None:
+        """Start a trial from a station that was settled at a regulator voltage (V)."""
+        self._rest = regulator_voltage
 
     def action_for(
         self, motor_voltage: float, regulator_voltage: float | None
     ) -> NDArray[np.float64]:
         """The action that commands these voltages (V), held to 0-10 V."""
-        regulator = self._rest.regulator if regulator_voltage is None else regulator_voltage
-        return np.array(self._scaled(Volts(motor_voltage, regulator)))
+        regulator = self._rest if regulator_voltage is None else regulator_voltage
+        volts = (motor_voltage, regulator)[: self._size]
+        scaled = (2.0 / HIGHEST_VOLTAGE * value - 1.0 for value in volts)
+        return np.array([min(max(value, -1.0), 1.0) for value in scaled])
 
-    def _scaled(self, volts: Volts) -> list[float]:
-        scaled = (2.0 / HIGHEST_VOLTAGE * value - 1.0 for value in volts[: self._size])
-        return [min(max(value, -1.0), 1.0) for value in scaled]
+    def checked(self, action: object) -> list[float]:
+        """An action's entries.
 
-    def _checked(self, action: object) -> list[float]:
+        Raises:
+            ValueError: an action of the wrong shape or kind, or not finite.
+        """
         try:
-            array = np.asarray(action, dtype=np.float64)  # type: ignore[arg-type]
+            array = np.asarray(action)
+            if array.dtype.kind not in "fiu":
+                raise TypeError
+            array = array.astype(np.float64)
         except (TypeError, ValueError):
-            raise ValueError(f"{self._rule()}; got {action!r}") from None
+            raise ValueError(f"{self._rule()}; got {action!r}; give real numbers") from None
         if array.shape != (self._size,):
             raise ValueError(
                 f"{self._rule()}; got shape {array.shape}: {action!r}; "

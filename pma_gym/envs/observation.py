@@ -1,12 +1,11 @@
 """What the agent sees: one table of entries, which packs, describes and bounds the observation."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
-from pma_gym.envs.knowledge import Reading
 from pma_gym.envs.options import Options
 from pma_gym.tasks import TASKS, Task
 from pma_gym.units import SI_FACTORS
@@ -38,13 +37,13 @@ class ObservationTable:
         """List the entries, and evaluate the reference at every step once."""
         protocol = task.protocol
         last = task.steps(options.control_rate_hz) + options.preview
-        self.references = protocol.reference(np.arange(last + 1) * options.period).tolist()
+        self.references = protocol.reference(np.arange(last + 1) * options.period)
         self.rows = _rows(task, options)
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
         self._span = protocol.span
-        self._scaled = [reference / protocol.span for reference in self.references]
         self._preview = options.preview
-        self._position = Reading._fields.index(protocol.quantity)
+        self._history, self._delay = options.history, options.observation_delay
+        self._quantity = protocol.quantity
 
     def describe(self) -> str:
         """The table of entries as text.
@@ -65,34 +64,36 @@ class ObservationTable:
             f"{i:{digits}}  {name:<{width}}1.0 = {unit}" for i, (name, unit) in enumerate(self.rows)
         )
 
-    def pack(
-        self, step: int, reading: Reading, action: Sequence[float], earlier: Iterable[Reading]
-    ) -> NDArray[np.float32]:
-        """The observation.
+    def entries(
+        self,
+        reading: Callable[[str, int], Any],
+        reference: Callable[[int], Any],
+        action: Sequence[Any],
+    ) -> list[Any]:
+        """The entries before they are clipped, of numbers or traced values.
 
         Args:
-            step: control steps since the trial began.
-            reading: what the sensors say.
+            reading: part of a reading (SI) by its name, and how many control steps ago it was
+                taken.
+            reference: reference (m or rad) so many control steps ahead.
             action: the last action, -1 to 1.
-            earlier: readings heard before, latest first.
-        Returns:
-            Array of shape (entries,), a new one each time.
         """
-        at, span = self._position, self._span
-        reference, *ahead = self._scaled[step : step + self._preview + 1]
-        entries = [
-            reading.extension / EXTENSION_SCALE,
-            reading.rotation / ROTATION_SCALE,
-            reading.load / LOAD_SCALE,
-            reading.pressure / PRESSURE_SCALE,
-            reference,
-            reference - reading[at] / span,
-            *ahead,
+        delay, quantity = self._delay, self._quantity
+        now = reference(0) * (1.0 / self._span)
+        return [
+            reading("extension", delay) * (1.0 / EXTENSION_SCALE),
+            reading("rotation", delay) * (1.0 / ROTATION_SCALE),
+            reading("load", delay) * (1.0 / LOAD_SCALE),
+            reading("pressure", delay) * (1.0 / PRESSURE_SCALE),
+            now,
+            now - reading(quantity, delay) * (1.0 / self._span),
+            *(reference(k) * (1.0 / self._span) for k in range(1, self._preview + 1)),
             *action,
-            *(past[at] / span for past in earlier),
+            *(
+                reading(quantity, delay + k) * (1.0 / self._span)
+                for k in range(1, self._history + 1)
+            ),
         ]
-        packed = np.array(entries, dtype=np.float32)
-        return packed.clip(-BOUND, BOUND, out=packed)
 
 
 def _rows(task: Task, options: Options) -> list[tuple[str, str]]:

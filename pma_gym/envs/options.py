@@ -7,6 +7,8 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, TypeGuard
 
+import numpy as np
+
 from pma_gym.plant.model import Model
 from pma_gym.tasks import RANDOMISATIONS, REWARDS, TASKS, Task
 
@@ -139,6 +141,35 @@ def check_pressure(pressure: object) -> None:
         )
     for one in several:
         _check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
+
+
+def check_pressures(pressures: object, count: int) -> None:
+    """Refuse pressures that are not one for each of so many environments.
+
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    if isinstance(pressures, str) or not isinstance(pressures, Sequence | np.ndarray):
+        length = "no sequence"
+    else:
+        length = "" if len(pressures) == count else f"{len(pressures)}"
+    if length:
+        raise ValueError(
+            f"pressures_kpa must hold one pressure for each of the {count} environments, got "
+            f"{length}: {pressures!r}; pressure_kpa is one for all"
+        )
+    for pressure in pressures:  # type: ignore[attr-defined]
+        check_pressure(pressure)
+
+
+def check_count(name: str, count: object, most: int) -> None:
+    """Refuse a number of things that is none.
+
+    Raises:
+        ValueError: names it, the rule and what came.
+    """
+    if not _is_whole(count) or not 1 <= count <= most:
+        raise ValueError(f"{name} must be a whole number in 1-{most}, got {count!r}")
 
 
 def _check_model(model: object) -> None:

@@ -1,6 +1,8 @@
 """The environment: a task on a plant, seen through the plant's sensors."""
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
@@ -8,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.envs.command import CommandLine
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.kernel import BAD_ACTION
 from pma_gym.envs.knowledge import Reading, Station
-from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import (
     Pressure,
     check_known,
@@ -18,22 +21,16 @@ from pma_gym.envs.options import (
     parse_options,
     parse_task,
 )
-from pma_gym.envs.recording import Recording
-from pma_gym.envs.sensing import SensorLine
-from pma_gym.plant.model import load_model
-from pma_gym.plant.plant import Plant
-from pma_gym.tasks import RANDOMISATIONS, REWARDS, broken_limit, missed_reward
-from pma_gym.units import SI_FACTORS
+from pma_gym.envs.record import PARTS, TRUTH
+from pma_gym.envs.summary import info_maker, summary
+from pma_gym.plant.plant import Condition, Plant
+from pma_gym.tasks import limit_in_words
 
 if TYPE_CHECKING:
     from pma_gym.envs.picture import Picture
 
 RESET_OPTIONS = ("pressure_kpa",)
 NOT_BEGUN = "no episode has begun"
-
-PRESSURE_TOLERANCE = 1.0
-"""How far a pressure may leave the trials' range before it counts (Pa): a settled pressure is
-exact to its last bits only."""
 
 
 class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
@@ -80,7 +77,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     |---|---|
     | `absolute` (default) | -abs(e) |
     | `quadratic` | -e^2 |
-    | `gaussian` | exp(-e^2) |
+    | `gaussian` | exp(-e^2), 0 where e^2 is 12 or more |
     | `smooth` | -abs(e) - 0.1 abs(da) |
 
     A terminated episode also gets, for every step that it did not reach, the reward of e = 100.
@@ -153,16 +150,25 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.render_mode = render_mode
         self.task = parse_task(task)
         self.options = parse_options(options)
-        self.nominal_plant = Plant(load_model(self.options.model))
-        self.table = ObservationTable(self.task, self.options)
+        self._engine = Engine(self.task, self.options)
+        self.nominal_plant = self._engine.nominal
+        self.table = self._engine.table
         self.observation_space = self.table.space
         self._commands = CommandLine(self.options)
         self.action_space = self._commands.space
-        self._sensors = SensorLine(self.options)
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
-        self._reward = REWARDS[self.options.reward]
-        self._steps = self.task.steps(self.options.control_rate_hz)
+        record = self._engine.record
+        self._places = record.places
+        self._row = self._engine.records[0, :, 0]
+        self._tail = self._row[self._places["ended"] :]
+        self._info = info_maker(record.info)
+        self._observed = self._engine.observations[0]
+        self._given = self._engine.actions[0]
+        # Writing a number through it is the fastest way into an array.
+        self._entry: Any = memoryview(self._given)
+        self._shape = self._given.shape
+        self._run, self._arguments = self._engine.call
         self._picture: Picture | None = None
         self._idle: str | None = NOT_BEGUN
 
@@ -183,13 +189,12 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         wanted = self._wanted_pressure(options or {})
         super().reset(seed=seed)
         self._idle = NOT_BEGUN
-        self.pressure = self._drawn_pressure(wanted)
-        nominal = self.nominal_plant.model
-        model = RANDOMISATIONS[self.options.randomisation](nominal, self.np_random)
-        self.plant = self.nominal_plant if model is nominal else Plant(model)
-        self.condition = self.plant.settle(motor_voltage=0.0, pressure=self.pressure)
-        self._begin()
-        return self._observation(), self._info()
+        self._engine.seed(_FIRST, [seed])
+        self._engine.reset(_FIRST, [wanted])
+        self._idle = self.ended_by = None
+        self.__dict__.pop("plant", None)
+        self._commands.begin(self._number("rest_regulator"))
+        return self._observed.copy(), self._info(*self._tail.tolist())
 
     def step(
         self, action: NDArray[np.floating]
@@ -200,28 +205,32 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ValueError: an action of the wrong shape, or not finite.
             gymnasium.error.ResetNeeded: no episode, or one that has ended.
         """
-        self._require_episode("step()")
-        self._volts = self._commands.send(action)
-        self._recording.record(self._volts)
-        self._sensors.take(self.condition, self.time)
-        self.ended_by = broken_limit(self.plant.model, self.truth)
-        terminated = self.ended_by is not None
-        missed = self._steps - self._recording.count
-        truncated = not terminated and missed == 0
-        reward = self._reward(self.task.error_percent(self.error), self._commands.change)
-        info = self._info()
-        if terminated:
-            reward += missed * missed_reward(self._reward)
-        if terminated or truncated:
-            self._idle = f"the episode ended at {self.time:g} s"
-            info |= self.episode_summary()
-        return self._observation(), reward, terminated, truncated, info
+        if self._idle:
+            self._require_episode("step()")
+        if type(action) is np.ndarray and action.shape == self._shape and action.dtype.kind == "f":
+            if len(self._entry) == 1:
+                self._entry[0] = action.item()
+            else:
+                self._given[:] = action
+        else:
+            self._given[:] = self._commands.checked(action)
+        ended = self._run(self._arguments)
+        if ended:
+            if ended & BAD_ACTION:
+                self._commands.checked(action)
+            return self._last(bool(ended & 1))
+        numbers = self._tail.tolist()
+        return self._observed.copy(), numbers[-1], False, False, self._info(*numbers)
 
-    def _begin(self) -> None:
-        self._idle = self.ended_by = None
-        self._volts = self._commands.begin(self.plant.regulator_voltage(self.pressure))
-        self._sensors.begin(self.plant, self.condition, self.np_random)
-        self._recording = Recording(self.plant, self.condition, self._steps, self.options.period)
+    def _last(
+        self, terminated: bool
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """What the step that ends an episode returns."""
+        code, *_, reward = numbers = self._tail.tolist()
+        self.ended_by = limit_in_words(self._engine.models[0], code)
+        self._idle = f"the episode ended at {self.time:g} s"
+        info = self._info(*numbers) | self.episode_summary()
+        return self._observed.copy(), reward, terminated, not terminated, info
 
     def _require_episode(self, wanted: str) -> None:
         if self._idle:
@@ -233,30 +242,51 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         check_pressure(wanted)
         return wanted
 
-    def _drawn_pressure(self, wanted: Pressure) -> float:
-        if isinstance(wanted, str):
-            low, high = self.task.lowest_pressure, self.task.highest_pressure
-            return float(self.np_random.uniform(low, high))
-        if isinstance(wanted, Sequence):
-            return 1e3 * float(wanted[int(self.np_random.integers(len(wanted)))])
-        return 1e3 * float(wanted)
+    def _number(self, name: str) -> float:
+        return float(self._row[self._places[name]])
 
     # -- what the agent, a controller and the reader see -------------------------------------------
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The Plant of this episode; differs from the nominal one with `randomisation`."""
+        model = self._engine.models[0]
+        return self.nominal_plant if model is self.nominal_plant.model else Plant(model)
+
+    @property
+    def pressure(self) -> float:
+        """Gauge pressure that this episode began at (Pa)."""
+        return float(self._engine.pressures[0])
+
+    @property
+    def condition(self) -> Condition:
+        """Where the plant stands; a copy."""
+        state = np.array([self._number(name) for name in self.nominal_plant.states])
+        zero, size = self._number("zero_contraction"), self._number("size")
+        return Condition(state, zero, self.time, size, (self.motor_voltage, self.regulator_voltage))
+
+    @property
+    def _count(self) -> int:
+        """Control steps so far."""
+        return int(self._row.view(np.int64)[self._places["count"]])
 
     @property
     def time(self) -> float:
         """Time since the trial began (s)."""
-        return self._recording.time
+        return self._count * self.options.period
 
     @property
     def reading(self) -> Reading:
         """What the sensors say now, as late as `observation_delay_s` makes them."""
-        return self._sensors.reading
+        delay = self.options.observation_delay
+        taken = max(self._count - delay, 0) * self.options.period
+        return Reading(taken, *(self._number(f"{part}_{delay}") for part in PARTS))
 
     @property
     def truth(self) -> dict[str, float]:
         """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa)."""
-        return self._sensors.truth
+        truth = {name: self._number(f"true_{name}") for name in TRUTH}
+        return truth | {"extension": self._number("zero_contraction") - truth["contraction"]}
 
     @property
     def station(self) -> Station:
@@ -266,32 +296,27 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def error(self) -> float:
         """True position less reference (m or rad)."""
-        return (
-            self.truth[self.task.protocol.quantity] - self.table.references[self._recording.count]
-        )
+        return self.truth[self.task.protocol.quantity] - float(self.table.references[self._count])
 
     @property
     def extrapolated(self) -> bool:
         """Whether the pressure lies outside this task's trials or the model's validity."""
-        valid, pressure = self.plant.model.parameters["validity"], self.truth["pressure"]
-        low = max(valid.lowest, self.task.lowest_pressure)
-        high = min(valid.highest, self.task.highest_pressure)
-        return not low - PRESSURE_TOLERANCE <= pressure <= high + PRESSURE_TOLERANCE
+        return self._number("extrapolated") != 0.0
 
     @property
     def motor_voltage(self) -> float:
         """Motor voltage that the station heard in the last step (V)."""
-        return self._volts.motor
+        return self._number("motor_voltage")
 
     @property
     def regulator_voltage(self) -> float:
         """Regulator voltage that the station heard in the last step (V)."""
-        return self._volts.regulator
+        return self._number("regulator_voltage")
 
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
         """Motor voltage that the station heard in every step so far (V), shape (steps,)."""
-        return self._recording.motor_voltages
+        return self._engine.voltages[: self._count].copy()
 
     def reference(self, time: float) -> float:
         """The reference at a time (s): extension (m) or rotation (rad)."""
@@ -313,7 +338,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def trajectory(self) -> NDArray[np.float64]:
         """True position (m or rad) at k / 384 s so far, whatever the control rate, shape (k,)."""
-        return self._recording.trajectory(self.task.protocol.quantity)
+        return self._engine.trace[: math.floor(self._number("sample") + 0.5)].copy()
 
     def episode_summary(self) -> dict[str, Any]:
         """RMSE of the true position at 384 Hz so far, as the dissertation defines it.
@@ -323,28 +348,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             each phase begun, by its name; `percent_of_range`: the first, of 25 mm or 90 deg;
             `ended_by`: the limit that ended the episode, in words, or None.
         """
-        return self._recording.score(self.task) | {"ended_by": self.ended_by}
-
-    def _observation(self) -> NDArray[np.float32]:
-        sensors = self._sensors
-        count, action = self._recording.count, self._commands.action
-        return self.table.pack(count, sensors.reading, action, sensors.earlier)
-
-    def _info(self) -> dict[str, Any]:
-        unit, quantity = self.task.protocol.unit, self.task.protocol.quantity
-        factor, truth = SI_FACTORS[unit], self.truth
-        return {
-            "time_s": self.time,
-            f"{quantity}_{unit}": truth[quantity] / factor,
-            f"measured_{quantity}_{unit}": getattr(self.reading, quantity) / factor,
-            f"reference_{unit}": self.table.references[self._recording.count] / factor,
-            f"error_{unit}": self.error / factor,
-            "motor_voltage_v": self.motor_voltage,
-            "regulator_voltage_v": self.regulator_voltage,
-            "pressure_kpa": truth["pressure"] / 1e3,
-            "load_n": truth["load"],
-            "extrapolated": self.extrapolated,
-        }
+        sums = {p.name: self._number(f"sum_{p.name}") for p in self.task.protocol.phases}
+        return summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, shape (400, 800, 3).
@@ -370,3 +375,6 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def close(self) -> None:
         """Free the picture."""
         self._picture = None
+
+
+_FIRST = np.zeros(1, np.int64)

@@ -11,8 +11,10 @@ cell is taken to read the spring's share of the extension, K y, which is F_ce - 
 
 from collections.abc import Mapping
 
+from pma_gym.effects.contractile_force import contractile_force
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.stiffness import spring_stiffness
+from pma_gym.kernels.trace import trace
 from pma_gym.plant.compose import Equations, Port
 
 PORTS: dict[str, Port] = {
@@ -28,7 +30,7 @@ PORTS: dict[str, Port] = {
     "servo_inertia": Port("acceleration of the motor's displacement (m/s^2)", most=1),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
-    "regulator_pace": Port("factor on the regulator's time constant, multiplied"),
+    "regulator_pace": Port("factor on the regulator's rate, multiplied"),
 }
 """Ports of the cascade: how many effects each takes, and what becomes of their results."""
 
@@ -43,37 +45,45 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 
-OUTPUTS: dict[str, str] = {
-    "contraction": "contraction",
-    "rotation": "servo / p_servo.radius",
-    "load": "muscle_stiffness * extension",
-    "pressure": "pressure",
-}
-"""True outputs by name: the text of each, in terms of the equations' variables."""
+POSITIONS: dict[str, float] = {"extension": 0.3, "servo": 0.3}
+"""States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
-FIRST_PARTS = 4
-"""Parts of the first internal step after a command: the servo, 13 428 1/s, overtakes the muscle
-there, and the damping turns with it."""
+SCALES: dict[str, float] = {
+    "contraction": 25e-3,
+    "extension": 25e-3,
+    "servo": 25e-3,
+    "servo_rate": 1.0,
+    "pressure": 500e3,
+    "rotation": 1.0,
+    "load": 500.0,
+}
+"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
 
 
 def write_equations(equations: Equations) -> None:
     """Write the dissertation's cascade, with the model's effects at its ports."""
-    let = equations.let
-    equations.functions.append(spring_stiffness)
-    let("pressure_command", equations.one("regulator_line"))
-    let("regulator_pace", equations.product("regulator_pace"))
-    let("displacement_input", equations.one("position_map"))
-    let("muscle_stiffness", "spring_stiffness(pressure, p_stiffness)")
-    let("no_load", "contractile_force(pressure, p_contractile_force) / muscle_stiffness")
-    let("contraction", "no_load - extension")
+    eq = equations
+    stiffness, force = eq.parameters["stiffness"], eq.parameters["contractile_force"]
+    eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("regulator_pace", eq.product("regulator_pace"))
+    eq.let("displacement_input", eq.one("position_map"))
+    eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))
+    no_load = trace(contractile_force, eq["pressure"], force) / eq["muscle_stiffness"]
+    eq.let("contraction", no_load - eq["extension"])
     # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
-    let("velocity", "extension - servo")
-    let("resistance", equations.one("muscle_damping"))
-    let("muscle_rate", "muscle_stiffness / resistance")
-    equations.add_state("extension", "muscle_rate * (servo - extension)")
-    _write_servo(equations)
-    equations.add_rate("pressure", equations.one("regulator_lag"))
-    equations.add_sensors(OUTPUTS)
+    eq.let("velocity", eq["extension"] - eq["servo"])
+    eq.let("resistance", eq.one("muscle_damping"))
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "rotation": eq["servo"] / eq.parameters["servo"].radius,
+        "load": eq["muscle_stiffness"] * eq["extension"],
+        "pressure": eq["pressure"],
+    }
+    pull = eq["muscle_stiffness"] / eq["resistance"] * (eq["servo"] - eq["extension"])
+    eq.add_state("extension", pull, SCALES["extension"])
+    _write_servo(eq)
+    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
+    eq.add_sensors(SCALES)
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
@@ -82,12 +92,11 @@ def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
     return (parameters["servo"].stiffness / inertial.inertia) ** 0.5 if inertial else 0.0
 
 
-def _write_servo(equations: Equations) -> None:
-    if not equations.at("servo_inertia"):
-        equations.add_rate("servo", equations.one("servo"))
+def _write_servo(eq: Equations) -> None:
+    if not eq.at("servo_inertia"):
+        eq.add_decaying("servo", eq.one("servo"), SCALES["servo"])
         return
-    call = equations.one(
-        "servo_inertia", displacement="servo", displacement_rate="servo_rate", servo="p_servo"
-    )
-    equations.add_state("servo", "servo_rate")
-    equations.add_state("servo_rate", call)
+    signals = {"displacement": eq["servo"], "displacement_rate": eq["servo_rate"]}
+    acceleration = eq.one("servo_inertia", servo=eq.parameters["servo"], **signals)
+    eq.add_state("servo", eq["servo_rate"], SCALES["servo"])
+    eq.add_state("servo_rate", acceleration, SCALES["servo_rate"])

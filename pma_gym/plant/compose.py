@@ -1,16 +1,28 @@
-"""Writes a plant's equations of motion as one Python module, from the texts of its laws.
+"""A plant's equations of motion while they are being put together from the laws of its effects.
 
 A plant (`station.py`, `cascade.py`) says which ports it has and how their results balance; the
-effects that a model has fill the ports. The result is plain Python text that runs as it stands
-(for debugging and for `symbolic`), and that `compiled.py` compiles.
+effects that a model has fill the ports. What comes out is traced arithmetic, from which compiled
+code, Python text and derivatives are made.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 from pma_gym.effects import Effect
-from pma_gym.effects.effect import signals
+from pma_gym.effects.effect import Parameters, signals
+from pma_gym.kernels.derivative import derivative
+from pma_gym.kernels.graph import CHANGING, FIXED, HELD, Graph, Value
+from pma_gym.kernels.trace import trace
+
+COMMANDS = ("motor_voltage", "regulator_voltage")
+"""What a plant is told (V)."""
+
+LAG_SHARE = 10.0
+"""Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
+
+ZERO = "zero_contraction"
+"""Name of the contraction x0 at which a trial began with no load (m)."""
 
 
 @dataclass(frozen=True)
@@ -41,104 +53,202 @@ class Port:
 
 @dataclass(frozen=True)
 class State:
-    """One state of a plant: its name, and what its rate is made of.
+    """One state of a plant.
 
     Attributes:
-        name: name of the state in the text.
-        source: expression of the part of the rate that does not decay.
-        decay: expression of the decay rate (1/s), which is integrated exactly; None if none.
+        name: its name.
+        value: the state itself.
+        rate: its time derivative.
+        scale: what an error of it is counted against (SI); None where it never asks for a step.
     """
 
     name: str
-    source: str
-    decay: str | None = None
+    value: Value
+    rate: Value
+    scale: float | None
 
 
-@dataclass
-class Equations:
-    """A plant's right-hand side while it is being written.
+@dataclass(frozen=True)
+class Path:
+    """A memory that depends on the way travelled alone.
 
     Attributes:
-        effects: the model's effects by name.
-        lines: assignments, in order of evaluation.
-        functions: functions that the lines call beside the effects' laws.
-        states: the states, in the order of the state vector.
+        name: its name.
+        value: the memory where the step began.
+        after: the memory after the way since then.
+        scale: what an error of it is counted against.
     """
 
-    effects: dict[str, Effect]
-    lines: list[str] = field(default_factory=list)
-    functions: list[Callable] = field(default_factory=list)
-    states: list[State] = field(default_factory=list)
+    name: str
+    value: Value
+    after: Value
+    scale: float
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A value at whose zero the right-hand side has a kink.
+
+    Attributes:
+        name: its name.
+        value: the value.
+        rate: its time derivative.
+        overshoot: largest overshoot that needs no step to end there, in the value's unit (and
+            times its duration, where `turning`).
+        turning: whether it is a velocity, whose kinks lie in the way travelled.
+    """
+
+    name: str
+    value: Value
+    rate: Value
+    overshoot: float
+    turning: bool = False
+
+
+class Equations:
+    """A plant's right-hand side.
+
+    Args:
+        effects: the model's effects by name.
+        parameters: their parameters by name; only how many there are matters here.
+        ramped: commands change linearly in time; else they are held.
+
+    Attributes:
+        graph: the graph of all values.
+        effects: the model's effects by name.
+        parameters: the effects' parameters by name, as values.
+        named: values by name: states, commands, and whatever else has been given a name.
+        states: the states that have rates, in the order of the state vector.
+        paths: the memories of the way travelled, which follow them there.
+        switches: where steps end.
+        outputs: true outputs by name.
+        travelled: the state whose way they remember, and its rate.
+    """
+
+    def __init__(
+        self,
+        effects: Mapping[str, Effect],
+        parameters: Mapping[str, Parameters],
+        ramped: bool = False,
+    ) -> None:
+        self.graph = Graph()
+        self.effects = dict(effects)
+        self.parameters = {
+            name: self.graph.inputs(name, values, FIXED) for name, values in parameters.items()
+        }
+        command = CHANGING if ramped else HELD
+        self.ramped = ramped
+        self.named: dict[str, Value] = {
+            ZERO: self.graph.input(ZERO, HELD),
+            **{name: self.graph.input(name, command) for name in COMMANDS},
+        }
+        self.states: list[State] = []
+        self.paths: list[Path] = []
+        self.switches: list[Switch] = []
+        self.travelled: tuple[Value, Value] | None = None
+        self.outputs: dict[str, Value] = {}
+
+    def finish(self) -> None:
+        """Add the commands as states of constant rate, if they are ramped."""
+        for name in COMMANDS if self.ramped else ():
+            self.add_state(name, self.graph.input(f"{name}_slope", HELD), None)
+
+    @property
+    def remembered(self) -> list[State | Path]:
+        """States and memories, without commands: the state vector."""
+        return [*(state for state in self.states if state.name not in COMMANDS), *self.paths]
+
+    def __getitem__(self, name: str) -> Value:
+        """A value by name; a state where nothing else has the name."""
+        if name not in self.named:
+            self.named[name] = self.graph.input(name, CHANGING)
+        return self.named[name]
 
     def at(self, port: str) -> list[Effect]:
         """The model's effects at a port, in catalogue order."""
         return [effect for effect in self.effects.values() if effect.port == port]
 
-    def call(self, effect: Effect, law: Callable, **renamed: str) -> str:
-        """The text of a law's call; `renamed` gives a signal another name."""
-        own = {"p": f"p_{effect.name}", "memory": f"memory_{effect.name}", **renamed}
-        return f"{law.__name__}({', '.join(own.get(name, name) for name in signals(law))})"
+    def call(self, effect: Effect, law: Callable, **other: Value) -> Value:
+        """What a law returns; `other` gives a signal another value."""
+        own = {"p": self.parameters[effect.name], **other}
 
-    def total(self, port: str) -> str:
-        """The text of the sum over the effects at a port."""
+        def signal(name: str) -> Value:
+            if name in own:
+                return own[name]
+            if name == "memory":
+                return self.memory(effect)
+            return self[name]
+
+        return trace(law, *(signal(name) for name in signals(law)))
+
+    def memory(self, effect: Effect) -> Value:
+        """The memory of an effect; one of the way travelled, as far as the step has come."""
+        name = f"memory_{effect.name}"
+        if effect.path is None:
+            return self[name]
+        for path in self.paths:
+            if path.name == name:
+                return path.after
+        assert self.travelled is not None
+        start, parameters = self[name], self.parameters[effect.name]
+        travel = self.travelled[0] - self["origin"]
+        after = trace(effect.path, start, travel, self["direction"], parameters)
+        self.paths.append(Path(name, start, after, effect.memory_scale))
+        return after
+
+    def let(self, name: str, value: Value) -> Value:
+        """Give a value a name."""
+        self.named[name] = self.graph.value(value)
+        return self.named[name]
+
+    def total(self, port: str) -> Value:
+        """The sum over the effects at a port."""
         terms = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
-        return " + ".join(terms) or "0.0"
+        return sum(terms[1:], terms[0]) if terms else self.graph.constant(0.0)
 
-    def product(self, port: str) -> str:
-        """The text of the product over the effects at a port."""
-        factors = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
-        return " * ".join(factors) or "1.0"
+    def product(self, port: str) -> Value:
+        """The product over the effects at a port."""
+        factor = self.graph.constant(1.0)
+        for effect in self.at(port):
+            if effect.law:
+                factor = factor * self.call(effect, effect.law)
+        return factor
 
-    def let(self, name: str, expression: str) -> None:
-        """Add an assignment."""
-        self.lines.append(f"{name} = {expression}")
-
-    def one(self, port: str, **renamed: str) -> str:
-        """The text of the law of the only effect at a port."""
+    def one(self, port: str, **other: Value) -> Value:
+        """What the law of the only effect at a port returns."""
         (effect,) = self.at(port)
         assert effect.law is not None
-        return self.call(effect, effect.law, **renamed)
+        return self.call(effect, effect.law, **other)
 
-    def add_state(self, name: str, source: str, decay: str | None = None) -> None:
-        """Add a state by the expressions of its source and decay."""
-        self.states.append(State(name, source, decay))
+    def add_state(self, name: str, rate: Value, scale: float | None) -> None:
+        """Add a state by its rate, and what an error of it is counted against."""
+        self.states.append(State(name, self[name], self.graph.value(rate), scale))
 
-    def add_rate(self, name: str, call: str) -> None:
+    def add_decaying(self, name: str, rate: tuple[Value, Value], scale: float | None) -> None:
         """Add a state whose rate law returns (source, decay)."""
-        self.lines.append(f"source_{name}, decay_{name} = {call}")
-        self.states.append(State(name, f"source_{name}", f"decay_{name}"))
+        source, decay = rate
+        self.add_state(name, source - decay * self[name], scale)
 
     def add_memories(self, ports: Sequence[str]) -> None:
         """Add the memory of every effect that has one at these ports."""
         for effect in self.effects.values():
             if effect.port in ports and effect.rate:
-                self.add_rate(f"memory_{effect.name}", self.call(effect, effect.rate))
+                rate = self.call(effect, effect.rate)
+                self.add_decaying(f"memory_{effect.name}", rate, effect.memory_scale)
 
-    def add_sensors(self, stands_on: dict[str, str]) -> None:
-        """Add the lag of every sensor; `stands_on` gives the text of the signal it reads."""
+    def add_switch(self, name: str, value: Value, overshoot: float, turning: bool = False) -> None:
+        """Add a value at whose zero steps end; all states must have been added."""
+        slopes = derivative(value, [state.value for state in self.states])
+        rate = self.graph.constant(0.0)
+        for slope, state in zip(slopes, self.states, strict=True):
+            if slope is not None:
+                rate = rate + slope * state.rate
+        self.switches.append(Switch(name, value, rate, overshoot, turning))
+
+    def add_sensors(self, scales: Mapping[str, float]) -> None:
+        """Add the lag of every sensor, by what an error of its output is counted against."""
         for effect in self.effects.values():
             if effect.port.startswith("sensor:") and effect.rate:
-                signal = stands_on[effect.port.removeprefix("sensor:")]
-                self.add_rate(f"lag_{effect.name}", self.call(effect, effect.rate, signal=signal))
-
-
-def parameter_lines(effects: dict[str, Effect], lengths: dict[str, list[int]]) -> list[str]:
-    """Text that unpacks the flat parameter vector into one named tuple an effect."""
-    lines, at = [], 0
-    for name, effect in effects.items():
-        fields = []
-        for length in lengths[name]:
-            items = [f"vector[{i}]" for i in range(at, at + max(length, 1))]
-            fields.append(f"({', '.join(items)},)" if length else items[0])
-            at += max(length, 1)
-        lines.append(f"p_{name} = {effect.parameters.__name__}({', '.join(fields)})")
-    return lines
-
-
-def imports(equations: Equations) -> list[str]:
-    """Import lines for the laws and parameter classes that the equations use."""
-    names = {(function.__module__, function.__name__) for function in equations.functions}
-    for effect in equations.effects.values():
-        names.add((effect.parameters.__module__, effect.parameters.__name__))
-        names.update((law.__module__, law.__name__) for law in effect.laws())
-    return [f"from {module} import {name}" for module, name in sorted(names)]
+                output = effect.port.removeprefix("sensor:")
+                rate = self.call(effect, effect.rate, signal=self.outputs[output])
+                self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])

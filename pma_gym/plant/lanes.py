@@ -1,52 +1,5 @@
-"""Runs the text of a law on other kinds of number: NumPy arrays, SymPy expressions.
+"""Another name of `pma_gym.kernels.lanes`."""
 
-A law calls nothing but the functions of `pma_gym.effects.arithmetic`; binding those anew gives the
-same law for another kind of number, without a second copy of it.
-"""
+from pma_gym.kernels.lanes import lanes, rebind
 
-import types
-from collections.abc import Callable, Mapping
-
-import numpy as np
-
-
-def rebind(function: Callable, names: Mapping[str, Callable]) -> Callable:
-    """The same function, with the functions of these names replaced wherever it calls them.
-
-    Args:
-        function: a law, or a generated function that calls laws.
-        names: replacements by name, such as {"where": numpy.where}.
-    Returns:
-        A new function of the same text.
-    """
-    return _rebind(function, names, {})
-
-
-def _rebind(
-    function: Callable, names: Mapping[str, Callable], done: dict[int, Callable]
-) -> Callable:
-    if id(function) in done:
-        return done[id(function)]
-    assert isinstance(function, types.FunctionType)
-    own = dict(function.__globals__)
-    fresh = types.FunctionType(
-        function.__code__, own, function.__name__, function.__defaults__, function.__closure__
-    )
-    done[id(function)] = fresh
-    for name in function.__code__.co_names:
-        value = own.get(name)
-        if name in names:
-            own[name] = names[name]
-        elif isinstance(value, types.FunctionType):
-            own[name] = _rebind(value, names, done)
-    return fresh
-
-
-def lanes(function: Callable) -> Callable:
-    """The same law for NumPy arrays.
-
-    >>> from pma_gym.effects.arithmetic import clip
-    >>> lanes(clip)(np.array([-1.0, 0.5, 2.0]), 0.0, 1.0).tolist()
-    [0.0, 0.5, 1.0]
-    """
-    return rebind(function, {"where": np.where, "exponential": np.exp})
+__all__ = ["lanes", "rebind"]

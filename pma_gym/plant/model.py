@@ -121,7 +121,7 @@ class Model:
     def paths(self) -> Iterator[str]:
         """Every parameter as `effect.parameter_unit`."""
         for effect in self.parameters:
-            yield from (f"{effect}.{name}" for name in self.at_the_door(effect))
+            yield from (f"{effect}.{name}" for name in CATALOGUE[effect].names_at_the_door())
 
     def _nearest(self, path: str) -> str:
         near = difflib.get_close_matches(path, list(self.paths()), 1)

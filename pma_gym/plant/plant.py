@@ -1,28 +1,27 @@
 """A plant that runs: settles, steps, simulates whole trials."""
 
-import math
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors, settle
-from pma_gym.plant.compiled import compile_module, import_text
-from pma_gym.plant.compose import Equations
-from pma_gym.plant.integrate import DEFAULT_STEP_S, module_text
-from pma_gym.plant.model import PLANTS, Model, load_model
+from pma_gym.plant.attempt import first_size
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.program import FIRST_S, program, table, vector
+from pma_gym.plant.simulation import Run, simulate_all
 
 if TYPE_CHECKING:
     import control
     import sympy
 
-NO_SAMPLES = np.zeros((0, 0))
+DEFAULT_TOLERANCE = 2e-4
+"""Largest error of an internal step, as a share of the states' scales, chosen by measured error:
+`python -m benchmarks accuracy` holds the result against scipy at rtol 1e-11."""
+
 OUTPUTS = ("contraction", "rotation", "load", "pressure")
 
 
@@ -35,11 +34,15 @@ class Condition:
         zero_contraction: contraction x0 at which the trial began with no load (m); extension is
             counted from it.
         time: time since the trial began (s).
+        size: size that the next internal step will have (s), if its error allows.
+        commands: motor and regulator voltage that it heard last (V), or None.
     """
 
     state: np.ndarray
     zero_contraction: float
     time: float = 0.0
+    size: float = FIRST_S
+    commands: tuple[float, float] | None = None
 
 
 class Plant:
@@ -47,14 +50,16 @@ class Plant:
 
     Args:
         model: a Model, the name of a shipped one, or the path of a TOML file.
-        step: largest internal time step (s).
-        compiled: False runs the laws as plain Python, some hundred times slower, for debugging;
-            the results are the same bits.
+        tolerance: largest error of an internal step, as a share of what the plant's states are
+            counted against; a station's positions are held to 0.1 % of it.
 
     Attributes:
         model: the Model.
+        tolerance: the tolerance.
+        program: the compiled functions of all models of this structure.
+        vector: tolerance and parameters, as compiled functions read them.
+        table: what is fixed for a model, as compiled functions read it.
         states: names of the states, in the order of the state vector.
-        decaying: the states whose rate law names a decay.
         outputs: names of the true outputs: contraction (m), rotation (rad), load (N),
             pressure (Pa).
 
@@ -66,40 +71,25 @@ class Plant:
     """
 
     def __init__(
-        self,
-        model: str | Path | Model = "serres2008",
-        step: float = DEFAULT_STEP_S,
-        compiled: bool = True,
+        self, model: str | Path | Model = "serres2008", tolerance: float = DEFAULT_TOLERANCE
     ) -> None:
         """Compile the model's equations, or load them from the cache."""
+        if not 1e-10 <= tolerance <= 0.1:
+            raise ValueError(
+                f"tolerance must be a share in 1e-10 to 0.1 of the states' scales, got "
+                f"{tolerance!r}; the default is {DEFAULT_TOLERANCE:g}"
+            )
         self.model = load_model(model)
-        self.step_limit = step
-        self.text, equations = _written(self.model)
-        self.states = [state.name for state in equations.states]
-        self.decaying = {state.name for state in equations.states if state.decay}
-        self._warn_of_large_steps()
-        self._module = compile_module(self.text) if compiled else import_text(self.text)
-        self.vector = self.model.vector()
+        self.tolerance = tolerance
+        self.program = program(self.model)
+        self.states = self.program.states
+        self.vector = vector(self.model, tolerance)
+        self.table = table(self.program, self.vector)
         self.outputs = OUTPUTS
         self.sensor_columns = [
             self.states.index(f"lag_{name}") if f"lag_{name}" in self.states else -1
             for name in sensors.SENSORS
         ]
-
-    @cached_property
-    def plain(self) -> ModuleType:
-        """The same equations as an uncompiled Python module, for debugging."""
-        return import_text(self.text)
-
-    def _warn_of_large_steps(self) -> None:
-        # Decays are integrated exactly; what swings is not, and is quietly wrong before it bursts.
-        frequency = PLANTS[self.model.plant].fastest_oscillation(self.model.parameters)
-        if frequency * self.step_limit > 1.0:
-            warnings.warn(
-                f"model {self.model.name} swings at {frequency:.3g} rad/s, too fast for steps of "
-                f"{self.step_limit:g} s; give Plant a step of at most {0.1 / frequency:.1g}",
-                stacklevel=3,
-            )
 
     def regulator_voltage(self, pressure: float) -> float:
         """Regulator voltage (V) that settles at a pressure (Pa).
@@ -107,15 +97,7 @@ class Plant:
         Raises:
             ValueError: if the regulator would need less than 0 or more than 10 V.
         """
-        line = self.model.parameters["regulator_line"]
-        voltage = (pressure - line.offset) / line.gain
-        if not 0.0 <= voltage <= 10.0:
-            low, high = max(0.0, line.offset), 10.0 * line.gain + line.offset
-            raise ValueError(
-                f"pressure must lie in {low / 1e3:g} to {high / 1e3:g} kPa, what the regulator "
-                f"reaches with 0-10 V; got {pressure / 1e3:g} kPa"
-            )
-        return voltage
+        return regulator_voltage(self.model, pressure)
 
     def settle(
         self,
@@ -132,15 +114,16 @@ class Plant:
         Returns:
             The settled condition.
         Raises:
-            ValueError: neither pressure nor regulator voltage, a pressure that the regulator does
-                not reach, or a load that the muscle cannot balance.
+            ValueError: neither pressure nor regulator voltage, a voltage out of 0-10 V, a pressure
+                that the regulator does not reach, or a load that the muscle cannot balance.
         """
         if regulator_voltage is None:
             if pressure is None:
                 raise ValueError("settle needs a pressure (Pa) or a regulator_voltage (V)")
             regulator_voltage = self.regulator_voltage(pressure)
+        check_voltages(motor_voltage, regulator_voltage)
         state, zero = settle.at_rest(self, motor_voltage, regulator_voltage)
-        return Condition(state, zero)
+        return Condition(state, zero, commands=(motor_voltage, regulator_voltage))
 
     def derivative(
         self,
@@ -150,10 +133,10 @@ class Plant:
         zero_contraction: float,
     ) -> np.ndarray:
         """Time derivative of the state vector (SI per s)."""
-        out = np.empty_like(state)
-        self._module.derivative(
-            state, motor_voltage, regulator_voltage, zero_contraction, self.vector, out
-        )
+        inputs = np.array([motor_voltage, regulator_voltage, zero_contraction], float)
+        state, out = np.ascontiguousarray(state, float), np.empty(len(self.states))
+        addresses = (a.ctypes.data for a in (state, inputs, self.vector))
+        self.program.derivative(1, *addresses, 0, out.ctypes.data)
         return out
 
     def step(
@@ -162,8 +145,6 @@ class Plant:
         motor_voltage: float,
         regulator_voltage: float,
         duration: float,
-        period: float = 0.0,
-        samples: np.ndarray = NO_SAMPLES,
     ) -> None:
         """Hold the commands for a while; changes the condition in place.
 
@@ -172,24 +153,28 @@ class Plant:
             motor_voltage: motor command (V).
             regulator_voltage: regulator command (V).
             duration: how long (s).
-            period: if positive, write the state at every multiple of it (s) into
-            samples: array of shape (multiples, states).
+        Raises:
+            ValueError: a voltage out of 0-10 V, or a duration that is not positive.
         """
-        substeps = max(1, math.ceil(duration / self.step_limit - 1e-6))
-        self._module.advance(
+        check_voltages(motor_voltage, regulator_voltage)
+        if not 0.0 < duration < float("inf"):
+            raise ValueError(f"duration must be a positive time in s, got {duration!r}")
+        commands = (motor_voltage, regulator_voltage)
+        before = condition.commands or commands
+        jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
+        run = Run(
+            np.array([0.0, duration]),
+            np.full(2, motor_voltage, float),
+            np.full(2, regulator_voltage, float),
+            False,
+            self.table,
             condition.state,
-            motor_voltage,
-            motor_voltage,
-            regulator_voltage,
-            regulator_voltage,
-            condition.time,
-            duration,
-            substeps,
             condition.zero_contraction,
-            self.vector,
-            period,
-            samples,
+            first_size(condition.size, jump),
         )
+        simulate_all(self.program, [run])
+        condition.state[:] = run.states[1]
+        condition.size, condition.commands = run.size, commands
         condition.time += duration
 
     def observe(self, states: np.ndarray, zero_contraction: float) -> dict[str, np.ndarray]:
@@ -201,8 +186,10 @@ class Plant:
         Returns:
             contraction, rotation, load, pressure and extension (SI), shape (rows,) each.
         """
+        states = np.ascontiguousarray(states, float)
         out = np.empty((states.shape[0], len(OUTPUTS)))
-        self._module.observe(states, 0.0, 0.0, zero_contraction, self.vector, out)
+        addresses = (a.ctypes.data for a in (self.vector, out))
+        self.program.observe(len(states), states.ctypes.data, zero_contraction, *addresses)
         truth = {name: out[:, i] for i, name in enumerate(OUTPUTS)}
         truth["extension"] = zero_contraction - truth["contraction"]
         return truth
@@ -214,8 +201,6 @@ class Plant:
         regulator_voltage: np.ndarray,
         joined: bool = True,
         condition: Condition | None = None,
-        period: float = 0.0,
-        samples: np.ndarray = NO_SAMPLES,
     ) -> tuple[np.ndarray, float]:
         """States at each time under given commands.
 
@@ -225,29 +210,23 @@ class Plant:
             regulator_voltage: regulator commands (V), shape (n,).
             joined: join commands linearly between times; else hold each until the next.
             condition: where to begin; settled at the first commands if not given.
-            period: as `step`.
-            samples: as `step`.
         Returns:
             States of shape (n, states) and the contraction x0 that extension counts from (m).
         """
         first = condition or self.settle(
             float(motor_voltage[0]), regulator_voltage=float(regulator_voltage[0])
         )
-        states = np.empty((len(time), len(self.states)))
-        self._module.simulate(
-            np.ascontiguousarray(time, dtype=float),
-            np.ascontiguousarray(motor_voltage, float),
-            np.ascontiguousarray(regulator_voltage, float),
+        run = Run(
+            np.asarray(time, float),
+            np.asarray(motor_voltage, float),
+            np.asarray(regulator_voltage, float),
             joined,
-            self.step_limit,
-            first.state.copy(),
+            self.table,
+            first.state,
             first.zero_contraction,
-            self.vector,
-            period,
-            samples,
-            states,
         )
-        return states, first.zero_contraction
+        simulate_all(self.program, [run])
+        return run.states, first.zero_contraction
 
     def simulate(
         self, trial: Trial, noise: bool = True, seed: int | None = 0, joined: bool = True
@@ -313,10 +292,31 @@ class Plant:
         return not valid.lowest <= pressure <= valid.highest
 
 
-def _written(model: Model) -> tuple[str, Equations]:
-    """The model's equations, and their text as a module."""
-    plant = PLANTS[model.plant]
-    equations = Equations(effects=model.effects)
-    plant.write_equations(equations)
-    text = module_text(equations, plant.OUTPUTS, model.lengths(), plant.FIRST_PARTS)
-    return text, equations
+def regulator_voltage(model: Model, pressure: float) -> float:
+    """Regulator voltage (V) of a model that settles at a pressure (Pa).
+
+    Raises:
+        ValueError: if the regulator would need less than 0 or more than 10 V.
+    """
+    line = model.parameters["regulator_line"]
+    voltage = (pressure - line.offset) / line.gain
+    if not 0.0 <= voltage <= 10.0:
+        low, high = max(0.0, line.offset), 10.0 * line.gain + line.offset
+        raise ValueError(
+            f"pressure must lie in {low / 1e3:g} to {high / 1e3:g} kPa, what the regulator "
+            f"reaches with 0-10 V; got {pressure / 1e3:g} kPa; give another pressure, or a model "
+            "whose regulator reaches it"
+        )
+    return voltage
+
+
+def check_voltages(motor_voltage: float, regulator_voltage: float) -> None:
+    """Refuse commands that no drive or regulator takes.
+
+    Raises:
+        ValueError: names the command, what came, and what may.
+    """
+    for name, voltage in (("motor", motor_voltage), ("regulator", regulator_voltage)):
+        # `not <=`: NaN is out of every range.
+        if not 0.0 <= voltage <= 10.0:
+            raise ValueError(f"{name}_voltage must lie in 0 to 10 V, got {voltage!r}")

@@ -1,5 +1,7 @@
 """What the DAQ logs: lagged signals plus noise, through the calibrations, quantised."""
 
+from typing import Any
+
 import numpy as np
 
 from pma_gym.data import calibration
@@ -43,9 +45,21 @@ def read(lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray) -> np.ndar
     Returns:
         Readings in SI, quantised to whole steps of the DAQ and held to its range.
     """
-    noisy = lagged + levels * normals
-    volts = noisy * _GAINS + _OFFSETS
-    return (calibration.quantise(volts) - _OFFSETS) / _GAINS
+    return reading(lagged, levels, normals, _GAINS, _OFFSETS)
+
+
+def reading(lagged: Any, level: Any, normal: Any, gain: Any, offset: Any) -> Any:  # noqa: ANN401
+    """One sensor's reading, of numbers, arrays or traced values.
+
+    Args:
+        lagged: what the sensor holds (SI).
+        level: standard deviation of its noise (SI).
+        normal: standard normal number.
+        gain: of its calibration (V per SI).
+        offset: of its calibration (V).
+    """
+    volts = (lagged + level * normal) * gain + offset
+    return (calibration.quantise(volts) - offset) * (1.0 / gain)
 
 
 def measure(

@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.optimize import root_scalar
+
+from pma_gym.plant.program import parameter_names
 
 if TYPE_CHECKING:
     from pma_gym.plant.plant import Plant
@@ -25,34 +26,91 @@ def at_rest(
     Raises:
         ValueError: no contraction within twice the limits balances the load.
     """
-    search = _Search(plant, (motor_voltage, regulator_voltage))
+    commands = np.array([motor_voltage], float), np.array([regulator_voltage], float)
+    search = _search(plant, *commands, None)
+    if search.unbalanced:
+        raise ValueError(f"model {plant.model.name}: {search.unbalanced}")
+    return search.state[0], float(search.zero[0])
+
+
+def all_at_rest(
+    plant: "Plant",
+    motor_voltages: np.ndarray,
+    regulator_voltages: np.ndarray,
+    vectors: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Many plants of one structure at rest, as `at_rest` one; none depends on the others.
+
+    Args:
+        plant: one of them.
+        motor_voltages: motor commands (V), shape (n,).
+        regulator_voltages: regulator commands (V), shape (n,).
+        vectors: parameters of each (`program.vector`), shape (n, numbers); the plant's own if not
+            given.
+    Returns:
+        State vectors, shape (n, states), and contractions x0 (m), shape (n,); NaN where no
+        contraction balances the load.
+    """
+    search = _search(plant, motor_voltages, regulator_voltages, vectors)
+    return search.state, search.zero
+
+
+def _search(
+    plant: "Plant",
+    motor_voltages: np.ndarray,
+    regulator_voltages: np.ndarray,
+    vectors: np.ndarray | None,
+) -> "_Search":
+    search = _Search(plant, motor_voltages, regulator_voltages, vectors)
     search.relax("pressure")
     find = _station if plant.model.plant == "station" else _cascade
     find(search)
     for name in plant.states:
         if name.startswith("lag_"):
             search.relax(name)
-    return search.state, search.zero
+    return search
 
 
 class _Search:
-    """A state on its way to rest; x0 is 0 until it is known."""
+    """States on their way to rest, shape (n, states); x0 of shape (n,) is 0 until it is known."""
 
-    def __init__(self, plant: "Plant", commands: tuple[float, float]) -> None:
-        self.plant, self.commands = plant, commands
-        self.state, self.zero = np.zeros(len(plant.states)), 0.0
+    def __init__(
+        self,
+        plant: "Plant",
+        motor: np.ndarray,
+        regulator: np.ndarray,
+        vectors: np.ndarray | None,
+    ) -> None:
+        self.plant = plant
+        self.names = {name: i for i, name in enumerate(plant.states)}
+        self.vectors = None if vectors is None else np.ascontiguousarray(vectors, float)
+        # Motor and regulator command, x0.
+        self.inputs = np.stack([motor, regulator, np.zeros(len(motor))], axis=1).astype(float)
+        self.state = np.zeros((len(motor), len(self.names)))
+        self.unbalanced = ""
 
-    def __getitem__(self, name: str) -> float:
-        return float(self.state[self.plant.states.index(name)])
+    @property
+    def zero(self) -> np.ndarray:
+        return self.inputs[:, 2]
 
-    def __setitem__(self, name: str, value: float) -> None:
-        self.state[self.plant.states.index(name)] = value
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.state[:, self.names[name]]
 
-    def rate(self, name: str, zero: float | None = None) -> float:
-        """Rate of a state."""
-        zero = self.zero if zero is None else zero
-        rates = self.plant.derivative(self.state, *self.commands, zero)
-        return float(rates[self.plant.states.index(name)])
+    def __setitem__(self, name: str, value: np.ndarray | float) -> None:
+        self.state[:, self.names[name]] = value
+
+    def rate(self, name: str, zero: np.ndarray | None = None) -> np.ndarray:
+        """Rate of a state, shape (n,)."""
+        inputs = self.inputs
+        if zero is not None:
+            inputs = inputs.copy()
+            inputs[:, 2] = zero
+        numbers = self.plant.vector if self.vectors is None else self.vectors
+        stride = 0 if self.vectors is None else self.vectors.shape[1]
+        out = np.empty_like(self.state)
+        states, commands, vectors = (a.ctypes.data for a in (self.state, inputs, numbers))
+        self.plant.program.derivative(len(out), states, commands, vectors, stride, out.ctypes.data)
+        return out[:, self.names[name]]
 
     def relax(self, name: str, of: str = "") -> None:
         """Put a state where a rate vanishes that is linear in it: its own, or that `of` another."""
@@ -66,24 +124,98 @@ class _Search:
         for _ in range(3):
             self[name] -= self.rate(of or name) / slope
 
+    def parameters(self, effect: str) -> dict[str, np.ndarray]:
+        """An effect's parameters, one each or one for all."""
+        return _columns(self.plant, self.vectors, effect)
+
+    def force(self, contraction: np.ndarray) -> np.ndarray:
+        """Force of the muscle (N) at a contraction (m), without the cable, shape (n,)."""
+        # With the zero at the contraction itself the cable is slack.
+        self["contraction"] = contraction
+        return self.parameters("slide")["mass"] * self.rate("velocity", zero=contraction)
+
 
 def _cascade(search: _Search) -> None:
-    search.relax("servo", of="servo_rate" if "servo_rate" in search.plant.states else "servo")
+    plant = search.plant
+    search.relax("servo", of="servo_rate" if "servo_rate" in search.names else "servo")
     search["extension"] = search["servo"]
-    truth = search.plant.observe(search.state[None, :], 0.0)
-    search.zero = float(truth["contraction"][0]) + search["extension"]
+    truth = np.empty((len(search.state), len(plant.outputs)))
+    for i, (state, out) in enumerate(zip(search.state, truth, strict=True)):
+        numbers = plant.vector if search.vectors is None else search.vectors[i]
+        addresses = (a.ctypes.data for a in (numbers, out))
+        plant.program.observe(1, state.ctypes.data, 0.0, *addresses)
+    search.zero[:] = truth[:, plant.outputs.index("contraction")] + search["extension"]
 
 
 def _station(search: _Search) -> None:
-    plant = search.plant
-    force = static_force(plant, search.state)
-    search.zero = _balance(plant, force, 0.0)
+    search.zero[:] = _balance(search, np.zeros(len(search.state)))
+    search["contraction"] = search.zero
     # With the zero at the contraction itself the cable is slack: the rotor shows the drive's load.
-    rotor = plant.model.parameters["rotor"]
-    load = search.rate("spin", zero=search["contraction"]) * rotor.inertia / rotor.radius
-    search["contraction"] = _balance(plant, force, load) if load > 0.0 else search.zero
-    if load > 0.0:
-        search["angle"] = _taut_angle(search, load)
+    rotor = search.parameters("rotor")
+    load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
+    search["contraction"] = _balance(search, np.maximum(load, 0.0))
+    search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+
+
+def _balance(search: _Search, loads: np.ndarray) -> np.ndarray:
+    """Contractions (m) at which the muscles balance loads (N); NaN where none does."""
+    limits = search.parameters("limits")
+    low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
+    at_low, at_high = search.force(low), search.force(high)
+    found = balances(search.plant, search["pressure"], loads, search.vectors)
+    found = np.where((loads == 0.0) & (at_low == 0.0) & (at_high == 0.0), 0.0, found)
+    outside = ~((at_low - loads) * (at_high - loads) <= 0.0)
+    if np.any(outside):
+        ends = np.broadcast_to(1e3 * low, outside.shape), np.broadcast_to(1e3 * high, outside.shape)
+        numbers = [column[outside][0] for column in (*ends, loads, at_low, at_high)]
+        search.unbalanced = search.unbalanced or (
+            "no contraction between {:g} and {:g} mm balances a load of {:.4g} N (the muscle gives "
+            "{:.4g} to {:.4g} N there); lower the first motor voltage or raise the pressure"
+        ).format(*numbers)
+    return np.where(outside, np.nan, found)
+
+
+def _taut_angles(search: _Search, loads: np.ndarray) -> np.ndarray:
+    """Angles at which the cables carry the loads (N) that the drives ask for."""
+    rotor, cable = search.parameters("rotor"), search.parameters("cable")
+    extension = search.zero - search["contraction"]
+
+    def torque(angles: np.ndarray) -> np.ndarray:
+        search["angle"] = angles
+        return search.rate("spin")
+
+    furthest = extension + cable["slack"] + 2.0 * loads / cable["stiffness"]
+    return _roots(torque, extension / rotor["radius"], furthest / rotor["radius"])
+
+
+def _roots(
+    function: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Zeros of a function that falls between two ends: regula falsi that halves what stands still.
+
+    Each row stops by itself, so that its bits do not depend on the others.
+    """
+    at_low, at_high = function(low), function(high)
+    found, done = high, np.zeros(low.shape, bool)
+    for _ in range(_MOST_SECANTS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            middle = high - at_high * (high - low) / (at_high - at_low)
+        middle = np.where((middle >= low) & (middle <= high), middle, 0.5 * (low + high))
+        value = function(middle)
+        near = np.abs(middle - found) <= 1e-15 + 1e-14 * np.abs(middle)
+        found = np.where(done, found, middle)
+        done = done | near | ~(value != 0.0) | np.isnan(value)
+        if np.all(done):
+            break
+        above = value > 0.0
+        # An end that stays where it is counts half the next time.
+        at_high = np.where(above, 0.5 * at_high, value)
+        at_low = np.where(above, value, 0.5 * at_low)
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return found
+
+
+_MOST_SECANTS = 200
 
 
 def static_force(plant: "Plant", state: np.ndarray) -> Callable[[float], float]:
@@ -100,34 +232,64 @@ def static_force(plant: "Plant", state: np.ndarray) -> Callable[[float], float]:
     return force
 
 
-def _balance(plant: "Plant", force: Callable[[float], float], load: float) -> float:
-    """Contraction (m) at which the muscle balances a load (N)."""
-    limits = plant.model.parameters["limits"]
-    low, high = -2.0 * limits.stretch, 2.0 * limits.contraction
-    if load == 0.0 and force(low) == force(high) == 0.0:
-        return 0.0
-    if (force(low) - load) * (force(high) - load) > 0.0:
-        raise ValueError(
-            f"model {plant.model.name}: no contraction between {low * 1e3:g} and {high * 1e3:g} mm "
-            f"balances a load of {load:.4g} N (the muscle gives {force(low):.4g} to "
-            f"{force(high):.4g} N there); lower the first motor voltage or raise the pressure"
-        )
-    return _root(lambda contraction: force(contraction) - load, low, high)
+def balances(
+    plant: "Plant", pressures: np.ndarray, loads: np.ndarray, vectors: np.ndarray | None = None
+) -> np.ndarray:
+    """Contraction (m) at which the muscle balances each load (N) at each pressure (Pa).
+
+    Args:
+        plant: a station.
+        pressures: shape (n,).
+        loads: shape (n,).
+        vectors: parameters of each, shape (n, numbers); the plant's own if not given.
+    Returns:
+        Shape (n,); an end of the bracket of twice the limits where nothing balances.
+    """
+    pressures, loads = (np.ascontiguousarray(a, float) for a in (pressures, loads))
+    numbers = plant.vector if vectors is None else np.ascontiguousarray(vectors, float)
+    stride = 0 if vectors is None else numbers.shape[1]
+    out = np.empty(len(pressures))
+    addresses = (a.ctypes.data for a in (pressures, loads, numbers))
+    plant.program.balance(len(out), *addresses, stride, out.ctypes.data)
+    return out
 
 
-def _taut_angle(search: _Search, load: float) -> float:
-    """Angle at which the cable carries the load (N) that the drive asks for."""
-    rotor, cable = (search.plant.model.parameters[name] for name in ("rotor", "cable"))
-    extension = search.zero - search["contraction"]
+def at_no_load(
+    plant: "Plant", pressures: np.ndarray, vectors: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Stations at rest with 0 V on the motor, many at once.
 
-    def torque(angle: float) -> float:
-        search["angle"] = angle
-        return search.rate("spin")
+    Args:
+        plant: a plant of their structure.
+        pressures: gauge pressures (Pa), shape (n,).
+        vectors: parameters of each, shape (n, numbers); the plant's own if not given.
+    Returns:
+        State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the cable
+        does not hang slack at 0 V, or a muscle finds no balance: `Plant.settle` knows those.
+    """
+    if plant.model.plant != "station":
+        return None
+    limits, drive = (_columns(plant, vectors, effect) for effect in ("limits", "drive"))
+    zero = balances(plant, pressures, np.zeros(len(pressures)), vectors)
+    low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
+    inside = (zero > low + 1e-6) & (zero < high - 1e-6)
+    if not (np.all(inside) and np.all(drive["offset"] <= 0.0)):
+        return None
+    states = np.zeros((len(pressures), len(plant.states)))
+    for name, value in {
+        "contraction": zero,
+        "pressure": pressures,
+        "lag_lvdt": zero,
+        "lag_pressure_transducer": pressures,
+    }.items():
+        if name in plant.states:
+            states[:, plant.states.index(name)] = value
+    return states, zero
 
-    furthest = extension + cable.slack + 2.0 * load / cable.stiffness
-    return _root(torque, extension / rotor.radius, furthest / rotor.radius)
 
-
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    found = root_scalar(function, method="brentq", bracket=(low, high), xtol=1e-15, rtol=1e-14)
-    return float(found.root)
+def _columns(plant: "Plant", vectors: np.ndarray | None, effect: str) -> dict[str, np.ndarray]:
+    """An effect's parameters, one each or one for all."""
+    numbers = plant.vector[None, :] if vectors is None else vectors
+    names = parameter_names(plant.model)
+    fields = plant.model.parameters[effect]._fields
+    return {field: numbers[:, 1 + names.index(f"{effect}.{field}")] for field in fields}

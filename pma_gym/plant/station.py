@@ -21,38 +21,54 @@ PORTS: dict[str, Port] = {
     "drive": Port("load that the drive asks for (N)", least=1, most=1),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
-    "regulator_pace": Port("factor on the regulator's time constant, multiplied"),
+    "regulator_pace": Port("factor on the regulator's rate, multiplied"),
 }
 """Ports of the station: how many effects each takes, and what becomes of their results."""
 
 PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
 """Effects of port `part` that the station reads itself and cannot do without."""
 
-OUTPUTS: dict[str, str] = {
-    "contraction": "contraction",
-    "rotation": "angle",
-    "load": "cable_tension",
-    "pressure": "pressure",
-}
-"""True outputs by name: the text of each, in terms of the equations' variables."""
+POSITIONS: dict[str, float] = {"contraction": 0.001, "angle": 0.001}
+"""States that are asked for more exactly than the others, and their tolerance beside theirs: dry
+friction turns an error of 1 nm into one of a ten-thousandth of its force."""
 
-FIRST_PARTS = 1
-"""Parts of the first internal step after a command: nothing here is faster than the step."""
+SCALES: dict[str, float] = {
+    "contraction": 25e-3,
+    "velocity": 0.1,
+    "angle": 1.0,
+    "spin": 4.0,
+    "pressure": 500e3,
+    "rotation": 1.0,
+    "load": 500.0,
+}
+"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+
+
+TURNING_M, TIGHTENING_M = 2e-10, 1e-8
+"""Ways (m) by which a step may miss where the slide turns, and where the cable tightens."""
 
 
 def write_equations(equations: Equations) -> None:
     """Write the balance of the station, with the model's effects at its ports."""
-    let = equations.let
-    let("load_command", equations.one("drive"))
-    let("pressure_command", equations.one("regulator_line"))
-    let("regulator_pace", equations.product("regulator_pace"))
-    let("stretch", "p_rotor.radius * angle + contraction - zero_contraction")
-    let("stretch_rate", "p_rotor.radius * spin + velocity")
-    let("cable_tension", equations.one("cable"))
-    let("muscle_force", equations.total("muscle_force"))
-    let("slide_force", equations.total("slide_force"))
-    let("resistance", equations.total("muscle_damping"))
-    _write_states(equations)
+    eq = equations
+    rotor = eq.parameters["rotor"]
+    eq.travelled = (eq["contraction"], eq["velocity"])
+    eq.let("load_command", eq.one("drive"))
+    eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("regulator_pace", eq.product("regulator_pace"))
+    eq.let("stretch", rotor.radius * eq["angle"] + (eq["contraction"] - eq["zero_contraction"]))
+    eq.let("stretch_rate", rotor.radius * eq["spin"] + eq["velocity"])
+    eq.let("cable_tension", eq.one("cable"))
+    eq.let("muscle_force", eq.total("muscle_force"))
+    eq.let("slide_force", eq.total("slide_force"))
+    eq.let("resistance", eq.total("muscle_damping"))
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "rotation": eq["angle"],
+        "load": eq["cable_tension"],
+        "pressure": eq["pressure"],
+    }
+    _write_states(eq)
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
@@ -63,21 +79,20 @@ def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
     ) ** 0.5
 
 
-def _write_states(equations: Equations) -> None:
-    add = equations.add_state
-    add("contraction", "velocity")
-    # Damping over mass is the fastest root, 5800 1/s: an explicit step would need 0.3 ms.
-    add(
-        "velocity",
-        "(muscle_force + slide_force - cable_tension) / p_slide.mass",
-        "resistance / p_slide.mass",
+def _write_states(eq: Equations) -> None:
+    rotor, slide = eq.parameters["rotor"], eq.parameters["slide"]
+    force = eq["muscle_force"] + eq["slide_force"] - eq["cable_tension"]
+    torque = rotor.radius * (eq["load_command"] - eq["cable_tension"])
+    eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
+    eq.add_state(
+        "velocity", (force - eq["resistance"] * eq["velocity"]) / slide.mass, SCALES["velocity"]
     )
-    add("angle", "spin")
-    add(
-        "spin",
-        "p_rotor.radius * (load_command - cable_tension) / p_rotor.inertia",
-        "p_rotor.damping / p_rotor.inertia",
-    )
-    equations.add_rate("pressure", equations.one("regulator_lag"))
-    equations.add_memories(("muscle_force", "slide_force", "cable", "drive"))
-    equations.add_sensors(OUTPUTS)
+    eq.add_state("angle", eq["spin"], SCALES["angle"])
+    eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / rotor.inertia, SCALES["spin"])
+    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
+    eq.add_memories(("muscle_force", "slide_force", "cable", "drive"))
+    eq.add_sensors(SCALES)
+    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
+    for effect in eq.at("cable"):
+        if effect.switch:
+            eq.add_switch("tightness", eq.call(effect, effect.switch), TIGHTENING_M)

@@ -1,16 +1,15 @@
 """A plant written as equations, from the very text that is simulated."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
-from pma_gym.effects.effect import Parameters
-from pma_gym.plant.lanes import rebind
+from pma_gym.kernels.lanes import rebind
+from pma_gym.plant.notation import Names, Notation
 from pma_gym.plant.plant import Plant
 
 if TYPE_CHECKING:
     import sympy
-
-INPUTS = ("motor_voltage", "regulator_voltage", "zero_contraction")
 
 
 def symbolic(plant: Plant) -> "dict[str, sympy.Expr]":
@@ -23,51 +22,56 @@ def symbolic(plant: Plant) -> "dict[str, sympy.Expr]":
     Returns:
         SymPy expression of every state's rate, by the state's name. Symbols are the states, the
         commands, zero_contraction, and parameters as effect.name (SI). A row that is interpolated
-        is a function effect_name of what it is interpolated at.
+        is a function effect_name of what it is interpolated at. A memory of the way travelled has
+        its slope along the way, times the velocity.
     """
     import sympy
 
-    rate = rebind(plant.plain.rate, _arithmetic())
-    states = [sympy.Symbol(name, real=True) for name in plant.states]
-    inputs = [sympy.Symbol(name, real=True) for name in INPUTS]
-    parameters = [_symbols(name, values) for name, values in plant.model.parameters.items()]
-    parts = iter(rate(*states, *inputs, *parameters))
-    rates = {}
-    for state in states:
-        source = next(parts)
-        rates[state.name] = source - next(parts) * state if state.name in plant.decaying else source
-    return rates
+    names = Names(lambda name: sympy.Symbol(name, real=True), sympy.sympify)
+    written = _Expressions(plant.model, names)
+    rates = {state.name: state.rate for state in written.states} | written.memory_rates()
+    return {name: rates[name] for name in plant.states}  # pyright: ignore[reportReturnType]
 
 
-def _arithmetic() -> dict:
-    """What the functions of `pma_gym.effects.arithmetic` are for SymPy."""
-    import sympy
+class _Expressions(Notation):
+    """Equations whose values are SymPy's."""
 
-    def interpolate(
-        value: sympy.Expr, knots: Sequence[sympy.Symbol], heights: Sequence[sympy.Symbol]
-    ) -> sympy.Expr:
-        row = heights[0].name.partition("[")[0].replace(".", "_")
-        return sympy.Function(row, real=True)(value)
+    @cached_property
+    def _arithmetic(self) -> dict[str, Callable]:
+        """What the functions of `pma_gym.effects.arithmetic` are for SymPy."""
+        import sympy
 
-    return {
-        "where": lambda condition, yes, no: sympy.Piecewise((yes, condition), (no, True)),
-        "positive": lambda value: sympy.Max(0, value),
-        "clip": lambda value, lower, upper: sympy.Min(sympy.Max(value, lower), upper),
-        "exponential": sympy.exp,
-        "interpolate": interpolate,
-    }
+        def interpolate(
+            value: "sympy.Expr", knots: Sequence["sympy.Symbol"], heights: Sequence["sympy.Symbol"]
+        ) -> "sympy.Expr":
+            row = heights[0].name.partition("[")[0].replace(".", "_")
+            return sympy.Function(row, real=True)(value)
 
+        return {
+            "where": lambda condition, yes, no: sympy.Piecewise((yes, condition), (no, True)),
+            "positive": lambda value: sympy.Max(0, value),
+            "clip": lambda value, lower, upper: sympy.Min(sympy.Max(value, lower), upper),
+            "exponential": sympy.exp,
+            "interpolate": interpolate,
+        }
 
-def _symbols(effect: str, values: Parameters) -> Parameters:
-    """The parameters of an effect, with a symbol for each number."""
-    import sympy
+    def apply(self, law: Callable, *arguments: Any) -> Any:  # noqa: ANN401
+        """The law's expression."""
+        return rebind(law, self._arithmetic)(*arguments)
 
-    symbols = {}
-    for name, value in values._asdict().items():
-        path = f"{effect}.{name}"
-        if isinstance(value, tuple):
-            row = (sympy.Symbol(f"{path}[{i}]", real=True) for i in range(len(value)))
-            symbols[name] = tuple(row)
-        else:
-            symbols[name] = sympy.Symbol(path, real=True)
-    return values._replace(**symbols)
+    def memory_rates(self) -> dict[str, Any]:
+        """Rates of the memories of the way travelled."""
+        import sympy
+
+        if not self.roads:
+            return {}
+        speed, travel = self.travelled[1], sympy.Symbol("travel", real=True)
+        direction = sympy.Piecewise((-1, speed < 0), (1, True))
+        # Choices as such: the derivative of Max or Min is a step function.
+        choices = {"where": self._arithmetic["where"]}
+        rates = {}
+        for name, effect in self.roads.items():
+            path = rebind(effect.path, choices)  # pyright: ignore[reportArgumentType]
+            after = path(self[name], travel, direction, self.parameters[effect.name])
+            rates[name] = sympy.diff(after, travel).subs(travel, 0) * speed
+        return rates

@@ -94,7 +94,7 @@ def test_json_says_what_it_was_made_with(document):
     assert document["suite"]["seed"] == load_suite().seed
     assert document["suite"]["selected"] is True
     run = document["run"]
-    assert set(run["versions"]) == {"python", "numpy", "scipy", "numba", "gymnasium", "pma_gym"}
+    assert set(run["versions"]) == {"python", "numpy", "scipy", "llvmlite", "gymnasium", "pma_gym"}
     assert set(run["git"]) == {"commit", "dirty"}
     assert run["wall_time_s"] > 0 and run["environment_steps_per_second"] > 0
     assert {target["verdict"] for target in document["targets"]} <= {"met", "missed", "no figure"}

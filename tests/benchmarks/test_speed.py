@@ -205,4 +205,4 @@ def test_the_page_takes_its_figures_from_a_whole_run(tmp_path, monkeypatch):
     assert "| CartPole-v1 | 20 ms; 4 states, one Euler step | 100 | 0 % |" in found
     assert f"<!-- figures: batches -->\n\n{page.ABSENT}" in found
     assert page.refreshed(found, json.loads(path.read_text())) == found
-    assert set(re.findall(r"figures: (\w+)", text)) >= {"setting", "ratios", "substeps", "absent"}
+    assert set(re.findall(r"figures: (\w+)", text)) >= {"setting", "ratios", "tolerances", "absent"}

@@ -1,20 +1,19 @@
 """Every effect of the catalogue: one text, honest units, exactly absent at its neutral value."""
 
 import math
-import sys
-import types
 from functools import cache
 
-import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numba.extending import register_jitable
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals
+from pma_gym.kernels.graph import CHANGING, Graph
+from pma_gym.kernels.text import evaluate
+from pma_gym.kernels.trace import trace
 from pma_gym.plant import cascade, station
 from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model, load_model, shipped_models
@@ -35,6 +34,8 @@ SIGNALS = {
     "displacement": (0.0, 0.05),
     "displacement_rate": (-0.2, 0.2),
     "signal": (-0.01, 500e3),
+    "travel": (0.0, 30e-6),
+    "direction": (1.0, 1.0),
 }
 """Ranges of what laws are given (SI)."""
 
@@ -71,26 +72,39 @@ def one_row(given, row):
     return [value if isinstance(value, tuple) else float(value[row]) for value in given]
 
 
-def compiled(law):
-    """The law as numba compiles it in a plant."""
-    for name in (law.__module__, exponential.__module__):
-        for function in vars(sys.modules[name]).values():
-            if isinstance(function, types.FunctionType) and function.__module__ == name:
-                register_jitable(error_model="numpy")(function)
-    return numba.njit(error_model="numpy")(law)
+def traced(law, given):
+    """What the law gives for arrays once it is a graph, one row an output."""
+    graph, arguments, numbers = Graph(), [], {}
+    for name, value in zip(signals(law), given, strict=True):
+        if isinstance(value, tuple):
+            arguments.append(graph.inputs(name, value))
+            for field, number in value._asdict().items():
+                row = number if isinstance(number, tuple) else ()
+                numbers |= {f"{name}.{field}[{i}]": n for i, n in enumerate(row)}
+                numbers[f"{name}.{field}"] = number
+        else:
+            arguments.append(graph.input(name, CHANGING))
+            numbers[name] = value
+    found = trace(law, *arguments)
+    parts = found if isinstance(found, tuple) else (found,)
+    return evaluate([graph.value(part) for part in parts], numbers)
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
 def test_one_text_gives_one_number(effect, law):
     given = arguments(effect, law, 64)
     plain = [law(*one_row(given, row)) for row in range(64)]
-    fast = compiled(law)
-    assert [fast(*one_row(given, row)) for row in range(64)] == plain
     together = lanes(law)(*given)
     parts = together if isinstance(together, tuple) else (together,)
-    for part, expected in zip(parts, np.reshape(plain, (64, -1)).T, strict=True):
-        scale, found = np.abs(expected).max(), np.broadcast_to(part, 64)
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12 * scale)
+    # Compiled code has the bits of the graph: `tests/kernels`.
+    for part, found, expected in zip(
+        parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True
+    ):
+        scale = np.abs(expected).max()
+        for value in (part, found):
+            np.testing.assert_allclose(
+                np.broadcast_to(value, 64), expected, rtol=1e-12, atol=1e-12 * scale
+            )
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
@@ -155,9 +169,37 @@ ADDED = [
 ]
 
 
+SHIPPED = load_model("serres2008")
+KEPT = {name: p for name, p in SHIPPED.parameters.items() if name != "coulomb_friction"}
+BASE = Model("base", "", "station", KEPT)
+SENSORS = ("lvdt", "load_cell", "pressure_transducer", "potentiometer")
+
+
+def rates(model, states):
+    """Rates by name at states given by name; states that only this model has are at zero."""
+    plant = Plant(model)
+    found = {name: [] for name in plant.states}
+    for state in states:
+        values = np.array([state.get(name, 0.0) for name in plant.states])
+        rate = plant.derivative(values, state["motor"], state["regulator"], 0.04)
+        for name, value in zip(plant.states, rate, strict=True):
+            found[name].append(value)
+    return found
+
+
+def some_states(plant):
+    """States about rest, by name, with commands."""
+    rest, generator = plant.settle(2.0, 300e3), np.random.default_rng(5)
+    for _ in range(20):
+        moved = rest.state * (1.0 + 0.1 * generator.standard_normal(rest.state.shape))
+        moved += 1e-2 * generator.standard_normal(rest.state.shape)
+        commands = {"motor": generator.uniform(0, 10), "regulator": generator.uniform(2, 9)}
+        yield dict(zip(plant.states, moved, strict=True)) | commands
+
+
 def trajectory(model):
-    """States and outputs by name under a busy motor and regulator."""
-    plant, base = Plant(model, compiled=False), Plant(BASE, compiled=False)
+    """Outputs by name under a busy motor and regulator."""
+    plant, base = Plant(model), Plant(BASE)
     rest = base.settle(2.0, 300e3)
     settled = dict(zip(base.states, rest.state, strict=True))
     state = np.array([settled.get(name, 0.0) for name in plant.states])
@@ -165,13 +207,7 @@ def trajectory(model):
     regulator = np.array([5.4, 6.0, 6.0, 5.0, 5.0])
     start = Condition(state, rest.zero_contraction)
     states, zero = plant.run(0.02 * np.arange(5), motor, regulator, condition=start)
-    truth = plant.observe(states, zero)
-    return {name: states[:, i] for i, name in enumerate(plant.states)} | truth
-
-
-SHIPPED = load_model("serres2008")
-KEPT = {name: p for name, p in SHIPPED.parameters.items() if name != "coulomb_friction"}
-BASE = Model("base", "", "station", KEPT)
+    return plant.observe(states, zero)
 
 
 @pytest.fixture(scope="module")
@@ -179,24 +215,30 @@ def without():
     return trajectory(BASE)
 
 
+def assert_near(found, expected):
+    """Trajectories equal but for the steps, which an effect's own states may choose otherwise."""
+    for name, values in expected.items():
+        assert np.abs(found[name] - values).max() < 2e-5 * np.ptp(values), name
+
+
 @pytest.mark.parametrize("effect", ADDED, ids=lambda effect: effect.name)
 def test_an_effect_at_its_neutral_value_is_exactly_absent(effect, without):
-    rest = {name: p for name, p in KEPT.items() if name != effect.name}
-    found = trajectory(Model("with", "", "station", {**rest, effect.name: effect.neutral}))
-    expected = (
-        without if effect.name not in KEPT else trajectory(Model("less", "", "station", rest))
-    )
+    less = Model("less", "", "station", {n: p for n, p in KEPT.items() if n != effect.name})
+    more = Model("with", "", "station", {**less.parameters, effect.name: effect.neutral})
+    states = list(some_states(Plant(BASE)))
+    expected, found = rates(less, states), rates(more, states)
     for name, values in expected.items():
         np.testing.assert_array_equal(found[name], values, err_msg=name)
+    assert_near(trajectory(more), trajectory(less) if effect.name in KEPT else without)
 
 
 def test_a_sensor_does_not_disturb_the_plant(without):
-    names = ("lvdt", "load_cell", "pressure_transducer", "potentiometer")
-    bare = trajectory(
-        Model("bare", "", "station", {n: p for n, p in KEPT.items() if n not in names})
-    )
-    for name, values in bare.items():
-        np.testing.assert_array_equal(without[name], values)
+    bare = Model("bare", "", "station", {n: p for n, p in KEPT.items() if n not in SENSORS})
+    states = list(some_states(Plant(BASE)))
+    expected = rates(BASE, states)
+    for name, values in rates(bare, states).items():
+        np.testing.assert_array_equal(values, expected[name])
+    assert_near(trajectory(bare), without)
 
 
 @given(st.floats(-12.0, 12.0))

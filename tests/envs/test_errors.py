@@ -26,6 +26,8 @@ def refused(error: type[Exception], *words: str, **options) -> None:
         ([np.nan], ["finite", "[nan]", "diverged"]),
         ([np.inf], ["finite", "[inf]"]),
         (["fast"], ["shape (1,)", "['fast']"]),
+        ([True], ["shape (1,)", "[True]", "real numbers"]),
+        (np.array([0.1 + 0.2j]), ["shape (1,)", "0.1+0.2j", "real numbers"]),
         (None, ["shape (1,)", "None"]),
         ([[1.0], [1.0, 2.0]], ["shape (1,)", "[[1.0], [1.0, 2.0]]"]),
     ],

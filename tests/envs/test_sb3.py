@@ -2,6 +2,9 @@
 
 import gymnasium as gym
 import pytest
+
+pytest.importorskip("stable_baselines3")
+
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_checker import check_env
 

@@ -24,7 +24,9 @@ def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model
     regulator = np.full(201, plant.regulator_voltage(300e3))
     rest = plant.settle(0.0, pressure=300e3)
     expected, _ = plant.run(time, np.append(volts, 0.0), regulator, joined=False, condition=rest)
-    np.testing.assert_array_equal(states, expected)
+    # The same steps in other compiled code, which rounds in another order.
+    scale = np.abs(expected).max(axis=0)
+    assert np.all(np.abs(states - expected) <= 1e-10 * scale)
 
 
 @pytest.mark.parametrize(
@@ -131,8 +133,8 @@ def test_a_delayed_action_acts_so_many_whole_steps_later(make, steps):
         assert observation[6] == pytest.approx(volts[k] / 5.0 - 1.0)
         if k < steps:
             assert abs(info["extension_mm"]) < 1e-9
-    # `steps` steps of rest, then the same motion, up to the time itself.
-    np.testing.assert_allclose(late.condition.state, states[39 - steps], rtol=1e-9, atol=1e-9)
+    # `steps` steps of rest, then the same motion, up to rounding and what comes of it.
+    np.testing.assert_allclose(late.condition.state, states[39 - steps], rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("steps", [1, 4])

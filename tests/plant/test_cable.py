@@ -7,6 +7,7 @@ from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Condition, Plant
 
 FINE = 1e-5
+"""Time between rows (s), for impulses."""
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +50,7 @@ def test_dead_travel_is_the_slack(loose):
 
 
 def test_slackening_and_tightening_again_keep_the_momentum(loose):
-    plant = Plant(loose.model, FINE)
+    plant = Plant(loose.model, tolerance=1e-6)
     start = plant.settle(4.0, 300e3)
     begin, states, released = held(plant, start, 0.0, 0.15, 15001)
     assert released["load"][0] > 300.0
@@ -80,7 +81,8 @@ def test_a_cable_cannot_push():
     # The muscle lengthens by itself; the pulley has no reason to turn.
     assert truth["extension"][-1] > 0.01
     assert np.all(truth["load"] == 0.0)
-    assert np.all(truth["rotation"] == 0.0)
+    # But for the first step, whose Jacobian stands at the very point where the cable tightens.
+    assert np.all(np.abs(truth["rotation"]) < 1e-8)
 
 
 def test_the_drive_cannot_unwind():

@@ -1,12 +1,16 @@
-"""Dry friction of the slide: sticks, breaks away, slides, and is odd."""
+"""Dry friction of the slide: sticks, breaks away, slides, remembers its way, and is odd."""
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from pma_gym.effects.coulomb_friction import friction_force, friction_path
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Condition, Plant
 
-STATIC, DYNAMIC = 1.96, 1.47
+STATIC, DYNAMIC, PRESLIDING = 1.96, 1.47, 10e-6
+P = load_model("serres2008").parameters["coulomb_friction"]
 
 
 def bare(intercept=0.0, viscous=0.001):
@@ -28,14 +32,16 @@ def bare(intercept=0.0, viscous=0.001):
 
 
 def pushed(plant, when, force):
-    """Contraction, velocity and friction under a force (N) over time, from rest; cable far off."""
+    """Contraction, velocity, friction (N) under a force (N) over time, from rest; cable far off."""
     state = np.zeros(len(plant.states))
     state[plant.states.index("pressure")] = 100e3 * force[0]
     regulator = (100.0 * force + 20.4) / 59.9
     start = Condition(state, zero_contraction=1e3)
     states, _ = plant.run(when, np.zeros_like(when), regulator, condition=start)
     names = ("contraction", "velocity", "memory_coulomb_friction")
-    return [states[:, plant.states.index(name)] for name in names]
+    x, velocity, memory = (states[:, plant.states.index(name)] for name in names)
+    p = plant.model.parameters["coulomb_friction"]
+    return x, velocity, -friction_force(velocity, memory, p)
 
 
 def test_below_the_static_force_it_holds_for_a_minute():
@@ -59,13 +65,31 @@ def test_a_small_swing_of_the_load_does_not_walk_it_away():
     assert 0.0 < x[6000] - x[1000] < 50e-6
 
 
+def test_under_seven_tenths_of_the_static_force_it_is_a_spring():
+    when = np.linspace(0.0, 2.0, 2001)
+    force = 0.69 * STATIC * np.sin(np.pi * when)
+    # Pushed by a constant, so that the pressure stays above zero.
+    x, velocity, friction = pushed(bare(intercept=-3.0, viscous=0.1), when, force + 3.0)
+    spring = STATIC / PRESLIDING * x
+    creep = np.abs(velocity).max() / 5e-3
+    # But for the Stribeck share of the creeping speed, which is squared.
+    np.testing.assert_allclose(friction, spring, atol=STATIC * creep**2 + 1e-12)
+    assert creep < 0.01
+    # Forth, back and forth again: what is left is the delay by damping over stiffness, 0.5 ms,
+    # and the regulator's, 1 ms.
+    assert abs(x[-1]) < 6e-3 * np.abs(x).max()
+
+
 def test_it_breaks_away_at_the_static_force():
     when = np.linspace(0.0, 2.0, 2001)
     force = 1.2 * when
     x, _, friction = pushed(bare(viscous=0.1), when, force)
-    gone = force[int(np.argmax(x > 30e-6))]
-    assert gone == pytest.approx(STATIC, rel=0.02)
+    # The bristles give way over 1.3 presliding distances.
+    gone = force[int(np.argmax(x > 1.3 * PRESLIDING))]
+    assert gone == pytest.approx(STATIC, rel=0.01)
     assert friction.max() == pytest.approx(STATIC, rel=0.01)
+    assert x[force < 0.99 * STATIC].max() < 1.3 * PRESLIDING
+    assert x[-1] > 1e-3
 
 
 def test_while_sliding_it_is_the_dynamic_force():
@@ -98,3 +122,53 @@ def test_it_stops_what_slides_without_pushing_it_back():
     assert x.max() - x[-1] < 12e-6
     assert abs(velocity[-1]) < 1e-3
     assert np.abs(friction).max() < STATIC * 1.001
+
+
+def test_on_the_way_back_it_follows_the_laws_path():
+    plant = bare(intercept=-3.0, viscous=0.05)
+    when = np.linspace(0.0, 1.0, 20001)
+    force = 3.0 + 2.5 * np.sin(9.0 * when) + 0.9 * np.sin(70.0 * when)
+    state = np.zeros(len(plant.states))
+    state[plant.states.index("pressure")] = 100e3 * force[0]
+    start = Condition(state, zero_contraction=1e3)
+    regulator = (100.0 * force + 20.4) / 59.9
+    states, _ = plant.run(when, np.zeros_like(when), regulator, condition=start)
+    names = ("contraction", "velocity", "memory_coulomb_friction")
+    x, velocity, z = (states[:, plant.states.index(name)] for name in names)
+    turned = np.flatnonzero(np.diff(np.sign(velocity)) != 0)
+    assert len(turned) > 10
+    checked = 0
+    for first, last in zip(turned[:-1] + 1, turned[1:], strict=True):
+        # From each turning to the next in one go, over presliding and sliding alike.
+        direction = np.sign(velocity[first])
+        for at in range(first, last + 1, 7):
+            expected = friction_path(z[first], x[at] - x[first], direction, P)
+            assert z[at] == pytest.approx(expected, abs=1e-9)
+            checked += 1
+    assert checked > 1000
+    assert z.max() == 1.0 and z.min() == -1.0
+
+
+@given(st.floats(-1, 1), st.floats(0, 30), st.floats(0, 30), st.sampled_from([-1.0, 1.0]))
+def test_a_way_in_two_parts_is_the_way_in_one(memory, first, second, direction):
+    ways = [direction * 1e-6 * way for way in (first, second)]
+    once = friction_path(memory, ways[0] + ways[1], direction, P)
+    twice = friction_path(friction_path(memory, ways[0], direction, P), ways[1], direction, P)
+    assert twice == pytest.approx(once, abs=1e-7)
+    assert -1.0 <= once <= 1.0
+
+
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_the_path_is_a_line_then_a_parabola_then_full(direction):
+    def after(memory, micrometres):
+        return direction * friction_path(
+            direction * memory, direction * 1e-6 * micrometres, direction, P
+        )
+
+    assert after(0.0, 7.0) == pytest.approx(0.7)
+    assert after(-1.0, 10.0) == pytest.approx(0.0, abs=1e-15)
+    assert after(0.0, 10.0) == pytest.approx(0.7 + 0.3 - 0.075)
+    assert after(0.0, 13.0) == pytest.approx(1.0) == after(0.0, 1000.0) == after(-1.0, 23.0)
+    assert after(0.4, 0.0) == 0.4
+    # Loaded and unloaded under 0.7, forth and back on one line.
+    assert friction_path(friction_path(0.0, 5e-6, 1.0, P), -5e-6, -1.0, P) == 0.0

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sympy
 
-from benchmarks.accuracy import with_effect
+from benchmarks.limits import with_effect
 from pma_gym.plant.linear import linearize, operating_point
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -129,7 +129,7 @@ INERTIAL = with_effect(
 
 @pytest.mark.parametrize("model", ["serres2008", "station", "cascade", "schulz", INERTIAL])
 def test_the_equations_are_what_is_simulated(model):
-    plant = Plant(model, compiled=False)
+    plant = Plant(model)
     rates = symbolic(plant)
     assert list(rates) == plant.states
     evaluate, generator = numerical(plant, rates), np.random.default_rng(3)
@@ -145,10 +145,10 @@ def test_the_equations_are_what_is_simulated(model):
 
 
 def test_the_equations_read_well():
-    rates = symbolic(Plant("serres2008", compiled=False))
+    rates = symbolic(Plant("serres2008"))
     assert rates["contraction"] == sympy.Symbol("velocity", real=True)
     assert rates["spin"].has(sympy.Max)
-    cascade = symbolic(Plant("cascade", compiled=False))
+    cascade = symbolic(Plant("cascade"))
     assert "position_map_linear(pressure)" in str(cascade["servo"])
     assert not cascade["servo"].has(sympy.Symbol("position_map.linear[3]", real=True))
 

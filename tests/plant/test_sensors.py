@@ -88,7 +88,7 @@ def test_a_model_without_a_sensor_reads_the_truth():
     from pma_gym.plant.model import Model
 
     bare = Model("bare", "", "station", {name: full.parameters[name] for name in names})
-    plant = Plant(bare, compiled=False)
+    plant = Plant(bare)
     commands = {"motor_voltage": np.array([2.0, 3.0]), "regulator_voltage": np.full(2, 6.0)}
     run = plant.simulate(Trial(time=np.array([0.0, 0.05]), commands=commands), noise=False)
     np.testing.assert_array_equal(run.measurements["contraction"], run.truth["contraction"])

@@ -11,7 +11,7 @@ LAWS = sorted(set(shipped_models()) - {"serres2008", "station", "cascade"})
 
 @pytest.mark.parametrize("model", sorted(shipped_models()))
 def test_nothing_moves_at_rest(model):
-    plant = Plant(model, compiled=False)
+    plant = Plant(model)
     for pressure in (200e3, 314e3, 430e3, 575e3):
         for voltage in (0.0, 0.5, 2.0, 4.5):
             rest = plant.settle(voltage, pressure)
@@ -65,7 +65,7 @@ def test_what_no_muscle_balances_is_refused():
     with pytest.raises(ValueError, match=r"balances a load of 976\.4 N .*lower the first motor"):
         plant.settle(10.0, 50e3)
     with pytest.raises(ValueError, match="no contraction between -24 and 180 mm"):
-        Plant("schulte", compiled=False).settle(3.0, 0.0)
+        Plant("schulte").settle(3.0, 0.0)
     with pytest.raises(ValueError, match="what the regulator reaches with 0-10 V; got 900 kPa"):
         plant.settle(0.0, 900e3)
     with pytest.raises(ValueError, match="settle needs a pressure"):
@@ -75,7 +75,7 @@ def test_what_no_muscle_balances_is_refused():
 @pytest.mark.parametrize("model", LAWS)
 def test_each_law_of_the_literature_settles_and_moves_stably(model):
     loaded = load_model(model)
-    plant = Plant(loaded, compiled=False)
+    plant = Plant(loaded)
     for pressure in (200e3, 300e3, 400e3, 575e3):
         rest = plant.settle(0.0, pressure)
         zero = rest.zero_contraction

@@ -5,17 +5,44 @@ A row whose part does not exist says so by `Missing` and is left out by name.
 
 from typing import Any
 
-from benchmarks.speed.loops import Missing, Prepared
+import gymnasium as gym
+import numpy as np
+
+from benchmarks.speed.loops import ACTIONS, Missing, Prepared
+from pma_gym.envs import ENVIRONMENTS
+from pma_gym.envs.engine import Engine
+from pma_gym.plant.plant import Plant
+
+EVALUATIONS = 4
+"""Evaluations of the right-hand side in an attempt at an internal step: three stages, and one with
+its Jacobian where the step begins."""
+
+WATCHED = 64
+"""Control steps over which evaluations are counted, fewer of large batches."""
+
+_counted: dict[int, float] = {}
 
 
 def right_hand_sides_per_step(environment: Any) -> float:  # noqa: ANN401 - single or vector
-    """Evaluations of the right-hand side in a control step, a mean where steps differ.
+    """Evaluations of the right-hand side in a control step: a mean, for steps differ.
+
+    Counted while the environment goes on under random actions; idle lanes of a register count.
 
     Args:
         environment: the environment that was measured, unwrapped.
     """
-    # 100 internal steps of 0.1 ms, four stages each.
-    return 400.0
+    engine: Engine = getattr(environment, "engine", None) or environment._engine
+    if id(engine) not in _counted:
+        generator, attempts = np.random.default_rng(1), 0
+        shape, watched = environment.action_space.shape, max(2, min(WATCHED, 65536 // engine.count))
+        environment.reset()
+        for _ in range(watched):
+            environment.step(generator.uniform(-1.0, 1.0, shape).astype(np.float32))
+            attempts += engine.attempts
+        environment.reset()
+        each = EVALUATIONS * attempts * engine.width / (watched * engine.count)
+        _counted[id(engine)] = each
+    return _counted[id(engine)]
 
 
 def single_kernel(name: str) -> Prepared:
@@ -24,7 +51,21 @@ def single_kernel(name: str) -> Prepared:
     Args:
         name: the environment's id.
     """
-    raise Missing("this version has no compiled control step")
+    environment: Any = gym.make(name).unwrapped
+    environment.reset(seed=0)
+    engine: Engine = environment._engine
+    run, arguments = engine.call
+    entry = memoryview(engine.actions[0])
+    actions = np.random.default_rng(0).uniform(-1.0, 1.0, ACTIONS).tolist()
+
+    def chunk() -> int:
+        for action in actions:
+            entry[0] = action
+            if run(arguments):
+                environment.reset()
+        return len(actions)
+
+    return Prepared(chunk)
 
 
 def joint_fits(candidates: int, trials: int, seconds: float) -> Prepared:
@@ -35,7 +76,19 @@ def joint_fits(candidates: int, trials: int, seconds: float) -> Prepared:
         trials: number of trials that each is fitted to.
         seconds: length of a trial (s).
     """
-    raise Missing("this version has no fitting kernel")
+    from benchmarks.speed import fits
+
+    models = fits.CANDIDATES[:candidates]
+    for candidate in models:
+        Plant(candidate.model())
+    logged = fits.trials(trials, seconds)
+
+    def chunk() -> int:
+        for candidate in models:
+            fits.fit(candidate.model(), logged, candidate.free, threads=fits.THREADS)
+        return 1
+
+    return Prepared(chunk)
 
 
 def gpu(name: str, count: int, precision: str) -> Prepared:
@@ -46,4 +99,10 @@ def gpu(name: str, count: int, precision: str) -> Prepared:
         count: number of environments.
         precision: `float32` or `float64`.
     """
-    raise Missing("no GPU here")
+    from benchmarks.speed.gpu import prepare
+    from pma_gym.kernels.driver import GpuError
+
+    try:
+        return prepare(ENVIRONMENTS[name], count, precision)
+    except GpuError as error:
+        raise Missing(str(error)) from error

@@ -1,7 +1,9 @@
 """do-mpc's simulator on the station, its laws as CasADi expressions of the same text."""
 
 # pyright: reportMissingImports=false
+import operator
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import casadi
@@ -10,32 +12,51 @@ from numpy.typing import NDArray
 
 from benchmarks.speed.loops import EPISODE, Prepared
 from benchmarks.speed.workers.same_plant import PERIOD, PRESSURE, plant, prepared
-from pma_gym.plant.lanes import rebind
+from pma_gym.kernels.trace import order
+from pma_gym.plant.program import parameter_names
 
 PACKAGES = ("do_mpc", "casadi", "numpy")
 
 TOLERANCE = 1e-6
 """Relative tolerance of CVODES; the absolute one is a thousandth of it."""
 
-_ARITHMETIC = {
-    "where": casadi.if_else,
-    "exponential": casadi.exp,
+_OPERATIONS: dict[str, Callable] = {
+    "add": operator.add,
+    "subtract": operator.sub,
+    "multiply": operator.mul,
+    "divide": operator.truediv,
+    "negative": operator.neg,
+    "absolute": casadi.fabs,
+    "square_root": casadi.sqrt,
+    "floor": casadi.floor,
+    "less": operator.lt,
+    "less_equal": operator.le,
+    "equal": operator.eq,
+    "not_equal": operator.ne,
+    "and": casadi.logic_and,
+    "or": casadi.logic_or,
+    "not": casadi.logic_not,
+    "select": casadi.if_else,
 }
-"""What the functions of `pma_gym.effects.arithmetic` are for CasADi."""
+"""What traced arithmetic is for CasADi."""
 
 
 def rates(states: dict[str, casadi.SX], motor: casadi.SX) -> list[casadi.SX]:
     """The rate of every state of the station, for CasADi's symbols of state and voltage (V)."""
     station = plant()
-    zero, regulator = station.settle(0.0, PRESSURE).zero_contraction, station.regulator_voltage
-    law = rebind(station.plain.rate, _ARITHMETIC)
-    given = station.model.parameters.values()
-    parts = iter(law(*states.values(), motor, regulator(PRESSURE), zero, *given))
-    found = []
-    for name, state in states.items():
-        source = next(parts)
-        found.append(source - next(parts) * state if name in station.decaying else source)
-    return found
+    numbers = zip(parameter_names(station.model), station.model.vector().tolist(), strict=True)
+    given: dict[str, Any] = {**dict(numbers), **states, "motor_voltage": motor}
+    given["regulator_voltage"] = station.regulator_voltage(PRESSURE)
+    given["zero_contraction"] = station.settle(0.0, PRESSURE).zero_contraction
+    wanted = station.program.rates()
+    found: dict[int, Any] = {}
+    for value in order(wanted):
+        if value.operands:
+            parts = [found[part.id] for part in value.operands]
+            found[value.id] = _OPERATIONS[value.operation](*parts)
+        else:
+            found[value.id] = value.data if value.is_constant else given[value.data]
+    return [found[value.id] for value in wanted]
 
 
 def simulator() -> Prepared:

@@ -11,7 +11,6 @@ import numpy as np
 
 import pma_gym.envs  # noqa: F401 - registers the environments
 from benchmarks.accuracy import (
-    CONTROL_PERIOD,
     Commands,
     Error,
     demanding_commands,
@@ -60,10 +59,11 @@ def batch(name: str, count: int, threads: int, held: bool = False) -> Prepared:
     return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
 
 
-def substeps(model: str, count: int) -> Prepared:
-    """Control steps of the plant alone in a demanding trial, in so many internal steps each."""
-    step = CONTROL_PERIOD / count
-    plant, rest = Plant(model, step), Plant(model).settle(0.0, 350e3)
+def tolerances(model: str, millionths: int) -> Prepared:
+    """Control steps of the plant alone in a demanding trial, at a tolerance."""
+    tolerance = millionths * 1e-6
+    plant = Plant(model, tolerance)
+    rest = plant.settle(0.0, 350e3)
     commands: Commands = demanding_commands(plant, 350e3)
     steps = len(commands.time) - 1
 
@@ -71,12 +71,12 @@ def substeps(model: str, count: int) -> Prepared:
         simulated(plant, rest, commands)
         return steps
 
-    return Prepared(chunk, lambda: _told(_error(model, step)))
+    return Prepared(chunk, lambda: _told(_error(model, tolerance)))
 
 
 @cache
-def _error(model: str, step: float) -> Error:
-    return error_ladder(model, (step,))[0]
+def _error(model: str, tolerance: float) -> Error:
+    return error_ladder(model, (tolerance,))[0]
 
 
 def _told(error: Error) -> dict[str, Any]:
@@ -84,6 +84,7 @@ def _told(error: Error) -> dict[str, Any]:
         "position_error": error.position,
         "worst_state": error.worst_state,
         "worst_error": error.states[error.worst_state],
+        "attempts": error.attempts,
     }
 
 
@@ -95,7 +96,7 @@ ROWS = {
     "one": one,
     "kernel": kernel,
     "batch": batch,
-    "substeps": substeps,
+    "tolerances": tolerances,
     "fits": hooks.joint_fits,
     "gpu": hooks.gpu,
 }

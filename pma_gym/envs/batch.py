@@ -1,0 +1,99 @@
+"""What a batch of environments is asked for and tells, in Gymnasium's form."""
+
+from collections.abc import Mapping, Sequence
+from numbers import Integral
+from typing import Any, TypeGuard
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.envs.options import Pressure, check_pressure, check_pressures
+
+
+def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
+    """The seed of every environment, None for one that goes on with its own.
+
+    Args:
+        seed: seed of the first, the others counting up from it; or one each.
+        count: how many environments.
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    if seed is None:
+        return [None] * count
+    rule = f"seed must be a whole number from 0 on, or one for each of the {count} environments"
+    if _is_seed(seed):
+        return [int(seed) + i for i in range(count)]
+    if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+        raise ValueError(f"{rule}; got {seed!r}")
+    if len(seed) != count:
+        raise ValueError(f"{rule}; got {len(seed)}")
+    for one in seed:
+        if one is not None and not _is_seed(one):
+            raise ValueError(f"{rule}; got {one!r} among them")
+    return [None if one is None else int(one) for one in seed]
+
+
+def _is_seed(value: object) -> TypeGuard[int]:
+    return isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 0
+
+
+def masked(mask: object, count: int) -> NDArray[np.int64]:
+    """Numbers of the environments in a mask.
+
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    array = np.asarray(mask)
+    if array.shape != (count,) or array.dtype != np.bool_ or not array.any():
+        raise ValueError(
+            f"reset_mask must be bool of shape ({count},) with at least one true, got "
+            f"{array.dtype} of shape {array.shape}, {np.count_nonzero(array)} of them true"
+        )
+    return np.flatnonzero(array)
+
+
+def wanted_pressures(
+    options: Mapping[str, Any], indices: NDArray[np.int64], count: int
+) -> list[Pressure] | None:
+    """Pressures of the episodes that begin, if a reset's options tell any.
+
+    Args:
+        options: may hold `pressure_kpa` for all, or `pressures_kpa` for each environment.
+        indices: the environments that begin.
+        count: how many there are.
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    if "pressures_kpa" in options:
+        if "pressure_kpa" in options:
+            raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
+        check_pressures(options["pressures_kpa"], count)
+        return [options["pressures_kpa"][i] for i in indices.tolist()]
+    if "pressure_kpa" in options:
+        check_pressure(options["pressure_kpa"])
+        return [options["pressure_kpa"]] * len(indices)
+    return None
+
+
+def spread(found: Mapping[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
+    """Values of the environments in a mask as arrays of all, each with a mask of its own.
+
+    Args:
+        found: arrays by name, one value for each environment in the mask, or dictionaries of such;
+            NaN for a value that there is not.
+        mask: bool, shape (num_envs,).
+    """
+    info: dict[str, Any] = {}
+    for name, values in found.items():
+        own = mask.copy()
+        if isinstance(values, Mapping):
+            info[name], info[f"_{name}"] = spread(values, mask), own
+            continue
+        known = ~np.isnan(values) if values.dtype.kind == "f" else np.ones(len(values), np.bool_)
+        if known.any():
+            own[mask] = known
+            array = np.full(len(mask), None if values.dtype.kind == "O" else 0, values.dtype)
+            array[own] = values[known]
+            info[name], info[f"_{name}"] = array, own
+    return info

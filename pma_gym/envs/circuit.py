@@ -1,0 +1,196 @@
+"""What happens in a control step beside the plant, as traced arithmetic: for kernels of any width.
+
+From the action to the drive, from the plant's state to reading, observation, reward and end.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pma_gym.envs.command import HIGHEST_VOLTAGE
+from pma_gym.envs.observation import BOUND, ObservationTable
+from pma_gym.envs.record import PARTS, TRUTH, Record
+from pma_gym.kernels.generic import to_real, where
+from pma_gym.kernels.graph import CHANGING, Graph, Value
+from pma_gym.kernels.random import normals, philox
+from pma_gym.kernels.substitute import substitute
+from pma_gym.plant import sensors
+from pma_gym.plant.attempt import first_size
+from pma_gym.plant.compose import COMMANDS, ZERO, Equations
+from pma_gym.plant.program import at_rest
+from pma_gym.tasks import REWARDS, broken, missed_reward
+from pma_gym.units import SI_FACTORS
+
+NOISE, TARE, DRAW = 0, 1, 2
+"""Streams of random numbers: sensors in a step, sensors at rest, what an episode begins with."""
+
+PRESSURE_TOLERANCE = 1.0
+"""How far a pressure may leave the trials' range before it counts (Pa): a settled pressure is
+exact to its last bits only."""
+
+
+@dataclass(frozen=True)
+class Circuit:
+    """Traced parts of a control step.
+
+    Attributes:
+        record: places of the numbers.
+        equations: the plant's equations, whose graph all of it is in.
+    """
+
+    record: Record
+    equations: Equations
+
+    @property
+    def graph(self) -> Graph:
+        """The graph of all values."""
+        return self.equations.graph
+
+    def slot(self, name: str) -> Value:
+        """A number of the record, as an input; states and commands are the plant's own."""
+        if name in self.record.states or name in (*COMMANDS, ZERO):
+            return self.equations[name]
+        return self.graph.input(f"record.{name}", CHANGING, self.record.kind(name))
+
+    def action(self, i: int) -> Value:
+        """An entry of the action, as an input."""
+        return self.graph.input(f"action.{i}", CHANGING)
+
+    def reference(self, ahead: int) -> Value:
+        """The reference so many steps after the one that begins (m or rad), as an input."""
+        return self.graph.input(f"reference.{ahead}", CHANGING)
+
+    def command(self) -> dict[str, Value]:
+        """From an action to what the station hears: new numbers by name."""
+        record, options = self.record, self.record.options
+        held = []
+        for i in range(record.actions):
+            asked = self.action(i)
+            held.append(where(asked < -1.0, -1.0, where(asked > 1.0, 1.0, asked)))
+        found: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
+        volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
+        if options.action_delay:
+            heard = [self.slot(f"wire_0_{i}") for i in range(record.actions)]
+            line = [
+                [self.slot(f"wire_{k}_{i}") for i in range(record.actions)]
+                for k in range(1, options.action_delay)
+            ]
+            for k, values in enumerate([*line, volts]):
+                found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
+        else:
+            heard = volts
+        found["motor_voltage"] = heard[0]
+        found["regulator_voltage"] = (
+            heard[1] if options.regulator_action else self.slot("rest_regulator")
+        )
+        change = self.graph.constant(0.0)
+        for i, value in enumerate(held):
+            moved = abs(value - self.slot(f"action_{i}"))
+            change = where(moved > change, moved, change)
+        found["reward"] = change
+        jump = abs(found["motor_voltage"] - self.slot("motor_voltage"))
+        other = abs(found["regulator_voltage"] - self.slot("regulator_voltage"))
+        jump = where(other > jump, other, jump)
+        found["size"] = first_size(self.slot("size"), jump)
+        return found
+
+    def truth(self) -> dict[str, Value]:
+        """True outputs at the plant's state."""
+        eq = self.equations
+        outputs = [eq.outputs[name] for name in TRUTH]
+        return dict(zip(TRUTH, substitute(outputs, at_rest(eq)), strict=True))
+
+    def read(self, stream: int, count: Value) -> list[Value]:
+        """What the four sensors say (SI), by random numbers of a stream."""
+        eq, truth = self.equations, self.truth()
+        lagged = [
+            eq[f"lag_{name}"] if f"lag_{name}" in self.record.states else truth[output]
+            for name, (output, _) in sensors.SENSORS.items()
+        ]
+        if not self.record.options.noise:
+            return lagged
+        words = philox(
+            (count, self.slot("episode") * 4 + stream, self.graph.constant(0, "integer"), 0),
+            (self.slot("key_0"), self.slot("key_1")),
+        )
+        said = []
+        for held, normal, (name, (_, line)) in zip(
+            lagged, normals(words), sensors.SENSORS.items(), strict=True
+        ):
+            parameters = eq.parameters.get(name)
+            level = getattr(parameters, "noise", self.graph.constant(0.0))
+            said.append(sensors.reading(held, level, normal, line.gain, line.offset))
+        return said
+
+    def sense(self, count: Value, first: bool) -> dict[str, Value]:
+        """From the plant's state to reading, end and info: new numbers by name.
+
+        Args:
+            count: control steps since the trial began, an integer.
+            first: at the trial's beginning, which has no readings before.
+        """
+        record, truth = self.record, self.truth()
+        contraction, rotation, load, pressure = self.read(NOISE, count)
+        reading = {
+            "extension": self.slot("tare_contraction") - contraction,
+            "rotation": rotation - self.slot("tare_rotation"),
+            "load": load,
+            "pressure": pressure,
+        }
+        found: dict[str, Value] = {f"true_{name}": value for name, value in truth.items()}
+        for k in range(record.readings):
+            for part in PARTS:
+                before = reading[part] if k == 0 or first else self.slot(f"{part}_{k - 1}")
+                found[f"{part}_{k}"] = before
+        ended = broken(self.equations.parameters["limits"], truth)
+        found["ended"] = self.graph.value(ended)
+        found["count"] = count
+        found |= self._info(found, to_real(count))
+        return found
+
+    def _info(self, found: Mapping[str, Value], count: Value) -> dict[str, Value]:
+        record, task = self.record, self.record.task
+        unit, quantity = task.protocol.unit, task.protocol.quantity
+        factor, position = 1.0 / SI_FACTORS[unit], self.position(found)
+        valid = self.equations.parameters["validity"]
+        low = where(valid.lowest < task.lowest_pressure, task.lowest_pressure, valid.lowest)
+        high = where(valid.highest < task.highest_pressure, valid.highest, task.highest_pressure)
+        pressure = found["true_pressure"]
+        inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
+        heard = found[f"{quantity}_{record.options.observation_delay}"]
+        values = [
+            count * record.options.period,
+            position * factor,
+            heard * factor,
+            self.reference(0) * factor,
+            (position - self.reference(0)) * factor,
+            self.slot("motor_voltage"),
+            self.slot("regulator_voltage"),
+            pressure * 1e-3,
+            found["true_load"],
+            where(inside, 0.0, 1.0),
+        ]
+        return dict(zip(record.info, values, strict=True))
+
+    def position(self, found: Mapping[str, Value]) -> Value:
+        """True position that the task asks for (m or rad)."""
+        if self.record.task.protocol.quantity == "extension":
+            return self.slot("zero_contraction") - found["true_contraction"]
+        return found["true_rotation"]
+
+    def reward(self, found: Mapping[str, Value]) -> Value:
+        """Reward of a step; the action's change stands where the reward will."""
+        task, options = self.record.task, self.record.options
+        rule = REWARDS[options.reward]
+        error = self.position(found) - self.reference(0)
+        value = self.graph.value(rule(task.error_percent(error), self.slot("reward")))
+        missed = float(task.steps(options.control_rate_hz)) - to_real(found["count"])
+        return where(found["ended"] > 0.0, value + missed * missed_reward(rule), value)
+
+    def observation(self, table: ObservationTable, found: Mapping[str, Value]) -> list[Value]:
+        """The observation's entries."""
+        entries = table.entries(
+            lambda part, k: found[f"{part}_{k}"],
+            self.reference,
+            [self.slot(f"action_{i}") for i in range(self.record.actions)],
+        )
+        return [where(e < -BOUND, -BOUND, where(e > BOUND, BOUND, e)) for e in entries]

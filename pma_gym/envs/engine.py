@@ -1,0 +1,327 @@
+"""Environments as arrays: one, or many that step together."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pma_gym.envs.circuit import DRAW
+from pma_gym.envs.kernel import ARGUMENTS, BAD_ACTION, Kernel
+from pma_gym.envs.observation import ObservationTable
+from pma_gym.envs.options import Options, Pressure
+from pma_gym.envs.record import Record
+from pma_gym.kernels.crew import Crew
+from pma_gym.kernels.random import philox, uniform
+from pma_gym.plant import settle
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.program import FIRST_S, vector
+from pma_gym.tasks import RANDOMISATIONS, Task
+
+WIDTH = 16
+"""Environments that share a block, one lane each."""
+
+
+class Engine:
+    """State of n environments, and what moves it.
+
+    What becomes of an environment depends on its seed, its episode and its actions alone, not on
+    the others, on how many there are, nor on the number of threads.
+
+    Args:
+        task: the task.
+        options: the options, the same for all.
+        count: how many environments.
+        threads: how many threads step them.
+        single: march in single precision: faster, see `PMAVectorEnv`.
+        pressures: pressure of each, if they differ: as the option `pressure_kpa`, one each.
+
+    Attributes:
+        count: how many environments.
+        record: places of an environment's numbers.
+        table: the observation's entries.
+        nominal: the Plant of the nominal model.
+        models: the Model of every environment's episode.
+        pressures: gauge pressure that every episode began at (Pa), shape (n,).
+        observations: of the last step or reset, float32, shape (n, entries).
+        rewards: of the last step, shape (n,).
+        terminated: of the last step, bool, shape (n,).
+        truncated: of the last step, bool, shape (n,).
+        trace: true position at k / 384 s of a single environment (m or rad).
+        voltages: motor voltage that a single environment's station heard in every step (V).
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        options: Options,
+        count: int = 1,
+        threads: int = 1,
+        single: bool = False,
+        pressures: Sequence[Pressure] | None = None,
+    ) -> None:
+        """Compile, and make room."""
+        self.task, self.options, self.count = task, options, count
+        self.wanted = list(pressures) if pressures is not None else [options.pressure_kpa] * count
+        self.nominal = Plant(load_model(options.model))
+        self.record = Record(tuple(self.nominal.states), task, options)
+        self.table = ObservationTable(task, options)
+        self.width = 1 if count == 1 else WIDTH
+        program = self.nominal.program
+        self.kernel = Kernel(program, self.record, self.table, self.width, single)
+        self.models = [self.nominal.model] * count
+        self.pressures = np.zeros(count)
+        self._allocate()
+        self._address = self._arguments.ctypes.data
+        self._crew = Crew(self.kernel.library.address("step"), self._parts(threads))
+
+    def _allocate(self) -> None:
+        record, width = self.record, self.width
+        self.blocks = -(-self.count // width)
+        padded = self.blocks * width
+        options = self.options
+        self.records = np.zeros((self.blocks, record.size, width))
+        self.integers = self.records.view(np.int64)
+        self._shares_table = options.randomisation == "none"
+        rows = 1 if self._shares_table else self.blocks
+        self._tables = np.zeros((rows, self.kernel.table_size, width))
+        self._tables[:] = self._table_of(self.nominal.vector)[:, None]
+        steps = self.task.steps(options.control_rate_hz)
+        # What has ended may be stepped once more before it is reset.
+        self._references = np.pad(self.table.references, (0, 2), mode="edge")
+        self.actions = np.zeros((padded, record.actions))
+        self._all_observations = np.zeros((padded, len(self.table.rows)), np.float32)
+        self._all_rewards = np.zeros(padded)
+        self._all_flags = np.zeros((2, padded), np.bool_)
+        self.observations = self._all_observations[: self.count]
+        self.rewards = self._all_rewards[: self.count]
+        self.terminated, self.truncated = self._all_flags[:, : self.count]
+        duration = (steps + 2) * options.period
+        self.trace = np.zeros(int(duration * 384.0) + 8 if width == 1 else 1)
+        self.voltages = np.zeros(steps + 2 if width == 1 else 1)
+        self._indices = np.zeros(max(self.count, 1), np.int64)
+        self._attempts = np.zeros((256, 8), np.int64)
+        self._episodes = np.full(self.count, -1, np.int64)
+        self._keys = np.zeros((self.count, 2), np.int64)
+        self._arguments = np.zeros(len(ARGUMENTS), np.int64)
+        stride = 0 if self._shares_table else self.kernel.table_size * width
+        given = {
+            "first": 0,
+            "last": self.blocks,
+            "count": self.count,
+            "table_stride": stride,
+            "records": self.records.ctypes.data,
+            "tables": self._tables.ctypes.data,
+            "references": self._references.ctypes.data,
+            "actions": self.actions.ctypes.data,
+            "observations": self._all_observations.ctypes.data,
+            "rewards": self._all_rewards.ctypes.data,
+            "terminated": self._all_flags[0].ctypes.data,
+            "truncated": self._all_flags[1].ctypes.data,
+            "trace": self.trace.ctypes.data,
+            "indices": self._indices.ctypes.data,
+            "attempts": self._attempts.ctypes.data,
+            "voltages": self.voltages.ctypes.data,
+        }
+        self._arguments[:] = [given[name] for name in ARGUMENTS]
+        self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
+        self._has_idle_lanes = self.count % width != 0
+
+    def _table_of(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.empty(self.kernel.table_size)
+        self.kernel.table(numbers.ctypes.data, out.ctypes.data)
+        return out
+
+    def _parts(self, threads: int) -> list[NDArray[np.int64]]:
+        """The arguments of a step, a share of the blocks for each thread."""
+        threads = max(1, min(threads, self.blocks))
+        edges = np.linspace(0, self.blocks, threads + 1).round().astype(int)
+        parts = [self._arguments.copy() for _ in range(threads)]
+        for k, part in enumerate(parts):
+            part[ARGUMENTS.index("first")], part[ARGUMENTS.index("last")] = edges[k : k + 2]
+            part[ARGUMENTS.index("attempts")] += 64 * k
+        return parts
+
+    # -- places ------------------------------------------------------------------------------------
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """A number of every environment by its place's name, shape (n,); a copy."""
+        return self.records[:, self.record.places[name], :].reshape(-1)[: self.count].copy()
+
+    def counts(self) -> NDArray[np.int64]:
+        """Control steps of every episode so far, shape (n,)."""
+        return self.integers[:, self.record.places["count"], :].reshape(-1)[: self.count].copy()
+
+    def _set(self, indices: NDArray[np.int64], name: str, values: ArrayLike) -> None:
+        block, lane = np.divmod(indices, self.width)
+        whole = self.record.kind(name) == "integer"
+        array = self.integers if whole else self.records
+        array[block, self.record.places[name], lane] = values
+
+    # -- episodes ----------------------------------------------------------------------------------
+
+    def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:
+        """Begin the random numbers of environments anew; None keeps an environment's own."""
+        for index, seed in zip(indices.tolist(), seeds, strict=True):
+            if seed is not None or self._episodes[index] < 0 and not self._keys[index].any():
+                self._keys[index] = np.random.SeedSequence(seed).generate_state(2)
+                self._episodes[index] = -1
+
+    def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
+        """Begin an episode: draw pressure and station, settle, zero the sensors.
+
+        Args:
+            indices: which environments, shape (m,).
+            wanted: pressure of each for this episode; the option's if not given.
+        Raises:
+            ValueError: a pressure that the regulator does not reach.
+        """
+        self._episodes[indices] += 1
+        asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
+        pressures = self._drawn_pressures(indices, asked)
+        vectors = self._drawn_models(indices)
+        regulator = np.array(
+            [
+                regulator_voltage(self.models[i], pressure)
+                for i, pressure in zip(indices.tolist(), pressures.tolist(), strict=True)
+            ]
+        )
+        states, zero = self._settled(indices, pressures, vectors)
+        self.pressures[indices] = pressures
+        self._fill(indices, states, zero, regulator)
+        arguments = self._arguments.copy()
+        self._indices[: len(indices)] = indices
+        arguments[ARGUMENTS.index("last")] = len(indices)
+        self.kernel.begin(arguments.ctypes.data)
+        self._score_first_sample(indices)
+
+    def _drawn_pressures(
+        self, indices: NDArray[np.int64], wanted: Sequence[Pressure]
+    ) -> NDArray[np.float64]:
+        """Gauge pressures of episodes (Pa)."""
+        keys = self._keys[indices].astype(np.uint64)
+        stream = (self._episodes[indices] * 4 + DRAW).astype(np.uint64)
+        nothing = np.zeros(len(indices), np.uint64)
+        word = philox((nothing, stream, nothing, nothing), (keys[:, 0], keys[:, 1]))[0]
+        shares = uniform(word)
+        low, high = self.task.lowest_pressure, self.task.highest_pressure
+        found = []
+        for share, one in zip(shares.tolist(), wanted, strict=True):
+            if isinstance(one, str):
+                found.append(low + share * (high - low))
+            elif isinstance(one, Sequence):
+                found.append(1e3 * float(one[int(share * len(one))]))
+            else:
+                found.append(1e3 * float(one))
+        return np.array(found)
+
+    def _drawn_models(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """Draw the stations of episodes; their vectors, or None if all are nominal."""
+        if self._shares_table:
+            return None
+        draw = RANDOMISATIONS[self.options.randomisation]
+        rows = []
+        for index in indices.tolist():
+            key = self._keys[index].astype(np.uint64)
+            seed = int(key[0]) | int(key[1]) << 32
+            bits = np.random.Philox(key=seed, counter=[0, 0, 0, int(self._episodes[index])])
+            self.models[index] = draw(self.nominal.model, np.random.Generator(bits))
+            rows.append(vector(self.models[index], self.nominal.tolerance))
+            block, lane = divmod(index, self.width)
+            self._tables[block, :, lane] = self._table_of(rows[-1])
+        return np.array(rows)
+
+    def _settled(
+        self,
+        indices: NDArray[np.int64],
+        pressures: NDArray[np.float64],
+        vectors: NDArray[np.float64] | None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        found = settle.at_no_load(self.nominal, pressures, vectors)
+        if found is not None:
+            return found
+        conditions = []
+        for index, pressure in zip(indices.tolist(), pressures.tolist(), strict=True):
+            model = self.models[index]
+            plant = self.nominal if model is self.nominal.model else Plant(model)
+            conditions.append(plant.settle(motor_voltage=0.0, pressure=pressure))
+        zero = np.array([condition.zero_contraction for condition in conditions])
+        return np.array([condition.state for condition in conditions]), zero
+
+    def _fill(
+        self,
+        indices: NDArray[np.int64],
+        states: NDArray[np.float64],
+        zero: NDArray[np.float64],
+        regulator: NDArray[np.float64],
+    ) -> None:
+        block, lane = np.divmod(indices, self.width)
+        self.records[block, :, lane] = 0.0
+        for i, name in enumerate(self.record.states):
+            self._set(indices, name, states[:, i])
+        self._set(indices, "size", FIRST_S)
+        self._set(indices, "zero_contraction", zero)
+        self._set(indices, "regulator_voltage", regulator)
+        self._set(indices, "rest_regulator", regulator)
+        for i in range(2):
+            self._set(indices, f"key_{i}", self._keys[indices, i])
+        self._set(indices, "episode", self._episodes[indices])
+        rest = (-1.0, np.clip(0.2 * regulator - 1.0, -1.0, 1.0))
+        for i in range(self.record.actions):
+            self._set(indices, f"action_{i}", rest[i])
+            for k in range(self.options.action_delay):
+                self._set(indices, f"wire_{k}_{i}", (0.0, regulator)[i])
+
+    def _score_first_sample(self, indices: NDArray[np.int64]) -> None:
+        phase = self.task.protocol.phases[0]
+        block, lane = np.divmod(indices, self.width)
+        quantity = self.task.protocol.quantity
+        true = {
+            name: self.records[block, self.record.places[name], lane]
+            for name in ("zero_contraction", "true_contraction", "true_rotation")
+        }
+        extension = true["zero_contraction"] - true["true_contraction"]
+        position = extension if quantity == "extension" else true["true_rotation"]
+        self._set(indices, f"sum_{phase.name}", (position - phase.initial) ** 2)
+        self._set(indices, "sample", 1.0)
+        if self.width == 1:
+            self.trace[0] = position[0]
+
+    def park(self, indices: NDArray[np.int64]) -> None:
+        """Put stations that broke a limit at rest until they are reset."""
+        block, lane = np.divmod(indices, self.width)
+        for name in (*self.record.states, "motor_voltage", "size"):
+            self.records[block, self.record.places[name], lane] = 0.0
+
+    # -- steps -------------------------------------------------------------------------------------
+
+    def step(self) -> int:
+        """Step all environments by `actions`; their results stand in the attributes.
+
+        Returns:
+            0 while no episode ended, else the sum of 1 if any terminated and 2 if any was
+            truncated.
+        Raises:
+            ValueError: an action that is not finite; nothing has happened then, but to the shares
+                of other threads.
+        """
+        if self._has_idle_lanes:
+            self._idle_lanes[:] = 0
+        ended = self._crew.run()
+        if ended & BAD_ACTION:
+            raise ValueError("action must be finite")
+        return ended
+
+    def close(self) -> None:
+        """End the threads."""
+        self._crew.close()
+
+    @property
+    def call(self) -> tuple[Callable[[int], int], int]:
+        """The compiled step and the address of its arguments, to be called without any check."""
+        return self.kernel.step, self._address
+
+    @property
+    def attempts(self) -> int:
+        """Attempts at internal steps in the last step, all lanes of a block counted as one."""
+        return int(self._attempts[:, 0].sum())

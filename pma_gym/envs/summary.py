@@ -1,0 +1,109 @@
+"""What an episode was worth: RMSE by phase, from the sums that were kept while it ran."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ, percent_of_range
+from pma_gym.tasks import Task
+from pma_gym.units import SI_FACTORS
+
+
+def info_maker(keys: Sequence[str]) -> Callable[..., dict[str, Any]]:
+    """A function that makes a step's info from the record's last numbers.
+
+    Args:
+        keys: the info's keys, `Record.info`.
+    Returns:
+        A function of what stands there: the limit broken, the info's numbers, the reward.
+    """
+    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9 = keys
+
+    # Written out: this runs in every step, and a loop would take three times as long.
+    def made(
+        ended: float,
+        v0: float,
+        v1: float,
+        v2: float,
+        v3: float,
+        v4: float,
+        v5: float,
+        v6: float,
+        v7: float,
+        v8: float,
+        v9: float,
+        reward: float,
+    ) -> dict[str, Any]:
+        return {
+            k0: v0,
+            k1: v1,
+            k2: v2,
+            k3: v3,
+            k4: v4,
+            k5: v5,
+            k6: v6,
+            k7: v7,
+            k8: v8,
+            k9: v9 != 0.0,
+        }
+
+    return made
+
+
+def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:
+    """RMSE of the true position at 384 Hz so far, at the door.
+
+    Args:
+        task: the task.
+        sums: squared errors (m^2 or rad^2) by phase, each on its own ideal line.
+        samples: samples so far, the first at the trial's beginning.
+    Returns:
+        rmse_mm or rmse_deg over all phases, rmse_by_phase_mm or _deg of each phase begun,
+        percent_of_range.
+    """
+    protocol = task.protocol
+    unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
+    counts = {
+        phase.name: min(max(samples - round(phase.start * SAMPLE_RATE_HZ), 0.0), PHASE_SAMPLES)
+        for phase in protocol.phases
+    }
+    begun = {name: count for name, count in counts.items() if count > 0.0}
+    total = math.sqrt(sum(sums[name] for name in begun) / sum(begun.values()))
+    return {
+        f"rmse_{unit}": total / factor,
+        f"rmse_by_phase_{unit}": {
+            name: math.sqrt(sums[name] / count) / factor for name, count in begun.items()
+        },
+        "percent_of_range": percent_of_range(total, protocol.span),
+    }
+
+
+def summaries(
+    task: Task, sums: Mapping[str, NDArray[np.float64]], samples: NDArray[np.float64]
+) -> dict[str, Any]:
+    """As `summary`, of many episodes at once, to the same bits; NaN for a phase not begun.
+
+    Args:
+        task: the task.
+        sums: squared errors (m^2 or rad^2) by phase, shape (m,) each.
+        samples: samples so far, shape (m,).
+    """
+    protocol = task.protocol
+    unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
+    total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
+    for phase in protocol.phases:
+        count = np.clip(samples - round(phase.start * SAMPLE_RATE_HZ), 0.0, PHASE_SAMPLES)
+        begun = count > 0.0
+        # A phase that has not begun adds nothing: its sum is 0.
+        total, number = total + sums[phase.name], number + count
+        mean = np.divide(sums[phase.name], count, out=np.full(len(count), np.nan), where=begun)
+        by_phase[phase.name] = np.sqrt(mean) / factor
+    whole = np.sqrt(total / number)
+    return {
+        f"rmse_{unit}": whole / factor,
+        f"rmse_by_phase_{unit}": by_phase,
+        "percent_of_range": 100.0 * whole / protocol.span,
+    }

@@ -1,0 +1,285 @@
+"""Many environments that step together, in SIMD lanes and threads."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
+from pma_gym.envs.command import CommandLine
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.observation import ObservationTable
+from pma_gym.envs.options import (
+    Pressure,
+    check_count,
+    check_known,
+    check_named,
+    check_pressures,
+    parse_options,
+    parse_task,
+)
+from pma_gym.envs.summary import summaries
+from pma_gym.tasks import limit_in_words
+
+RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
+
+
+class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+    """As `PMAEnv`, n times: the same actions, observations, rewards and ends, side by side.
+
+    An environment gives the same bits here as alone with the same seed, whatever n and the number
+    of threads. `gym.make_vec(id, num_envs=n, vectorization_mode="vector_entry_point")` makes one.
+
+    While no episode ends `info` is empty. When episodes end it has what `PMAEnv` puts in their last
+    info, as arrays of shape (num_envs,), each with its mask `_name`; with SAME_STEP it stands in
+    `final_info`, beside `final_obs`. `station_info()` has the numbers of any step.
+
+    Args:
+        num_envs: how many.
+        task: `displacement` or `rotation`.
+        autoreset_mode: NEXT_STEP (default), SAME_STEP or DISABLED (then `reset` takes the option
+            `reset_mask`).
+        threads: how many threads step them, at most one for every 16 environments.
+        precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
+            rarely 1e-3 off, where rounding decides when friction lets go.
+        pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
+        render_mode: None; a batch draws nothing.
+        options: as `PMAEnv`.
+
+    Attributes:
+        task: the Task.
+        options: the checked Options.
+        table: the ObservationTable.
+
+    Example:
+        >>> envs = PMAVectorEnv(4, "displacement", model="serres2008", pressures_kpa=[200, 300] * 2)
+        >>> observations, _ = envs.reset(seed=1)
+        >>> observations, rewards, *_ = envs.step(np.zeros((4, 1), np.float32))
+        >>> observations.shape, rewards.shape
+        ((4, 7), (4,))
+    """
+
+    metadata: dict[str, Any] = {
+        "render_modes": [],
+        "render_fps": 100,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        task: str = "displacement",
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+        precision: str = "double",
+        pressures_kpa: Sequence[Pressure] | None = None,
+        render_mode: str | None = None,
+        **options: Any,
+    ) -> None:
+        """Check the options and compile."""
+        check_count("num_envs", num_envs, 1 << 24)
+        check_count("threads", threads, 256)
+        check_named("precision", precision, ("double", "single"))
+        if not isinstance(autoreset_mode, AutoresetMode):
+            check_named("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
+        if render_mode is not None:
+            raise ValueError(
+                f"a vector environment draws nothing, got render_mode={render_mode!r}; render one "
+                "PMAEnv of the same seed"
+            )
+        self.num_envs = num_envs = int(num_envs)
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.task, self.options = parse_task(task), parse_options(options)
+        self.metadata = self.metadata | {
+            "render_fps": round(self.options.control_rate_hz),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        if pressures_kpa is not None:
+            if "pressure_kpa" in options:
+                raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
+            check_pressures(pressures_kpa, num_envs)
+        single = precision == "single"
+        self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
+        self.table: ObservationTable = self.engine.table
+        self.single_observation_space = self.table.space
+        self.single_action_space = CommandLine(self.options).space
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._all = np.arange(num_envs)
+        self._shape = (num_envs, *self.single_action_space.shape)
+        self._given = self.engine.actions[:num_envs]
+        self._begun = np.zeros(num_envs, np.bool_)
+        self._ended = np.zeros(num_envs, np.bool_)
+        # Which of them have ended, None if none has: looking through them takes a microsecond.
+        self._waiting: NDArray[np.int64] | None = None
+        self._idle = True
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode in every environment.
+
+        Args:
+            seed: seed of the first environment, the others counting up from it; or one each.
+            options: may hold, for these episodes, `pressure_kpa` (for all) or `pressures_kpa` (for
+                each environment); and `reset_mask`, bool of shape (num_envs,): which environments
+                begin anew, the others go on.
+        Raises:
+            TypeError: an unknown option.
+            ValueError: a pressure out of range, or seeds, pressures or a mask of another length.
+        """
+        given = dict(options or {})
+        check_known("reset option", given, RESET_OPTIONS)
+        indices = masked(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._all
+        wanted = wanted_pressures(given, indices, self.num_envs)
+        seeds = all_seeds(seed, self.num_envs)
+        super().reset(seed=seeds[0])
+        # Should it fail on the way, these have no episode.
+        self._begun[indices], self._idle = False, True
+        self.engine.seed(indices, [seeds[i] for i in indices.tolist()])
+        self.engine.reset(indices, wanted)
+        self._begun[indices], self._ended[indices] = True, False
+        self._idle = not self._begun.all()
+        self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
+        return self.engine.observations.copy(), {}
+
+    def step(
+        self, actions: NDArray[np.floating]
+    ) -> tuple[
+        NDArray[np.float32],
+        NDArray[np.float64],
+        NDArray[np.bool_],
+        NDArray[np.bool_],
+        dict[str, Any],
+    ]:
+        """Command every station, let one control step pass, look what came of it.
+
+        Args:
+            actions: shape (num_envs, entries of an action).
+        Raises:
+            ValueError: actions of another shape, or not finite; nothing has happened then.
+            gymnasium.error.ResetNeeded: `reset` was not called; or, without autoreset, an episode
+                has ended.
+        """
+        waiting = self._waiting
+        if self._idle or waiting is not None:
+            self._require_episodes()
+        self._take(actions, waiting)
+        engine = self.engine
+        ended = engine.step()
+        if waiting is not None:
+            ended = self._begin_again(waiting)
+        if ended:
+            return self._last()
+        flags = engine.terminated.copy(), engine.truncated.copy()
+        return engine.observations.copy(), engine.rewards.copy(), *flags, {}
+
+    def _require_episodes(self) -> None:
+        if self._idle:
+            late = np.flatnonzero(~self._begun)
+            which = "" if len(late) == self.num_envs else f" in environments {_few(late)}"
+            raise gym.error.ResetNeeded(f"no episode has begun{which}: call reset() before step()")
+        if self.autoreset_mode == AutoresetMode.DISABLED:
+            raise gym.error.ResetNeeded(
+                f"the episodes of environments {_few(np.flatnonzero(self._ended))} have ended and "
+                'autoreset is disabled: call reset(options={"reset_mask": terminated | truncated})'
+            )
+
+    def _last(self) -> tuple[Any, ...]:
+        """What a step in which episodes end returns."""
+        engine = self.engine
+        rewards = engine.rewards.copy()
+        terminated, truncated = engine.terminated.copy(), engine.truncated.copy()
+        over = terminated | truncated
+        indices = np.flatnonzero(over)
+        info = self._summaries(over, indices)
+        if self.autoreset_mode == AutoresetMode.SAME_STEP:
+            final = np.full(self.num_envs, None, object)
+            for i in indices.tolist():
+                final[i] = engine.observations[i].copy()
+            info = {"final_obs": final, "_final_obs": over, "final_info": info}
+            info["_final_info"] = over.copy()
+            engine.reset(indices)
+        else:
+            self._ended, self._waiting = over, indices
+            # With autoreset they are stepped once more: from somewhere harmless.
+            engine.park(np.flatnonzero(terminated))
+        return engine.observations.copy(), rewards, terminated, truncated, info
+
+    def _begin_again(self, indices: NDArray[np.int64]) -> int:
+        """The step after an episode's end begins the next one, whatever the action.
+
+        Returns:
+            Whether any other episode ended in this step.
+        """
+        engine = self.engine
+        engine.reset(indices)
+        engine.rewards[indices] = 0.0
+        engine.terminated[indices] = engine.truncated[indices] = False
+        self._ended[:], self._waiting = False, None
+        return int(engine.terminated.any() or engine.truncated.any())
+
+    def _take(self, actions: object, waiting: NDArray[np.int64] | None) -> None:
+        """Check the actions and hand them over; those of episodes that have ended mean nothing."""
+        try:
+            array = np.asarray(actions)
+            if array.dtype.kind not in "fiu":
+                raise TypeError
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"{self._rule()}; got {type(actions).__name__} of no real numbers"
+            ) from None
+        if array.shape != self._shape:
+            raise ValueError(f"{self._rule()}; got shape {array.shape}")
+        self._given[:] = array
+        if waiting is not None:
+            self._given[waiting] = 0.0
+        finite = np.isfinite(self._given)
+        if not finite.all():
+            row = int(np.flatnonzero(~finite.all(axis=1))[0])
+            raise ValueError(
+                f"{self._rule()}, all of them finite; environment {row} got "
+                f"{self._given[row].tolist()}; look for a division by zero or a diverged policy"
+            )
+
+    def _rule(self) -> str:
+        return (
+            f"actions must have shape {self._shape}: one row an environment, each entry -1 to 1 "
+            "for 0 to 10 V"
+        )
+
+    def _summaries(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[str, Any]:
+        """Last infos of the episodes that ended, in Gymnasium's form: arrays with masks."""
+        engine = self.engine
+        phases = [phase.name for phase in self.task.protocol.phases]
+        sums = {name: engine.numbers(f"sum_{name}")[indices] for name in phases}
+        found = {name: values[indices] for name, values in self.station_info().items()}
+        found |= summaries(self.task, sums, engine.numbers("sample")[indices])
+        codes = engine.numbers("ended")[indices].tolist()
+        limits = [limit_in_words(engine.models[i], c) for i, c in zip(indices, codes, strict=True)]
+        found["ended_by"] = np.array(limits, object)
+        return spread(found, over)
+
+    def station_info(self) -> dict[str, NDArray[Any]]:
+        """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
+        found: dict[str, NDArray[Any]] = {
+            name: self.engine.numbers(name) for name in self.engine.record.info
+        }
+        found["extrapolated"] = found["extrapolated"] != 0.0
+        return found
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Send the threads home."""
+        self.engine.close()
+
+
+def _few(indices: NDArray[np.int64]) -> str:
+    """Numbers of environments, the first five of them."""
+    return f"{indices[:5].tolist()}" + (" and others" if len(indices) > 5 else "")

@@ -1,0 +1,183 @@
+"""Compiles LLVM modules for the processor at hand, keeps the result on disk, and calls it."""
+
+import ctypes
+import itertools
+from collections.abc import Callable, Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import llvmlite
+import llvmlite.binding as llvm
+
+from pma_gym.kernels.cache import digest, keep, load, source_digest
+
+if TYPE_CHECKING:
+    # Not at run time: what is kept on disk loads without it, and faster.
+    from llvmlite import ir
+
+_OPTIMISATION = 3
+_libraries: dict[str, "Library"] = {}
+_numbers = itertools.count()
+
+
+class Library:
+    """Compiled functions in memory, for as long as the process lives.
+
+    Args:
+        module: LLVM module, or its text.
+        name: name in messages.
+
+    Attributes:
+        name: its name.
+        was_kept: whether it came from the disk.
+
+    Example:
+        >>> from llvmlite import ir
+        >>> from pma_gym.kernels.control import DOUBLE, function
+        >>> module = ir.Module()
+        >>> builder, (x,) = function(module, "twice", [("x", DOUBLE)], DOUBLE)
+        >>> _ = builder.ret(builder.fadd(x, x))
+        >>> Library(module).function("twice", [ctypes.c_double], ctypes.c_double)(1.5)
+        3.0
+    """
+
+    def __init__(self, module: "ir.Module | str", name: str = "kernels") -> None:
+        text = str(module)
+        code, self.was_kept = _kept(digest((text, *_machine_key())), lambda: object_code(text))
+        self._link(code, name)
+
+    @classmethod
+    def from_object(cls, code: bytes, name: str = "kernels", was_kept: bool = False) -> "Library":
+        """The functions of object code."""
+        library = cls.__new__(cls)
+        library.was_kept = was_kept
+        library._link(code, name)
+        return library
+
+    def _link(self, code: bytes, name: str) -> None:
+        self.name = name
+        # The number is there because a process may have several libraries of one name.
+        self._unit = f"{name}.{next(_numbers)}"
+        parts = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+        _alive.append(parts.link(_jit(), self._unit))
+
+    def address(self, name: str) -> int:
+        """Address of a function.
+
+        Raises:
+            KeyError: there is none of this name.
+        """
+        try:
+            found = _jit().lookup(self._unit, name)
+        except RuntimeError as error:
+            raise KeyError(f"no function {name} in library {self.name}: {error}") from error
+        _alive.append(found)
+        return found[name]
+
+    def function(
+        self,
+        name: str,
+        arguments: Sequence[Any],
+        returns: Any = None,  # noqa: ANN401
+    ) -> Callable:
+        """A function to be called from Python; it lets other threads run meanwhile.
+
+        Args:
+            name: its name in the module.
+            arguments: ctypes type of each argument: c_void_p for pointers (give
+                `array.ctypes.data`), c_int64, c_double.
+            returns: ctypes type of the result.
+        Raises:
+            KeyError: there is none of this name.
+        """
+        return ctypes.CFUNCTYPE(returns, *arguments)(self.address(name))
+
+
+_alive: list[Any] = []
+"""What LLVM would unload if Python let go of it."""
+
+
+def compiled(
+    key_parts: Sequence[str], build: "Callable[[], ir.Module | str]", name: str = "kernels"
+) -> Library:
+    """The library that `build` describes, from memory or disk if it was made before.
+
+    Args:
+        key_parts: all that the module depends on beside the texts of this library's modules, such
+            as the names of a model's effects.
+        build: makes the module; only called if the library is not kept.
+        name: name in messages.
+    """
+    key = digest((source_digest(), *_machine_key(), *key_parts))
+    if key not in _libraries:
+        code, was_kept = _kept(key, lambda: object_code(str(build())))
+        _libraries[key] = Library.from_object(code, name, was_kept)
+    return _libraries[key]
+
+
+def _kept(key: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
+    code = load(key)
+    if code is not None:
+        return code, True
+    code = make()
+    keep(key, code)
+    return code, False
+
+
+def object_code(text: str) -> bytes:
+    """Machine code of a module's text."""
+    return _machine().emit_object(_optimised(text))
+
+
+def assembly(text: str) -> str:
+    """Assembly of a module's text, to be read."""
+    return _machine().emit_assembly(_optimised(text))
+
+
+def _optimised(text: str) -> llvm.ModuleRef:
+    module = llvm.parse_assembly(text)
+    module.verify()
+    return optimise(module, _machine())
+
+
+def optimise(module: llvm.ModuleRef, machine: llvm.TargetMachine) -> llvm.ModuleRef:
+    """The module after LLVM's passes, which keep every bit of its results."""
+    options = llvm.create_pipeline_tuning_options(speed_level=_OPTIMISATION)
+    # The vectors are in the text already.
+    options.loop_vectorization = False
+    options.slp_vectorization = False
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(module, builder)
+    return module
+
+
+@cache
+def host() -> tuple[str, str]:
+    """Name and features of the processor."""
+    return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
+
+
+def _machine_key() -> tuple[str, ...]:
+    versions = llvmlite.__version__, str(llvm.llvm_version_info), str(_OPTIMISATION)
+    return (*versions, llvm.get_process_triple(), *host())
+
+
+@cache
+def _machine() -> llvm.TargetMachine:
+    return _new_machine()
+
+
+def _new_machine() -> llvm.TargetMachine:
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    name, features = host()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    return target.create_target_machine(
+        cpu=name, features=features, opt=_OPTIMISATION, reloc="pic", codemodel="small", jit=True
+    )
+
+
+@cache
+def _jit() -> llvm.LLJIT:
+    # It takes the machine over. JITLink keeps code and constants near each other.
+    return llvm.create_lljit_compiler(_new_machine(), use_jit_link=True)

@@ -1,0 +1,215 @@
+"""One attempt at a step: how long it is, whether it is good enough, how long the next should be."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pma_gym.kernels.generic import from_bits, square_root, to_bits, where
+from pma_gym.kernels.graph import CHANGING, FIXED, Value
+from pma_gym.kernels.substitute import substitute
+from pma_gym.plant.compose import Equations, Switch
+from pma_gym.plant.rosenbrock import Step, step
+
+SAFETY = 0.8
+SHRINK, GROW = 0.1, 4.0
+"""How much smaller or larger the next attempt is than this one, at most."""
+
+LEAST_S = 1e-7
+"""A step of this length (s) is taken whatever its error."""
+
+LOST = 1e300
+"""A step of the least length with such an error, or one that is no number, ends the span: what the
+states are then says that the trial was lost."""
+
+AIMED = 0.995
+"""Share of a step behind which a switch has been aimed at."""
+
+BEYOND = 1.001
+"""How far a step goes on to be surely past a switch, as a factor."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """An attempt, as values.
+
+    Attributes:
+        size: proposed size at its beginning (s), an input.
+        left: time left until the end of the span (s), an input.
+        tolerance: largest error of a step, as a share of the states' scales, an input.
+        taken: whether it is good enough.
+        length: how long it is (s).
+        before: states and memories at its beginning, inputs.
+        moved: what states and memories are at its end if it is taken, by the id of what they were.
+        frozen: what is fixed for the step, by id.
+        here: what holds at its beginning, by id.
+        states: states and memories after it, as they were if it is not good enough.
+        next_size: proposed size of the next.
+        next_left: time left after it.
+    """
+
+    size: Value
+    left: Value
+    tolerance: Value
+    taken: Value
+    length: Value
+    before: list[Value]
+    moved: dict[int, Value]
+    frozen: dict[int, Value]
+    here: dict[int, Value]
+    states: list[Value]
+    next_size: Value
+    next_left: Value
+
+
+def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
+    """An attempt at a step of a plant.
+
+    Args:
+        eq: its equations.
+        positions: states that are asked for more exactly than the others, and their tolerance
+            beside that of the others.
+    """
+    graph = eq.graph
+    size, left = graph.input("size", CHANGING), graph.input("left", CHANGING)
+    tolerance = graph.input("tolerance", FIXED)
+    # Two halves instead of a step and a scrap.
+    length = where(left <= size, left, where(left < 2.0 * size, 0.5 * left, size))
+    frozen, here = beginning(eq)
+    made = step(eq.states, length, frozen, here)
+    moved = {s.value.id: new for s, new in zip(eq.states, made.states, strict=True)}
+    square = graph.constant(0.0)
+    for state, error in zip(eq.states, made.errors, strict=True):
+        if state.scale is None:
+            continue
+        scale = state.scale * positions.get(state.name, 1.0)
+        share = error * (1.0 / (scale * tolerance))
+        square = square + share * share
+    factor = SAFETY * _inverse_eighth_root(square)
+    factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
+    exact = square <= 1.0
+    share, missed = _switched(eq, made, length, frozen, here, moved)
+    factor = where(exact & missed, share, factor)
+    taken = (exact & ~missed) | (length <= LEAST_S)
+    proposed = length * factor
+    # A step cut short by the end of the span says little against the size before.
+    cut = taken & (length < size) & (proposed < size)
+    after = substitute([path.after for path in eq.paths], {**frozen, **moved})
+    before = [state.value for state in eq.states] + [path.value for path in eq.paths]
+    return Attempt(
+        size=size,
+        left=left,
+        tolerance=tolerance,
+        taken=taken,
+        length=length,
+        before=before,
+        moved=moved,
+        frozen=frozen,
+        here=here,
+        states=[
+            where(taken, new, old) for new, old in zip([*made.states, *after], before, strict=True)
+        ],
+        next_size=where(cut, size, where(proposed > LEAST_S, proposed, LEAST_S)),
+        # States that are no numbers any more need no small steps to the end of the span.
+        next_left=where(taken, where(square < LOST, left - length, 0.0), left),
+    )
+
+
+def first_size(size: Any, jump: Any) -> Any:  # noqa: ANN401
+    """Size of the first attempt after a command that jumps (s), of numbers or traced values.
+
+    Args:
+        size: size that the attempts before had come to (s).
+        jump: how far the command jumps (V).
+    Returns:
+        The same, but 0.33 ms at most after a jump of 1 V, and less with its fourth root.
+    """
+    most = JUMP_S * _inverse_eighth_root(jump * jump)
+    return where(size < most, size, most)
+
+
+JUMP_S = 3.3e-4
+"""First attempt after a jump of 1 V (s): of the random steps of 3 V, one in fifty is too large."""
+
+
+def beginning(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
+    """What is fixed for a step, and what holds at its beginning."""
+    if eq.travelled is None:
+        return {}, {}
+    way, speed = eq.travelled
+    here = {path.after.id: path.value for path in eq.paths}
+    (rate,) = substitute([_rate_of(eq, speed)], here)
+    still = where(rate < 0.0, -1.0, 1.0)
+    direction = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, still))
+    return {eq["origin"].id: way, eq["direction"].id: direction}, here
+
+
+def _rate_of(eq: Equations, value: Value) -> Value:
+    return next(state.rate for state in eq.states if state.value is value)
+
+
+def _inverse_eighth_root(square: Any) -> Any:  # noqa: ANN401
+    """The error of a step goes with h^4, and comes squared; within 9 % by its exponent's bits."""
+    return from_bits(_ONE_BITS + (_ONE_BITS >> 3) - (to_bits(square) >> 3))
+
+
+_ONE_BITS = 1023 << 52
+"""Bits of 1.0."""
+
+
+def _switched(
+    eq: Equations,
+    made: Step,
+    length: Value,
+    frozen: dict[int, Value],
+    here: dict[int, Value],
+    moved: dict[int, Value],
+) -> tuple[Value, Value]:
+    """Share of the step at which a switch is passed, and whether it may not be missed.
+
+    The share is that of the last of the switches that are passed; the others come in turn.
+    """
+    graph = eq.graph
+    missed = twice = graph.constant(False, "truth")
+    start = rate = end = graph.constant(1.0)
+    for switch in eq.switches:
+        at_end, at_start, speed = (
+            *substitute([switch.value], {**frozen, **moved}),
+            switch.value,
+            *substitute([switch.rate], {**frozen, **here}),
+        )
+        sign = where(
+            at_start > 0.0, 1.0, where(at_start < 0.0, -1.0, where(speed < 0.0, -1.0, 1.0))
+        )
+        beyond = -sign * at_end
+        # Way beyond the point of turning, or penetration times its share of the step, by the speed
+        # at which the parabola through both ends comes there.
+        over = beyond * beyond * (0.5 * length if switch.turning else 1.0)
+        coming = 2.0 * (at_end - at_start) - speed * length
+        passed = (beyond > 0.0) & (over > switch.overshoot * abs(coming))
+        missed = missed | passed
+        start = where(passed, sign * at_start, start)
+        rate = where(passed, sign * speed, rate)
+        end = where(passed, sign * at_end, end)
+        if switch.turning and frozen:
+            twice = _turned_twice(eq, switch, made, length, frozen)
+    slope = rate * length
+    bend = end - start - slope
+    inside = slope * slope - 4.0 * bend * start
+    share = 2.0 * start / (square_root(where(inside > 0.0, inside, 0.0)) - slope)
+    # What lies in the last bit of the step has been aimed at: no step aims twice.
+    missed = (missed & ~(share >= AIMED)) | twice
+    # From rest the way back may begin at once: 0 / 0, which is no share above 0.05.
+    share = where(end < 0.0, where(share > 0.05, BEYOND * share, 0.05), 0.5)
+    return share, missed
+
+
+def _turned_twice(
+    eq: Equations, switch: Switch, made: Step, length: Value, frozen: dict[int, Value]
+) -> Value:
+    """Whether the slide turned on the way although it moves on as before at the end."""
+    at = next(i for i, state in enumerate(eq.states) if state.value is switch.value)
+    turned = eq.graph.constant(False, "truth")
+    for states in made.visited:
+        back = -frozen[eq["direction"].id] * states[at]
+        turned = turned | (back * (0.25 * length) > 10.0 * switch.overshoot)
+    return turned

@@ -1,0 +1,158 @@
+"""The compiled step once more in plain Python: to read, to print from, to set breakpoints in.
+
+    plain = PlainPlant(Plant("station"))
+    print(plain.text)                       # the arithmetic, line by line
+    for made in plain.attempts(rest, motor_voltage=3.0, regulator_voltage=6.0, duration=0.01):
+        print(made.length, made.taken, made.state)
+
+It makes the same attempts in the same order as the compiled march, some hundred times slower.
+Compiled code rounds a product and a sum at once (fused multiply-add), so a step's numbers differ
+from it by a few units in the last place, and a long trial's by what those grow to.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from types import ModuleType
+
+import numpy as np
+
+from pma_gym.kernels.graph import Value
+from pma_gym.kernels.text import python_text
+from pma_gym.kernels.trace import live_inputs
+from pma_gym.plant.attempt import first_size
+from pma_gym.plant.compose import COMMANDS, ZERO
+from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.program import parameter_names
+
+
+@dataclass(frozen=True)
+class Made:
+    """One attempt at a step.
+
+    Attributes:
+        proposed: size that it was begun with (s).
+        left: time that was left of the span (s).
+        taken: whether it was good enough.
+        length: how long it was (s); time passes only if it was taken.
+        state: state vector after it (SI).
+        size: proposed size of the next (s).
+    """
+
+    proposed: float
+    left: float
+    taken: bool
+    length: float
+    state: np.ndarray = field(repr=False)
+    size: float
+
+
+class PlainPlant:
+    """A plant whose rates and steps are functions of plain Python.
+
+    Args:
+        plant: the compiled plant that it stands beside.
+
+    Attributes:
+        plant: the compiled plant.
+        text: the module: functions `rates` and `attempt`, one line an operation.
+        module: the module itself; replace its functions, or step into them with a debugger.
+        arguments: names of the inputs of each function, as they stand in the equations.
+    """
+
+    def __init__(self, plant: Plant) -> None:
+        self.plant = plant
+        system, made = plant.program.held, plant.program.held.attempt
+        stepped = [*made.states, made.next_size, made.next_left, made.taken, made.length]
+        functions = {"rates": plant.program.rates(), "attempt": stepped}
+        inputs = {name: live_inputs(values) for name, values in functions.items()}
+        self.arguments = {name: [i.data for i in values] for name, values in inputs.items()}
+        self.states = [entry.name for entry in system.equations.remembered]
+        self.text = "\n\n".join(
+            _text(values, inputs[name], name) for name, values in functions.items()
+        )
+        self.module = ModuleType(f"plain_{plant.model.name}")
+        code = compile(self.text, f"<{self.module.__name__}>", "exec")
+        exec(code, self.module.__dict__)
+        names = ["tolerance", *parameter_names(plant.model)]
+        self._fixed = dict(zip(names, map(float, plant.vector), strict=True))
+
+    def derivative(
+        self,
+        state: np.ndarray,
+        motor_voltage: float,
+        regulator_voltage: float,
+        zero_contraction: float,
+    ) -> np.ndarray:
+        """Time derivative of the state vector (SI per s), as `Plant.derivative`."""
+        known = self._known(state, (motor_voltage, regulator_voltage), zero_contraction)
+        return np.array(self._call("rates", known), float)
+
+    def attempt(
+        self,
+        state: np.ndarray,
+        commands: tuple[float, float],
+        zero_contraction: float,
+        size: float,
+        left: float,
+    ) -> Made:
+        """One attempt at a step.
+
+        Args:
+            state: state vector (SI).
+            commands: motor and regulator voltage (V).
+            zero_contraction: contraction x0 that the trial began at with no load (m).
+            size: proposed size (s).
+            left: time left (s).
+        """
+        known = self._known(state, commands, zero_contraction) | {"size": size, "left": left}
+        *after, following, _, taken, length = self._call("attempt", known)
+        after = np.array(after, float)
+        return Made(size, left, bool(taken), float(length), after, float(following))
+
+    def attempts(
+        self,
+        condition: Condition,
+        motor_voltage: float,
+        regulator_voltage: float,
+        duration: float,
+    ) -> Iterator[Made]:
+        """All attempts of `Plant.step`, one by one; the condition moves along with them."""
+        left, zero = duration, condition.zero_contraction
+        commands = (motor_voltage, regulator_voltage)
+        before = condition.commands or commands
+        jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
+        condition.size, condition.commands = first_size(condition.size, jump), commands
+        while left > 0.0:
+            given = (motor_voltage, regulator_voltage)
+            made = self.attempt(condition.state, given, zero, condition.size, left)
+            condition.state[:], condition.size = made.state, made.size
+            if made.taken:
+                left -= made.length
+                condition.time += made.length
+            yield made
+
+    def step(
+        self,
+        condition: Condition,
+        motor_voltage: float,
+        regulator_voltage: float,
+        duration: float,
+    ) -> int:
+        """Hold the commands for a while, as `Plant.step`; returns how many attempts were made."""
+        return sum(1 for _ in self.attempts(condition, motor_voltage, regulator_voltage, duration))
+
+    def _known(
+        self, state: np.ndarray, commands: tuple[float, float], zero: float
+    ) -> dict[str, float]:
+        moving = dict(zip(self.states, map(float, state), strict=True))
+        return self._fixed | moving | dict(zip(COMMANDS, commands, strict=True)) | {ZERO: zero}
+
+    def _call(self, name: str, known: dict[str, float]) -> tuple:
+        function: Callable[..., tuple] = getattr(self.module, name)
+        # NumPy's numbers divide by zero as compiled code does: inf or NaN, where a float raises.
+        with np.errstate(all="ignore"):
+            return function(*(np.float64(known[i]) for i in self.arguments[name]))
+
+
+def _text(values: list[Value], inputs: list[Value], name: str) -> str:
+    return python_text(values, inputs, name)

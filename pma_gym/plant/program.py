@@ -1,0 +1,436 @@
+"""A plant's compiled functions: rates, outputs, balances, whole trials.
+
+They depend on a model's structure alone, its effects and the lengths of its rows; parameters come
+as a vector when they run. So a drawn station, or a fit's next guess, compiles nothing.
+"""
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from llvmlite import ir
+
+from pma_gym.kernels.control import (
+    DOUBLE,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    function,
+    integer,
+    intrinsic,
+    loop,
+    offset,
+)
+from pma_gym.kernels.graph import CHANGING, FIXED, Value
+from pma_gym.kernels.llvm import Lanes
+from pma_gym.kernels.native import compiled
+from pma_gym.kernels.substitute import substitute
+from pma_gym.kernels.trace import live_inputs
+from pma_gym.plant.attempt import Attempt, attempt, first_size
+from pma_gym.plant.compose import COMMANDS, ZERO, Equations
+from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
+from pma_gym.plant.model import PLANTS, Model
+
+WIDTH = 16
+"""Lanes of the kernels for many plants: two registers of AVX-512, the fastest measured."""
+
+FIRST_S = 7e-4
+"""First attempt at a step from rest (s)."""
+
+_POINTER, _INTEGER, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
+
+
+@dataclass(frozen=True)
+class System:
+    """A model's equations with the arithmetic of one step.
+
+    Attributes:
+        equations: the equations.
+        attempt: one attempt at a step.
+        layout: what a lane works on.
+    """
+
+    equations: Equations
+    attempt: Attempt
+    layout: Layout
+
+
+def system(model: Model, ramped: bool) -> System:
+    """A model's equations and step; with `ramped`, commands change linearly in time."""
+    plant = PLANTS[model.plant]
+    equations = Equations(model.effects, model.parameters, ramped)
+    plant.write_equations(equations)
+    equations.finish()
+    made = attempt(equations, plant.POSITIONS)
+    return System(equations, made, Layout.of(made))
+
+
+def parameter_names(model: Model) -> list[str]:
+    """Names of the inputs that a model's vector gives, in its order."""
+    names = []
+    for effect, lengths in model.lengths().items():
+        fields = model.parameters[effect]._fields
+        for field, length in zip(fields, lengths, strict=True):
+            whole = f"{effect}.{field}"
+            names += [f"{whole}[{i}]" for i in range(length)] if length else [whole]
+    return names
+
+
+def structure(model: Model) -> list[str]:
+    """What a model's compiled functions depend on, beside this package's text."""
+    return [model.plant, *(f"{name} {lengths}" for name, lengths in model.lengths().items())]
+
+
+class Program:
+    """The compiled functions of all models of one structure.
+
+    Args:
+        model: one of them.
+
+    Attributes:
+        model: the model it was made for.
+        states: names of states and memories, in the order of the state vector.
+        outputs: names of the true outputs.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.model = model
+        self.library = compiled(["plant", *structure(model)], self._build, f"plant {model.name}")
+        self._functions()
+
+    @cached_property
+    def held(self) -> System:
+        """The system with commands held."""
+        return system(self.model, ramped=False)
+
+    @cached_property
+    def ramped(self) -> System:
+        """The system with commands joined linearly."""
+        return system(self.model, ramped=True)
+
+    @cached_property
+    def equations(self) -> Equations:
+        """The equations with commands held, without the arithmetic of a step."""
+        equations = Equations(self.model.effects, self.model.parameters)
+        PLANTS[self.model.plant].write_equations(equations)
+        return equations
+
+    @property
+    def states(self) -> list[str]:
+        """Names of states and memories, in the order of the state vector."""
+        return [state.name for state in self.equations.remembered]
+
+    def _functions(self) -> None:
+        pointer, whole, real = _POINTER, _INTEGER, _REAL
+        get = self.library.function
+        self.table = get("table", [pointer, pointer])
+        self.derivative = get("derivative", [whole, *[pointer] * 3, whole, pointer])
+        self.observe = get("observe", [whole, pointer, real, pointer, pointer])
+        self.simulate_one = get("simulate_1", [whole, pointer, pointer])
+        self.simulate_many = get(f"simulate_{WIDTH}", [whole, pointer, pointer])
+        if self.model.plant == "station":
+            self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
+        self.table_size = int(get("table_size", [], whole)())
+
+    def _build(self) -> ir.Module:
+        module = ir.Module()
+        self._table(module)
+        self._derivative(module)
+        self._observe(module)
+        if self.model.plant == "station":
+            self._balance(module)
+        for width in (1, WIDTH):
+            _simulate(module, self.ramped, width)
+        return module
+
+    def parameters(self, builder: Builder, vector: Operand, values: list[Value]) -> dict:
+        """The inputs of level FIXED that values depend on, loaded from a vector.
+
+        The vector begins with the tolerance.
+        """
+        places = {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
+        return {
+            value.id: builder.load(offset(builder, vector, places[value.data]), typ=DOUBLE)
+            for value in live_inputs(values)
+            if value.level == FIXED
+        }
+
+    def _table(self, module: ir.Module) -> None:
+        """Everything that is fixed for a model, from its vector."""
+        fixed = self.ramped.layout.fixed
+        b, (vector, out) = function(module, "table", [("vector", POINTER), ("out", POINTER)])
+        # Without fused products: the table may be made in other ways, of the same bits.
+        found = Lanes(1).emit(b, fixed, self.parameters(b, vector, fixed))
+        for i, value in enumerate(fixed):
+            b.store(found[value.id], offset(b, out, i))
+        b.ret_void()
+        b, _ = function(module, "table_size", [], INTEGER)
+        b.ret(integer(len(fixed)))
+
+    def _derivative(self, module: ir.Module) -> None:
+        """Rates of many states at once, each with its commands and x0, and its own vector."""
+        eq = self.equations
+        b, (count, states, inputs, vectors, stride, out) = function(
+            module,
+            "derivative",
+            [("count", INTEGER), ("states", POINTER), ("inputs", POINTER)]
+            + [("vectors", POINTER), ("stride", INTEGER), ("out", POINTER)],
+        )
+        rates, given = self.rates(), (*COMMANDS, ZERO)
+        with loop(b, count) as row:
+            known = self.parameters(b, offset(b, vectors, b.mul(row, stride)), rates)
+            for i, entry in enumerate(eq.remembered):
+                where = b.add(b.mul(row, integer(len(eq.remembered))), integer(i))
+                known[entry.value.id] = b.load(offset(b, states, where), typ=DOUBLE)
+            for i, name in enumerate(given):
+                where = b.add(b.mul(row, integer(len(given))), integer(i))
+                known[eq[name].id] = b.load(offset(b, inputs, where), typ=DOUBLE)
+            found = Lanes(1).emit(b, rates, known)
+            for i, rate in enumerate(rates):
+                where = b.add(b.mul(row, integer(len(rates))), integer(i))
+                b.store(found[rate.id], offset(b, out, where))
+        b.ret_void()
+
+    def rates(self) -> list[Value]:
+        """Rates of all states and memories, where a step begins."""
+        return rates(self.equations)
+
+    def _observe(self, module: ir.Module) -> None:
+        eq = self.equations
+        outputs = substitute(list(eq.outputs.values()), at_rest(eq))
+        b, (count, states, zero, vector, out) = function(
+            module,
+            "observe",
+            [("count", INTEGER), ("states", POINTER), ("zero", DOUBLE)]
+            + [("vector", POINTER), ("out", POINTER)],
+        )
+        known = self.parameters(b, vector, outputs) | {eq[ZERO].id: zero}
+        n = len(eq.remembered)
+        with loop(b, count) as row:
+            for i, entry in enumerate(eq.remembered):
+                where = b.add(b.mul(row, integer(n)), integer(i))
+                known[entry.value.id] = b.load(offset(b, states, where), typ=DOUBLE)
+            found = Lanes(1).emit(b, outputs, known)
+            for i, value in enumerate(outputs):
+                where = b.add(b.mul(row, integer(len(outputs))), integer(i))
+                b.store(found[value.id], offset(b, out, where))
+        b.ret_void()
+
+    def _balance(self, module: ir.Module) -> None:
+        """Contraction at which the muscle balances a load, by halving, memories at zero."""
+        eq = self.equations
+        (force,) = substitute([static_force(eq)], {})
+        b, (count, pressures, loads, vectors, stride, out) = function(
+            module,
+            "balance",
+            [("count", INTEGER), ("pressures", POINTER), ("loads", POINTER)]
+            + [("vectors", POINTER), ("stride", INTEGER), ("out", POINTER)],
+        )
+        names = parameter_names(self.model)
+        stretch, contraction = (
+            names.index(f"limits.{name}") + 1 for name in ("stretch", "contraction")
+        )
+        with loop(b, count) as row:
+            vector = offset(b, vectors, b.mul(row, stride))
+            known = self.parameters(b, vector, [force])
+            known[eq["pressure"].id] = b.load(offset(b, pressures, row), typ=DOUBLE)
+            load = b.load(offset(b, loads, row), typ=DOUBLE)
+            reach = [b.load(offset(b, vector, i), typ=DOUBLE) for i in (stretch, contraction)]
+            found = balanced(b, eq, force, known, load, reach)
+            b.store(found, offset(b, out, row))
+        b.ret_void()
+
+
+HALVINGS = 60
+"""Halvings of a bracket of some 160 mm: to the last bit."""
+
+
+def balanced(
+    b: Builder,
+    eq: Equations,
+    force: Value,
+    known: dict[int, Operand],
+    load: Operand,
+    reach: Sequence[Operand],
+) -> Operand:
+    """Write a search for the contraction at which a force has a value; returns it.
+
+    Args:
+        b: where to write.
+        eq: the equations.
+        force: the muscle's force, which falls with contraction (N).
+        known: its inputs but the contraction, by id.
+        load: the value (N).
+        reach: greatest stretch and contraction (m); twice these is where it searches.
+    """
+    low, high = memory(b, DOUBLE), memory(b, DOUBLE)
+    b.store(b.fmul(ir.Constant(DOUBLE, -2.0), reach[0]), low)
+    b.store(b.fmul(ir.Constant(DOUBLE, 2.0), reach[1]), high)
+    with loop(b, HALVINGS):
+        a, c = b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE)
+        middle = b.fmul(ir.Constant(DOUBLE, 0.5), b.fadd(a, c))
+        found = Lanes(1).emit(b, [force], {**known, eq["contraction"].id: middle})[force.id]
+        pulls = b.fcmp_ordered(">", found, load)
+        b.store(b.select(pulls, middle, a), low)
+        b.store(b.select(pulls, c, middle), high)
+    half = b.fadd(b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE))
+    return b.fmul(ir.Constant(DOUBLE, 0.5), half)
+
+
+def at_rest(eq: Equations) -> dict[int, Value]:
+    """What paths and their direction are where a step begins, by id."""
+    here = {path.after.id: path.value for path in eq.paths}
+    if eq.travelled is not None and eq.paths:
+        here[eq["origin"].id] = eq.travelled[0]
+    return here
+
+
+def rates(eq: Equations) -> list[Value]:
+    """Rates of states, then of memories of the way: their slope along it, times the speed."""
+    from pma_gym.kernels.derivative import derivative
+    from pma_gym.plant.attempt import beginning
+
+    frozen, here = beginning(eq)
+    own = [state.rate for state in eq.states if state.name not in COMMANDS]
+    found = substitute(own, {**frozen, **here})
+    for path in eq.paths:
+        assert eq.travelled is not None
+        (slope,) = derivative(path.after, [eq.travelled[0]])
+        assert slope is not None
+        found.append(substitute([slope], frozen)[0] * eq.travelled[1])
+    return found
+
+
+def static_force(eq: Equations) -> Value:
+    """Force of the muscle on the slide at rest, without the cable, memories at zero."""
+    force = eq["muscle_force"] + eq["slide_force"]
+    nothing = eq.graph.constant(0.0)
+    memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
+    here = at_rest(eq) | {eq["velocity"].id: nothing}
+    (first,) = substitute([force], here)
+    return substitute([first], memories | {eq["velocity"].id: nothing})[0]
+
+
+JOB = ("rows", "joined", "time", "motor", "regulator", "table", "start", "out")
+"""Entries of a job of `simulate`: counts, then addresses. `start` holds the state vector, the size
+of the first step and the contraction x0; `out` takes the states, one row a time."""
+
+
+def _simulate(module: ir.Module, system: System, width: int) -> None:
+    """Whole trials, one after the other in every lane."""
+    eq, made = system.equations, system.attempt
+    b, (count, jobs, attempts) = function(
+        module,
+        f"simulate_{width}",
+        [("count", INTEGER), ("jobs", POINTER), ("attempts", POINTER)],
+    )
+    lanes = Lanes(width, fused=FUSED)
+    lane = Lane(b, lanes, system.layout)
+    following = memory(b, INTEGER)
+    b.store(integer(0), following)
+    rows = memory(b, ir.ArrayType(INTEGER, width))
+    n = len(eq.remembered)
+
+    def entry(job: Operand, name: str) -> Operand:
+        where = b.add(b.mul(job, integer(len(JOB))), integer(JOB.index(name)))
+        return b.load(offset(b, jobs, where, INTEGER), typ=INTEGER)
+
+    def address(job: Operand, name: str) -> Operand:
+        return b.inttoptr(entry(job, name), POINTER)
+
+    def at(job: Operand, name: str, row: Operand) -> Operand:
+        return b.load(offset(b, address(job, name), row), typ=DOUBLE)
+
+    jump = eq.graph.input("jump", CHANGING)
+    begun = first_size(made.size, jump)
+
+    def begin_row(k: Operand, job: Operand, row: Operand) -> None:
+        ahead = b.add(row, integer(1))
+        duration = b.fsub(at(job, "time", ahead), at(job, "time", row))
+        lane.put(made.left, k, duration)
+        joined = b.icmp_signed("!=", entry(job, "joined"), integer(0))
+        start = address(job, "start")
+        known = {eq[ZERO].id: b.load(offset(b, start, n + 1), typ=DOUBLE)}
+        moved: Operand = ir.Constant(DOUBLE, 0.0)
+        for name, column in zip(COMMANDS, ("motor", "regulator"), strict=True):
+            first, last = at(job, column, row), at(job, column, ahead)
+            slope = b.fdiv(b.fsub(last, first), duration)
+            known[eq.graph.input(f"{name}_slope", 1).id] = b.select(
+                joined, slope, ir.Constant(DOUBLE, 0.0)
+            )
+            lane.put(eq[name], k, first)
+            # A trial begins settled at its first commands: nothing jumps there.
+            before = b.select(b.icmp_signed(">", row, integer(0)), b.sub(row, integer(1)), row)
+            moves = intrinsic(b, "fabs", b.fsub(first, at(job, column, before)))
+            larger = b.fcmp_ordered(">", moves, moved)
+            moved = b.select(larger, moves, moved)
+        size = lane.get(made.size, k)
+        found = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
+        lane.put(made.size, k, b.select(joined, size, found[begun.id]))
+        lane.hold(k, known)
+        b.store(row, offset(b, rows, k, INTEGER))
+
+    def keep(k: Operand, job: Operand, row: Operand) -> None:
+        out = offset(b, address(job, "out"), b.mul(row, integer(n)))
+        for i, state in enumerate(eq.remembered):
+            b.store(lane.get(state.value, k), offset(b, out, i))
+
+    def take(k: Operand) -> Operand:
+        job = b.load(following, typ=INTEGER)
+        found = b.icmp_signed("<", job, count)
+        with b.if_then(found):
+            b.store(b.add(job, integer(1)), following)
+            b.store(job, lane.job(k))
+            start = address(job, "start")
+            for i, state in enumerate(eq.remembered):
+                lane.put(state.value, k, b.load(offset(b, start, i), typ=DOUBLE))
+            lane.put(made.size, k, b.load(offset(b, start, n), typ=DOUBLE))
+            lane.tabulate(k, address(job, "table"))
+            keep(k, job, integer(0))
+            begin_row(k, job, integer(0))
+        return found
+
+    def proceed(k: Operand) -> Operand:
+        job = b.load(lane.job(k), typ=INTEGER)
+        row = b.add(b.load(offset(b, rows, k, INTEGER), typ=INTEGER), integer(1))
+        keep(k, job, row)
+        more = b.icmp_signed("<", row, b.sub(entry(job, "rows"), integer(1)))
+        goes_on = memory(b, ir.IntType(1))
+        b.store(ir.Constant(ir.IntType(1), 1), goes_on)
+        with b.if_else(more) as (yes, no):
+            with yes:
+                begin_row(k, job, row)
+            with no:
+                b.store(lane.get(made.size, k), offset(b, address(job, "start"), n))
+                b.store(take(k), goes_on)
+        return b.load(goes_on, typ=ir.IntType(1))
+
+    made_ones = march(lane, made, take, proceed)
+    b.store(b.load(made_ones, typ=INTEGER), attempts)
+    b.ret_void()
+
+
+_programs: dict[tuple[str, ...], Program] = {}
+
+
+def program(model: Model) -> Program:
+    """The compiled functions of a model's structure, made once."""
+    key = tuple(structure(model))
+    if key not in _programs:
+        _programs[key] = Program(model)
+    return _programs[key]
+
+
+def vector(model: Model, tolerance: float) -> np.ndarray:
+    """A model's numbers as compiled functions read them: the tolerance, then all parameters."""
+    return np.concatenate([[tolerance], model.vector()])
+
+
+def table(made: Program, numbers: np.ndarray) -> np.ndarray:
+    """Everything that is fixed for a model, from its vector."""
+    out = np.empty(made.table_size)
+    made.table(numbers.ctypes.data, out.ctypes.data)
+    return out

@@ -1,0 +1,288 @@
+"""What a model leaves unexplained of many trials, and how that changes with its parameters.
+
+All trials, each with the parameters as they are and with every free one moved a little, are
+simulated together. Sums over residuals are made trial by trial, so that no Jacobian of a million
+rows is ever held.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import repeat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.plant import sensors, settle
+from pma_gym.plant.logged import Logged
+from pma_gym.plant.model import Model, ModelError
+from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS, Plant
+from pma_gym.plant.program import FIRST_S, parameter_names, table
+from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+MOST_BYTES = 1 << 28
+"""Most memory for the states of trials that are simulated together."""
+
+_COLUMNS = 1024
+"""Residuals in one product of matrices: few enough that no BLAS shares it between threads, which
+would make the last bits a matter of their number."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that a fit may change.
+
+    Attributes:
+        path: `effect.parameter_unit`, as in `Model.paths`.
+        place: its place in the vector that compiled functions read.
+        quantity: its unit and bounds.
+    """
+
+    path: str
+    place: int
+    quantity: Quantity
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over the residuals r of all trials, in units of their noise; J = dr / d(parameters).
+
+    Attributes:
+        chi_square: r.r; infinite where the model cannot be simulated.
+        gradient: J^T r, shape (p,), per unit at the door.
+        curvature: J^T J, shape (p, p).
+    """
+
+    chi_square: float
+    gradient: Array
+    curvature: Array
+
+
+class Residuals:
+    """Measured trials beside a model whose free parameters are given.
+
+    A residual is simulated minus measured, in standard deviations: the sensor's noise and the
+    rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
+    does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
+    begins settled at its first commands.
+
+    Args:
+        model: the model; its noise levels weigh the sensors, its drive and its regulator's line
+            say what commanded loads and pressures are in volts.
+        trials: the trials, which need measurements.
+        free: paths of the free parameters.
+        tolerance: of the integrator, as `Plant`.
+        joined: whether commands are joined linearly; else each is held until the next.
+        threads: how many threads share the work; the results' bits do not depend on it.
+
+    Attributes:
+        free: the free parameters.
+        start: their values in the model, at the door, shape (p,).
+        count: number of residuals.
+        deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
+        trials: number of trials.
+    Raises:
+        ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
+        ValueError: no trial, or one that measures nothing.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        free: Sequence[str],
+        tolerance: float = DEFAULT_TOLERANCE,
+        joined: bool = True,
+        threads: int = 1,
+    ) -> None:
+        self.plant, self.joined, self.threads = Plant(model, tolerance), joined, threads
+        self.free = _free(self.plant.model, free)
+        places = [parameter.place for parameter in self.free]
+        self._factors = np.array([parameter.quantity.factor for parameter in self.free])
+        self.start: Array = self.plant.vector[places] / self._factors
+        self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
+        self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
+        steps = np.array([line.resolution for _, line in sensors.SENSORS.values()])
+        rounding = steps / math.sqrt(12.0)
+        self.deviations: Array = np.hypot(sensors.noise_levels(self.plant.model), rounding)
+        self.trials = len(trials)
+        if not trials:
+            raise ValueError("a fit needs at least one trial")
+        self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
+        self.count = sum(logged.count for logged in self._trials)
+        self._buffer = np.empty(0)
+
+    def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
+        """Sums at parameters, with the Jacobian by finite differences.
+
+        Args:
+            values: the parameters at the door, shape (p,).
+            steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
+            central: move each both ways, which costs twice as much.
+        """
+        size = len(steps)
+        total = np.zeros((size + 1, size + 1))
+
+        def add(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            return self._gram(self._differences(logged, states, zeros, vectors, central))
+
+        tried = _moved(values, steps, central)
+        for gram in self._each(tried, add):
+            total += gram
+        widths = np.concatenate([[1.0], steps])
+        total /= np.outer(widths, widths)
+        if not np.isfinite(total).all() or not self._settled:
+            return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
+        return Sums(float(total[0, 0]), total[1:, 0], total[1:, 1:])
+
+    def each(self, values: Array) -> list[Array]:
+        """Residuals of each trial at parameters, shape (rows, 4) in the order of outputs.
+
+        Raises:
+            ValueError: the model cannot balance the load at the beginning of a trial.
+        """
+        return [found[0] for found in self._dense(values, np.ones(0), central=False)]
+
+    def jacobian(self, values: Array, steps: Array, central: bool = False) -> list[Array]:
+        """Derivatives of each trial's residuals, shape (p, rows, 4), as `sums` uses them."""
+        return [found[1:] / steps[:, None, None] for found in self._dense(values, steps, central)]
+
+    def _dense(self, values: Array, steps: Array, central: bool) -> list[Array]:
+        def copy(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            found = self._differences(logged, states, zeros, vectors, central)
+            scaled = found / self.deviations[:, None]
+            return scaled[:, :, : len(logged.time)].transpose(0, 2, 1)
+
+        found = list(self._each(_moved(values, steps, central), copy))
+        if not self._settled:
+            raise ValueError("no contraction balances the load at the beginning of a trial")
+        return found
+
+    def _each(
+        self, tried: Array, work: Callable[[Logged, Array, Array, Array], Array]
+    ) -> list[Array]:
+        """Simulate all trials at all parameters; what `work` makes of each trial, in their order.
+
+        It gets states of shape (tried, rows, states), x0 of shape (tried,) and their vectors.
+        """
+        vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
+        for column, parameter in enumerate(self.free):
+            vectors[:, parameter.place] = tried[:, column] * self._factors[column]
+        tables = [table(self.plant.program, vector) for vector in vectors]
+        count, number = len(tried), len(self.plant.states)
+        first = np.array([logged.first for logged in self._trials])
+        commands = np.repeat(first, count, axis=0).T
+        states, zeros = settle.all_at_rest(
+            self.plant, commands[0], commands[1], np.tile(vectors, (len(self._trials), 1))
+        )
+        found: list[Array] = []
+        self._settled = bool(np.isfinite(zeros).all() and np.isfinite(states).all())
+        if not self._settled:
+            return found
+        shape = (len(self._trials), count)
+        states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
+        with ThreadPoolExecutor(self.threads) as pool:
+            for block in self._blocks(8 * number * count):
+                runs, spaces = [], self._spaces(block, count)
+                for i, space in zip(block, spaces, strict=True):
+                    logged = self._trials[i]
+                    columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                    runs += [
+                        Run(*columns, tables[k], states[i, k], zeros[i, k], FIRST_S, space[k])
+                        for k in range(count)
+                    ]
+                simulate_all(self.plant.program, runs, self.threads)
+                logs = [self._trials[i] for i in block]
+                found += pool.map(work, logs, spaces, zeros[block], repeat(vectors))
+        return found
+
+    def _blocks(self, bytes_a_row: int) -> list[list[int]]:
+        """Trials that fit into memory together."""
+        blocks, room = [], 0
+        for i, logged in enumerate(self._trials):
+            needed = bytes_a_row * len(logged.time)
+            if not blocks or needed > room:
+                blocks.append([])
+                room = MOST_BYTES
+            blocks[-1].append(i)
+            room -= needed
+        return blocks
+
+    def _spaces(self, block: list[int], count: int) -> list[Array]:
+        """Room for the states of a block's trials, shape (count, rows, states) each; used again."""
+        shapes = [(count, len(self._trials[i].time), len(self.plant.states)) for i in block]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
+        if len(self._buffer) < ends[-1]:
+            self._buffer = np.empty(ends[-1])
+        parts = np.split(self._buffer[: ends[-1]], ends[:-1])
+        return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+
+    def _differences(
+        self, logged: Logged, states: Array, zeros: Array, vectors: Array, central: bool
+    ) -> Array:
+        """Simulated minus measured, then what moving each parameter changes (SI).
+
+        Shape (1 + p, 4, rows and some zeros more).
+        """
+        held = self._held(states, zeros, vectors)
+        count, rows = len(states), len(logged.time)
+        moved = (count - 1) // 2 if central else count - 1
+        found = np.zeros((1 + moved, len(OUTPUTS), -(-rows // _COLUMNS) * _COLUMNS))
+        for channel, signal in enumerate(held):
+            if not logged.measures[channel]:
+                continue
+            there = found[:, channel, :rows]
+            np.subtract(signal[0], logged.measured[channel], out=there[0])
+            if central:
+                np.subtract(signal[1 : 1 + moved], signal[1 + moved :], out=there[1:])
+                there[1:] *= 0.5
+            else:
+                np.subtract(signal[1:], signal[0], out=there[1:])
+            if logged.missing[channel].size:
+                there[:, logged.missing[channel]] = 0.0
+        return found
+
+    def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
+        """What the sensors hold, shape (tried, rows) each."""
+        columns, program = self.plant.sensor_columns, self.plant.program
+        count, rows, _ = states.shape
+        truth = np.empty((count, rows, len(OUTPUTS)) if min(columns) < 0 else (0, 0, 0))
+        for i, out in enumerate(truth):
+            addresses = (vectors[i].ctypes.data, out.ctypes.data)
+            program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)
+        return [states[:, :, at] if at >= 0 else truth[:, :, i] for i, at in enumerate(columns)]
+
+    def _gram(self, differences: Array) -> Array:
+        """Products of all differences with each other, in units of noise, shape (1 + p, 1 + p)."""
+        parts = differences.reshape(*differences.shape[:2], -1, _COLUMNS).transpose(1, 2, 0, 3)
+        products = np.matmul(parts, parts.swapaxes(2, 3)).sum(axis=1)
+        return np.sum(products / (self.deviations**2)[:, None, None], axis=0)
+
+
+def _moved(values: Array, steps: Array, central: bool) -> Array:
+    """The parameters, then with each of them moved, shape (tried, p)."""
+    moves = np.diag(steps) if steps.size else np.empty((0, len(values)))
+    both = [np.zeros((1, len(values))), moves, -moves]
+    return values + np.concatenate(both if central else both[:2])
+
+
+def _free(model: Model, paths: Sequence[str]) -> list[Free]:
+    names, found = parameter_names(model), []
+    # Its message names the nearest that there is.
+    model.replace({path: 0.0 for path in paths if path not in set(model.paths())})
+    for path in paths:
+        effect, _, door = path.partition(".")
+        law = model.effects[effect]
+        stem = law.names_at_the_door()[door]
+        if stem in law.rows or (effect in sensors.SENSORS and stem == "noise"):
+            raise ModelError(
+                f"{path} cannot be fitted: it is "
+                + ("a row of numbers" if stem in law.rows else "what residuals are counted in")
+            )
+        found.append(Free(path, 1 + names.index(f"{effect}.{stem}"), law.quantities[stem]))
+    return found

@@ -1,0 +1,215 @@
+"""An environment in a batch is the environment alone, bit for bit."""
+
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.plant.model import load_model
+from pma_gym.plant.sensors import noise_levels
+from pma_gym.tasks import REWARDS, TASKS
+
+EPISODE = 51
+"""Steps of a displacement at 10 Hz."""
+
+SEVERAL = {
+    "randomisation": "varied", "action_delay_s": 0.2, "observation_delay_s": 0.3, "history": 2,
+    "preview": 3, "regulator_action": True, "reward": "smooth", "pressure_kpa": "random",
+}  # fmt: skip
+"""Nearly everything at once."""
+
+
+@pytest.mark.parametrize("count", [1, 2, 15, 16, 17, 33])
+@pytest.mark.parametrize("threads", [1, 2])
+def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
+    both = twins(count, model=fragile, batch={"threads": threads})
+    both.reset(seed=5)
+    for _ in range(3 * EPISODE):
+        both.step()
+    assert both.ends[0].sum() > 2 * count
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("task", TASKS)
+def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, task):
+    both = twins(5, task, autoreset_mode=mode, model=fragile, pressure_kpa="random")
+    both.reset(seed=[3, 1, 4, 1, 5])
+    # Gently in turn, so that some episodes reach their end.
+    for k in range(12 * EPISODE):
+        both.step(-1.0, 1.0 if k % 250 < 60 else -0.9)
+    assert both.ends[0].sum() > 3 and both.ends[1].sum() > 3
+    # Episodes that go on are begun anew as well.
+    both.reset()
+    both.step()
+    both.reset(seed=9, options={"pressure_kpa": 444.0})
+    assert both.batch.station_info()["pressure_kpa"] == pytest.approx([444.0] * 5)
+    both.step()
+
+
+def test_without_autoreset_a_mask_says_who_begins_anew(twins, fragile):
+    both = twins(17, autoreset_mode="Disabled", model=fragile, randomisation="varied")
+    both.reset(seed=2)
+    for k in range(3 * EPISODE):
+        over = both.step()
+        if over.any():
+            # Some with a seed of their own, some going on with theirs.
+            seeds = None if k % 2 else [k + i if i % 3 else None for i in range(17)]
+            both.reset(seed=seeds, options={"reset_mask": over})
+    assert both.ends[0].sum() > 30
+
+
+@pytest.mark.parametrize("randomisation", ["none", "intervals", "varied"])
+@pytest.mark.parametrize("name", ["serres2008", "station", "cascade", "chou_hannaford"])
+def test_models_and_their_randomisation(twins, name, randomisation):
+    options = {"model": name, "randomisation": randomisation, "pressure_kpa": "random"}
+    both = twins(18, **options)
+    for _ in range(2):
+        both.reset(seed=11)
+        for _ in range(EPISODE + 5):
+            both.step(-1.0, -0.5)
+
+
+@pytest.mark.parametrize("reward", sorted(REWARDS))
+def test_rewards(twins, reward):
+    both = twins(3, reward=reward)
+    both.reset(seed=0)
+    for _ in range(20):
+        both.step(-0.9, -0.7)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"noise": False},
+        {"action_delay_s": 0.3},
+        {"observation_delay_s": 0.2, "history": 2},
+        {"preview": 4},
+        {"regulator_action": True},
+        {"regulator_action": True, "action_delay_s": 0.1},
+        {"control_rate_hz": 100.0, "task": "rotation"},
+        {"control_rate_hz": 384.0 / 7.0},
+        SEVERAL,
+        SEVERAL | {"task": "rotation", "model": "station"},
+    ],
+    ids=",".join,
+)
+def test_options(twins, options):
+    both = twins(17, **options)
+    both.reset(seed=1)
+    for _ in range(EPISODE + 9):
+        both.step(-0.9, -0.4)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_each_environment_has_its_own_pressures(twins, mode):
+    pressures = [200.0, [300.0, 400], "random", 575]
+    both = twins(4, autoreset_mode=mode, pressures_kpa=pressures)
+    both.reset(seed=4)
+    started = []
+    for _ in range(4 * EPISODE + 10):
+        if both.step(-1.0, -0.9).any():
+            started.append(both.batch.engine.pressures.copy() / 1e3)
+    low, listed, drawn, high = np.transpose(started)
+    assert set(low) == {200.0} and set(high) == {575.0}
+    assert set(listed) <= {300.0, 400.0} and len(set(drawn)) > 2
+
+
+def test_pressures_of_one_reset_may_differ_too():
+    envs = PMAVectorEnv(3, model="serres2008")
+    envs.reset(seed=1, options={"pressures_kpa": [200, 300, 400]})
+    assert envs.station_info()["pressure_kpa"] == pytest.approx([200.0, 300.0, 400.0])
+    mask = np.array([False, True, True])
+    envs.reset(options={"pressures_kpa": [500, 350, "random"], "reset_mask": mask})
+    found = envs.station_info()["pressure_kpa"]
+    assert found[:2] == pytest.approx([200.0, 350.0]) and found[2] != pytest.approx(400.0)
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_single_precision_is_near(model, task):
+    made = {"model": model, "noise": False, "pressure_kpa": "random"}
+    envs = [PMAVectorEnv(17, task, precision=p, **made) for p in ("double", "single")]
+    for one in envs:
+        one.reset(seed=8)
+    key, worst = envs[0].engine.record.info[1], np.zeros(17)
+    for k in range(400):
+        volts = 3.0 * np.sin(0.01 * k) ** 2
+        results = [one.step(np.full((17, 1), 0.2 * volts - 1.0)) for one in envs]
+        assert results[1][1].dtype == np.float64 and not results[1][2].any()
+        positions = [one.station_info()[key] for one in envs]
+        worst = np.maximum(worst, np.abs(np.subtract(*positions)))
+    share = worst / {"displacement": 25.0, "rotation": 90.0}[task]
+    # Where rounding decides when friction lets go, a trial may come out a little otherwise.
+    assert 0.0 < np.median(share) < 2e-5 and share.max() < 1e-2
+
+
+def test_single_precision_gives_the_same_bits_in_any_batch():
+    actions = np.random.default_rng(0).uniform(-1.0, 0.0, (60, 33, 1))
+    found = []
+    for count, threads in ((33, 1), (33, 2), (17, 1)):
+        envs = PMAVectorEnv(count, model="station", precision="single", threads=threads)
+        envs.reset(seed=3)
+        steps = [envs.step(actions[k, :count]) for k in range(60)]
+        found.append((np.array([s[0] for s in steps]), np.array([s[1] for s in steps])))
+    for observations, rewards in found[1:]:
+        count = observations.shape[1]
+        np.testing.assert_array_equal(observations, found[0][0][:, :count])
+        np.testing.assert_array_equal(rewards, found[0][1][:, :count])
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_parked_stations_disturb_nobody(model, mode):
+    weak = load_model(model).replace({"limits.tension_n": 5.0})
+    made = {"control_rate_hz": 1.0, "pressure_kpa": 300.0}
+    envs = PMAVectorEnv(19, model=weak, autoreset_mode=mode, **made)
+    envs.reset(seed=0)
+    ends = 0
+    for _ in range(40):
+        observations, rewards, terminated, *_ = envs.step(np.ones((19, 1)))
+        ends += int(terminated.sum())
+        assert np.isfinite(observations).all() and np.isfinite(rewards).all()
+        assert envs.engine.attempts < 20_000
+        numbers = envs.engine.records[:, : len(envs.engine.record.states)]
+        assert np.isfinite(numbers).all()
+    assert ends >= 19
+
+
+@pytest.mark.parametrize("count", [2, 17, 31])
+def test_lanes_without_an_environment_never_end(model, count):
+    envs = PMAVectorEnv(count, "rotation", model=model, action_delay_s=0.01)
+    envs.reset(seed=0)
+    for _ in range(30):
+        envs.engine.actions[:] = 0.0
+        envs.engine.actions[:count] = -0.9
+        assert envs.engine.step() == 0
+
+
+def test_noise_of_a_batch_is_the_models_and_its_environments_own():
+    model = load_model("serres2008")
+    loud = {"lvdt.noise_mm": 1.0, "load_cell.noise_n": 20.0, "pressure_transducer.noise_kpa": 9.0}
+    model = model.replace(loud | {"potentiometer.noise_deg": 5.0})
+    envs = PMAVectorEnv(64, "rotation", model=model, pressure_kpa=300)
+    envs.reset(seed=1)
+    rest = np.full((64, 1), -1.0)
+    readings = np.array([envs.step(rest)[0][:, :4] for _ in range(400)], float)
+    readings *= [25e-3, np.pi / 2, 1000.0, 600e3]
+    levels = noise_levels(model)
+    # The standard deviation of 25600 normal numbers is known to 0.44 %; five of those.
+    np.testing.assert_allclose(readings.std(axis=(0, 1)), levels, rtol=0.025)
+    for quantity in range(4):
+        one = readings[:, :, quantity] - readings[:, :, quantity].mean(axis=0)
+        related = np.corrcoef(one.T)[np.triu_indices(64, 1)]
+        # 2016 pairs of 400 numbers: five standard deviations of 0.05.
+        assert np.abs(related).max() < 0.25
+    # Nor does a step tell the next.
+    assert np.abs((one[1:] * one[:-1]).mean() / one.var()) < 0.03
+
+
+def test_one_environment_is_the_environment():
+    envs, env = PMAVectorEnv(1, model="station"), PMAEnv(model="station")
+    observations, _ = envs.reset(seed=6)
+    np.testing.assert_array_equal(observations[0], env.reset(seed=6)[0])
+    for k in range(100):
+        action = env.action(0.02 * k)
+        observations, rewards, *_ = envs.step(action[None])
+        observation, reward, *_ = env.step(action)
+        np.testing.assert_array_equal(observations[0], observation)
+        assert rewards[0] == reward

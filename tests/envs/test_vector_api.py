@@ -1,0 +1,150 @@
+"""Batches as Gymnasium knows them: ids, modes, spaces, seeds, statistics."""
+
+import os
+import subprocess
+import sys
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from gymnasium.wrappers.vector import RecordEpisodeStatistics
+
+from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+
+MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
+NAME = "pma_gym/IsokineticDisplacement-v0"
+
+
+@pytest.mark.parametrize("mode", [None, "vector_entry_point"])
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_ids_make_batches(name, mode):
+    envs = gym.make_vec(name, 5, vectorization_mode=mode, threads=2, **MADE)
+    assert type(envs) is PMAVectorEnv
+    assert envs.num_envs == 5 and envs.task.name == ENVIRONMENTS[name]
+    assert envs.spec is not None and envs.spec.id == name
+    observations, info = envs.reset(seed=3)
+    assert envs.observation_space.contains(observations) and info == {}
+    again = gym.make_vec(envs.spec)
+    assert type(again) is PMAVectorEnv and again.num_envs == 5
+    np.testing.assert_array_equal(again.reset(seed=3)[0], observations)
+    envs.close()
+
+
+def test_gymnasiums_own_loop_is_made_as_before():
+    envs = gym.make_vec(NAME, 2, vectorization_mode="sync", **MADE)
+    assert type(envs) is SyncVectorEnv
+    ours = gym.make_vec(NAME, 2, **MADE)
+    np.testing.assert_array_equal(envs.reset(seed=1)[0], ours.reset(seed=1)[0])
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_metadata_says_how_episodes_follow_each_other(batch, mode):
+    for given in (mode, mode.value):
+        assert batch(autoreset_mode=given).metadata["autoreset_mode"] == mode
+    assert batch().metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
+    assert batch().metadata["render_fps"] == 10
+    assert PMAVectorEnv.metadata["render_fps"] == 100
+
+
+def test_spaces_are_those_of_the_environment_in_rows(batch):
+    options = {"preview": 2, "history": 1, "regulator_action": True}
+    envs, env = batch(4, **options), PMAEnv(**(MADE | options))
+    assert envs.single_observation_space == env.observation_space
+    assert envs.single_action_space == env.action_space
+    assert envs.observation_space.shape == (4, 11) and envs.action_space.shape == (4, 2)
+    envs.reset(seed=0)
+    observations, rewards, terminated, truncated, _ = envs.step(envs.action_space.sample())
+    assert envs.observation_space.contains(observations)
+    assert rewards.shape == terminated.shape == truncated.shape == (4,)
+    assert (rewards.dtype, terminated.dtype, truncated.dtype) == (np.float64, bool, bool)
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_gymnasiums_statistics_count_episodes(batch, mode):
+    envs = RecordEpisodeStatistics(batch(4, autoreset_mode=mode))
+    envs.reset(seed=0)
+    for _ in range(160):
+        *_, truncated, info = envs.step(np.full((4, 1), -0.9))
+        if truncated.any():
+            known = info if mode == "NextStep" else info["final_info"]
+            assert np.all(known["rmse_mm"] > 0.0)
+            assert np.all(info["episode"]["l"] == 51) and np.all(info["episode"]["r"] < 0.0)
+    assert envs.episode_count == 12
+
+
+def test_the_same_seed_gives_the_same_bits(batch):
+    def episode(envs: PMAVectorEnv) -> list[bytes]:
+        bits = [envs.reset(seed=4)[0].tobytes()]
+        for k in range(70):
+            observations, rewards, *_ = envs.step(np.full((17, 1), 0.005 * k - 1.0))
+            bits += [observations.tobytes(), rewards.tobytes()]
+        return bits
+
+    envs = batch(17, pressure_kpa="random", randomisation="varied")
+    first = episode(envs)
+    assert episode(envs) == first
+    other = batch(17, pressure_kpa="random", randomisation="varied", threads=2)
+    assert episode(other) == first
+    assert envs.reset(seed=5)[0].tobytes() != first[0]
+
+
+def test_without_a_seed_environments_and_episodes_differ(batch):
+    envs = batch(8)
+    first, _ = envs.reset()
+    assert len(np.unique(first[:, :4], axis=0)) == 8
+    assert np.any(envs.reset()[0] != first) and np.any(batch(8).reset()[0] != first)
+
+
+def test_no_info_while_no_episode_ends(batch):
+    envs = batch(6)
+    assert envs.reset(seed=0)[1] == {}
+    for k in range(110):
+        *_, terminated, truncated, info = envs.step(np.full((6, 1), -0.9))
+        assert (k in (50, 102)) == bool(info) == bool(truncated.any())
+        assert not terminated.any()
+
+
+def test_what_is_returned_stays_as_it_was(batch):
+    envs = batch()
+    kept = [envs.reset(seed=0)[0]]
+    copies = [kept[0].copy()]
+    for _ in range(60):
+        results = envs.step(np.full((3, 1), -0.5))[:4]
+        kept += results
+        copies += [array.copy() for array in results]
+    for array, copy in zip(kept, copies, strict=True):
+        np.testing.assert_array_equal(array, copy)
+
+
+def test_closed_threads_come_back_when_they_are_needed(batch):
+    envs, alone = batch(40, threads=3), batch(40)
+    for one in (envs, alone):
+        one.reset(seed=0)
+    envs.close()
+    for _ in range(5):
+        results = [one.step(np.full((40, 1), -0.4)) for one in (envs, alone)]
+        np.testing.assert_array_equal(results[0][0], results[1][0])
+
+
+def test_numbers_of_numpy_are_numbers():
+    envs = PMAVectorEnv(np.int64(2), threads=np.int32(1), pressures_kpa=np.array([200.0, 300]))
+    assert envs.reset(seed=np.int64(3))[0].shape == (2, 7)
+    np.testing.assert_array_equal(envs.reset(seed=3)[0], envs.reset(seed=np.array([3, 4]))[0])
+
+
+def test_a_cache_that_cannot_be_written_is_no_obstacle(tmp_path):
+    blocked = tmp_path / "file"
+    blocked.write_text("no folder")
+    code = (
+        "import warnings; warnings.simplefilter('always')\n"
+        "import numpy as np; from pma_gym.envs import PMAVectorEnv\n"
+        "envs = PMAVectorEnv(2, model='cascade'); envs.reset(seed=0)\n"
+        "print(envs.step(np.zeros((2, 1)))[0].shape)"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True,
+        env=os.environ | {"PMA_GYM_CACHE": str(blocked / "cache")},
+    )  # fmt: skip
+    assert run.stdout == "(2, 7)\n"
+    assert "set PMA_GYM_CACHE" in run.stderr

@@ -1,0 +1,130 @@
+"""Threads that share a compiled function's work: each part once a call, asleep or awake."""
+
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from llvmlite import ir
+
+from pma_gym.kernels.control import INTEGER, POINTER, function, integer, offset
+from pma_gym.kernels.crew import Crew
+from pma_gym.kernels.native import Library, compiled
+
+COUNTER, SECOND = 0, 1
+
+
+def build() -> ir.Module:
+    """Adds the second number to the first, and returns the second."""
+    module = ir.Module()
+    b, (numbers,) = function(module, "add", [("numbers", POINTER)], INTEGER)
+    more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
+    where = offset(b, numbers, integer(COUNTER), INTEGER)
+    b.store(b.add(b.load(where, typ=INTEGER), more), where)
+    b.ret(more)
+    return module
+
+
+def library() -> Library:
+    return compiled(["test crew"], build, "test")
+
+
+@pytest.fixture
+def crew() -> Iterator[tuple[Crew, list[np.ndarray]]]:
+    """Four threads, the parts of their work."""
+    parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
+    crew = Crew(library().address("add"), parts)
+    yield crew, parts
+    crew.close()
+
+
+def test_each_part_is_done_once_a_call(crew):
+    crew, parts = crew
+    for calls in range(1, 50):
+        assert crew.run() == 15
+        assert [part[COUNTER] for part in parts] == [calls << k for k in range(4)]
+
+
+def test_threads_that_sleep_wake_up(crew):
+    crew, parts = crew
+    before = sys.getswitchinterval()
+    # Short turns and all kinds of pauses: a thread is caught at every stage of falling asleep.
+    sys.setswitchinterval(1e-6)
+    try:
+        pauses = np.random.default_rng(0).uniform(0.0, 2e-3, 200)
+        for pause in pauses:
+            time.sleep(pause)
+            assert crew.run() == 15
+    finally:
+        sys.setswitchinterval(before)
+    assert parts[3][COUNTER] == 1600
+
+
+@pytest.fixture
+def begun() -> Callable[[], list[threading.Thread]]:
+    """Threads that have begun since."""
+    before = set(threading.enumerate())
+    return lambda: [thread for thread in threading.enumerate() if thread not in before]
+
+
+def test_a_crew_of_one_needs_no_thread(begun):
+    assert Crew(library().address("add"), [np.array([0, 3], np.int64)]).run() == 3
+    assert not begun()
+
+
+@pytest.mark.parametrize("asleep", [False, True])
+def test_threads_end_with_their_crew(begun, asleep):
+    crew = Crew(library().address("add"), [np.ones(2, np.int64) for _ in range(3)])
+    crew.run()
+    threads = begun()
+    assert len(threads) == 2
+    time.sleep(0.2 if asleep else 0.0)
+    del crew
+    gc.collect()
+    for thread in threads:
+        thread.join(10.0)
+    assert not begun()
+
+
+def test_a_closed_crew_begins_again(begun):
+    crew = Crew(library().address("add"), [np.ones(2, np.int64) for _ in range(3)])
+    for _ in range(2):
+        assert crew.run() == 1
+        threads = begun()
+        assert len(threads) == 2
+        crew.close()
+        for thread in threads:
+            thread.join(10.0)
+        assert not begun()
+
+
+FORK = """
+import os, warnings
+import numpy as np
+from pma_gym.envs import PMAVectorEnv
+warnings.simplefilter("ignore")
+envs = PMAVectorEnv(32, model="cascade", threads=2, pressure_kpa=300)
+envs.reset(seed=0)
+envs.step(np.zeros((32, 1)))
+child = os.fork()
+total = sum(float(envs.step(np.zeros((32, 1)))[1].sum()) for _ in range(5))
+print(total, flush=True)
+if child:
+    os.waitpid(child, 0)
+else:
+    os._exit(0)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork here")
+def test_a_forked_process_has_threads_of_its_own():
+    run = subprocess.run(
+        [sys.executable, "-c", FORK], capture_output=True, text=True, check=True, timeout=120
+    )
+    first, second = run.stdout.split()
+    assert first == second

@@ -1,0 +1,151 @@
+"""Compiled plants: one program a structure, any parameters, any number of trials at once."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.simulation import Run, simulate_all
+
+CHANGES = ("slide.mass_kg", "rotor.inertia_kg_m2", "cable.stiffness_n_per_mm")
+
+
+def trials(count, model="station"):
+    """Trials of different plants of one structure, of different lengths and commands."""
+    nominal, generator = load_model(model), np.random.default_rng(count)
+    values = {name: nominal.at_the_door(name.split(".")[0])[name.split(".")[1]] for name in CHANGES}
+    runs = []
+    for k in range(count):
+        factors = 1.0 + 0.2 * generator.uniform(-1.0, 1.0, len(CHANGES))
+        changed = {n: v * f for (n, v), f in zip(values.items(), factors, strict=True)}
+        plant = Plant(nominal.replace(changed), tolerance=(1.5e-4, 1e-5)[k % 2])
+        rest = plant.settle(0.0, 300e3)
+        rows = int(generator.integers(1, 30))
+        motor, regulator = generator.uniform(0.0, 6.0, rows), generator.uniform(4.0, 8.0, rows)
+        when = np.cumsum(generator.uniform(0.002, 0.02, rows))
+        joined = bool(k % 3)
+        given = (rest.state, rest.zero_contraction)
+        runs.append(Run(when, motor, regulator, joined, plant.table, *given))
+    return runs
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 15, 16, 17, 33, 40])
+def test_many_trials_at_once_have_the_bits_of_each_alone(count, threads):
+    program = Plant("station").program
+    together, alone = trials(count), trials(count)
+    simulate_all(program, together, threads)
+    for run in alone:
+        simulate_all(program, [run])
+    for one, other in zip(together, alone, strict=True):
+        np.testing.assert_array_equal(one.states, other.states)
+        assert one.size == other.size
+        assert one.states.shape == (len(one.time), len(program.states))
+        assert np.all(np.isfinite(one.states))
+
+
+def test_the_order_of_trials_changes_nothing():
+    program = Plant("station").program
+    runs, others = trials(21), trials(21)
+    simulate_all(program, runs)
+    simulate_all(program, others[::-1])
+    for one, other in zip(runs, others, strict=True):
+        np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_run_is_one_trial_of_many():
+    plant = Plant("station")
+    (run,) = trials(1)
+    run.table = plant.table
+    simulate_all(plant.program, [run])
+    start = plant.settle(0.0, 300e3)
+    states, _ = plant.run(run.time, run.motor, run.regulator, run.joined, start)
+    np.testing.assert_array_equal(states, run.states)
+
+
+def test_a_trial_of_another_structure_is_refused():
+    station, runs = Plant("station"), trials(2, "serres2008")
+    with pytest.raises(ValueError, match="models of one structure .*simulate the other models in"):
+        simulate_all(station.program, runs)
+    (run,) = trials(1)
+    run.motor = np.append(run.motor, 1.0)
+    with pytest.raises(ValueError, match="must have one length; got "):
+        simulate_all(station.program, [run])
+
+
+def test_parameters_and_tolerance_compile_nothing():
+    nominal = Plant("station")
+    changed = Plant(load_model("station").replace({"slide.mass_kg": 0.7}), tolerance=1e-6)
+    assert changed.program is nominal.program
+    assert Plant("serres2008").program is not nominal.program
+    assert np.any(changed.table != nominal.table)
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 1e-11, 0.2, float("nan")])
+def test_a_tolerance_that_means_nothing_is_refused(tolerance):
+    with pytest.raises(ValueError, match=r"tolerance must be a share in 1e-10 to 0\.1"):
+        Plant("station", tolerance)
+
+
+def test_a_duration_that_means_nothing_is_refused():
+    plant = Plant("station")
+    rest = plant.settle(0.0, 300e3)
+    for duration in (0.0, -0.01, float("nan"), float("inf")):
+        with pytest.raises(ValueError, match="duration must be a positive time in s"):
+            plant.step(rest, 0.0, 5.0, duration)
+    with pytest.raises(ValueError, match="motor_voltage must lie in 0 to 10 V, got nan"):
+        plant.step(rest, float("nan"), 5.0, 0.01)
+
+
+def run(code, **environment):
+    """Standard output and error of a fresh interpreter, which must succeed."""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        env={**os.environ, **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
+
+
+def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning():
+    code = (
+        "from pma_gym.plant.plant import Plant\n"
+        "for name in ('serres2008', 'station'):\n"
+        "    plant = Plant(name)\n"
+        "    print(plant.settle(0.0, 300e3).zero_contraction)\n"
+        "import pma_gym.kernels.cache as c; print(c.cache_directory())"
+    )
+    out, error = run(code, PMA_GYM_CACHE="/proc/nope")
+    first, _, folder = out.split()
+    assert float(first) == pytest.approx(0.039774599, rel=1e-6)
+    assert error.count("cannot write compiled plants to /proc/nope") == 1
+    assert "set PMA_GYM_CACHE to a writable folder" in error
+    assert not os.path.exists(folder)
+
+
+def test_the_cache_is_where_it_was_asked_for_and_is_used_again(tmp_path):
+    code = (
+        "from pma_gym.plant.plant import Plant\nprint(Plant('serres2008').program.library.was_kept)"
+    )
+    folder = tmp_path / "a" / "b"
+    assert run(code, PMA_GYM_CACHE=str(folder))[0].split() == ["False"]
+    kept = sorted(path for path in folder.rglob("*") if path.is_file())
+    assert kept
+    assert run(code, PMA_GYM_CACHE=str(folder))[0].split() == ["True"]
+    assert sorted(path for path in folder.rglob("*") if path.is_file()) == kept
+
+
+def test_importing_the_library_loads_nothing_heavy():
+    code = (
+        "import sys, pma_gym.plant.plant\n"
+        "print([m for m in ('torch', 'matplotlib', 'control', 'sympy', 'stable_baselines3', "
+        "'pandas', 'pyarrow', 'numba') if m in sys.modules])"
+    )
+    assert run(code)[0].strip() == "[]"
