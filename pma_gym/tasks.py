@@ -52,7 +52,7 @@ class Task:
         # Less than a sample's rounding: 384 Hz needs 1922 steps, not 1923.
         return math.ceil(self.duration * control_rate - 1e-9)
 
-    def error_percent(self, error: float) -> float:
+    def error_percent(self, error: Any) -> Any:  # noqa: ANN401
         """An error (m or rad) in percent of the task's range."""
         return 100.0 * error / self.protocol.span
 

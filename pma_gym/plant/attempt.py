@@ -84,9 +84,10 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
         scale = state.scale * positions.get(state.name, 1.0)
         share = error * (1.0 / (scale * tolerance))
         square = square + share * share
-    factor = SAFETY * _inverse_eighth_root(square)
+    allowed = _allowed(eq)
+    factor = SAFETY * _inverse_eighth_root(square, allowed)
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
-    exact = square <= 1.0
+    exact = square <= allowed
     share, missed = _switched(eq, made, length, frozen, here, moved)
     factor = where(exact & missed, share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
@@ -123,7 +124,7 @@ def first_size(size: Any, jump: Any) -> Any:  # noqa: ANN401
     Returns:
         The same, but 0.33 ms at most after a jump of 1 V, and less with its fourth root.
     """
-    most = JUMP_S * _inverse_eighth_root(jump * jump)
+    most = JUMP_S * _inverse_eighth_root(jump * jump, 1.0)
     return where(size < most, size, most)
 
 
@@ -147,9 +148,30 @@ def _rate_of(eq: Equations, value: Value) -> Value:
     return next(state.rate for state in eq.states if state.value is value)
 
 
-def _inverse_eighth_root(square: Any) -> Any:  # noqa: ANN401
-    """The error of a step goes with h^4, and comes squared; within 9 % by its exponent's bits."""
-    return from_bits(_ONE_BITS + (_ONE_BITS >> 3) - (to_bits(square) >> 3))
+def _allowed(eq: Equations) -> Value:
+    """Squared error that a step may have: 1 at rest, more the faster the slide moves.
+
+    An error counts against the range of a trial, and what moves at 0.5 m/s is not held to 10 nm.
+    """
+    if eq.travelled is None:
+        return eq.graph.constant(1.0)
+    share = eq.travelled[1] * (1.0 / SWIFT_M_PER_S)
+    square = share * share
+    return 1.0 + where(square < 1e6, square, 1e6)
+
+
+SWIFT_M_PER_S = 0.1
+"""Speed of the slide at which twice the squared error is allowed (m/s)."""
+
+
+def _inverse_eighth_root(square: Any, allowed: Any) -> Any:  # noqa: ANN401
+    """(square / allowed)^(-1/8) within some 10 %, by the bits of the exponents.
+
+    The error of a step goes with h^4, and comes squared. Below 1e-9 it is taken for that.
+    """
+    floored = where(square < 1e-9, 1e-9, square)
+    bits = to_bits(floored) + _ONE_BITS - to_bits(allowed)
+    return from_bits(_ONE_BITS + (_ONE_BITS >> 3) - (bits >> 3))
 
 
 _ONE_BITS = 1023 << 52

@@ -8,6 +8,7 @@ code, Python text and derivatives are made.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from pma_gym.effects import Effect
 from pma_gym.effects.effect import Parameters, signals
@@ -168,7 +169,7 @@ class Equations:
         """The model's effects at a port, in catalogue order."""
         return [effect for effect in self.effects.values() if effect.port == port]
 
-    def call(self, effect: Effect, law: Callable, **other: Value) -> Value:
+    def call(self, effect: Effect, law: Callable, **other: Value) -> Any:  # noqa: ANN401
         """What a law returns; `other` gives a signal another value."""
         own = {"p": self.parameters[effect.name], **other}
 
@@ -214,7 +215,7 @@ class Equations:
                 factor = factor * self.call(effect, effect.law)
         return factor
 
-    def one(self, port: str, **other: Value) -> Value:
+    def one(self, port: str, **other: Value) -> Any:  # noqa: ANN401
         """What the law of the only effect at a port returns."""
         (effect,) = self.at(port)
         assert effect.law is not None

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from benchmarks.reference import demanding_commands
+from pma_gym.plant.attempt import first_size
 from pma_gym.plant.plain import PlainPlant
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import FIRST_S
@@ -81,7 +82,7 @@ def test_an_attempt_tells_what_it_was(both):
     made = list(plain.attempts(rest, 4.0, 6.0, 0.01))
     refused = [one for one in made if not one.taken]
     assert 2 < len(made) < 60
-    assert made[0].proposed == FIRST_S
+    assert made[0].proposed == first_size(FIRST_S, 3.0)
     assert made[0].left == 0.01
     for before, after in zip(made[:-1], made[1:], strict=True):
         assert after.proposed == before.size
