@@ -204,7 +204,9 @@ class Equations:
 
     def total(self, port: str) -> Value:
         """The sum over the effects at a port."""
-        terms = [self.call(effect, effect.law) for effect in self.at(port) if effect.law]
+        terms: list[Value] = [
+            self.call(effect, effect.law) for effect in self.at(port) if effect.law
+        ]
         return sum(terms[1:], terms[0]) if terms else self.graph.constant(0.0)
 
     def product(self, port: str) -> Value:
