@@ -89,7 +89,7 @@ def test_the_reference_ends_its_spans_at_kinks():
 def test_energy_stays_where_nothing_dissipates():
     # In half a second of swinging at 180 Hz, as a share of what moves about.
     drifts = [energy_drift(tolerance, 0.5) for tolerance in (DEFAULT_TOLERANCE, 1e-5, 1e-7)]
-    assert drifts[0] < 3e-6
+    assert drifts[0] < 5e-6
     assert drifts[1] < 1e-7
     assert drifts[2] < 1e-9
 

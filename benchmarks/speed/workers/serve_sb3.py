@@ -53,6 +53,7 @@ def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any)
 
     def chunk() -> int:
         torch.set_num_threads(threads)
+        assert model.env is not None
         model.collect_rollouts(model.env, callback, model.rollout_buffer, model.n_steps)
         return model.n_steps * count
 
