@@ -39,6 +39,9 @@ def one(name: str, held: bool = False) -> Prepared:
     environment = gym.make(name)
     environment.reset(seed=0)
     prepared = single(environment, list(actions((ACTIONS, 1), held)))
+    if held:
+        # Evaluations are counted under random actions.
+        return prepared
     return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
 
 
@@ -56,6 +59,8 @@ def batch(name: str, count: int, threads: int, held: bool = False) -> Prepared:
     )
     environment.reset(seed=0)
     prepared = vector(environment, actions((BATCHES, count, 1), held), count)
+    if held:
+        return prepared
     return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
 
 
