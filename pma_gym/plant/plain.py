@@ -19,7 +19,6 @@ import numpy as np
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.text import python_text
 from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.attempt import first_size
 from pma_gym.plant.compose import COMMANDS, ZERO
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import parameter_names
@@ -118,10 +117,7 @@ class PlainPlant:
     ) -> Iterator[Made]:
         """All attempts of `Plant.step`, one by one; the condition moves along with them."""
         left, zero = duration, condition.zero_contraction
-        commands = (motor_voltage, regulator_voltage)
-        before = condition.commands or commands
-        jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
-        condition.size, condition.commands = first_size(condition.size, jump), commands
+        condition.hear(motor_voltage, regulator_voltage)
         while left > 0.0:
             given = (motor_voltage, regulator_voltage)
             made = self.attempt(condition.state, given, zero, condition.size, left)

@@ -44,6 +44,13 @@ class Condition:
     size: float = FIRST_S
     commands: tuple[float, float] | None = None
 
+    def hear(self, motor_voltage: float, regulator_voltage: float) -> None:
+        """Take commands (V) in: where they jump, the next internal step begins smaller."""
+        commands = (motor_voltage, regulator_voltage)
+        before = self.commands or commands
+        jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
+        self.size, self.commands = first_size(self.size, jump), commands
+
 
 class Plant:
     """A model's equations of motion, compiled.
@@ -159,9 +166,7 @@ class Plant:
         check_voltages(motor_voltage, regulator_voltage)
         if not 0.0 < duration < float("inf"):
             raise ValueError(f"duration must be a positive time in s, got {duration!r}")
-        commands = (motor_voltage, regulator_voltage)
-        before = condition.commands or commands
-        jump = max(abs(new - old) for new, old in zip(commands, before, strict=True))
+        condition.hear(motor_voltage, regulator_voltage)
         run = Run(
             np.array([0.0, duration]),
             np.full(2, motor_voltage, float),
@@ -170,11 +175,11 @@ class Plant:
             self.table,
             condition.state,
             condition.zero_contraction,
-            first_size(condition.size, jump),
+            condition.size,
         )
         simulate_all(self.program, [run])
         condition.state[:] = run.states[1]
-        condition.size, condition.commands = run.size, commands
+        condition.size = run.size
         condition.time += duration
 
     def observe(self, states: np.ndarray, zero_contraction: float) -> dict[str, np.ndarray]:

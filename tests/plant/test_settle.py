@@ -84,7 +84,6 @@ def test_each_law_of_the_literature_settles_and_moves_stably(model):
     rest = plant.settle(0.0, 300e3)
     regulator = plant.regulator_voltage(300e3)
     held = plant.settle(1.5, 300e3)
-    plant.step_limit = 2e-4
     for _ in range(150):
         plant.step(rest, 1.5, regulator, 0.01)
     stroke = rest.zero_contraction - held.state[0]
