@@ -16,12 +16,22 @@ class Station:
         task: the task, with its protocol.
         pressure: gauge pressure that the trial begins at (Pa).
         period: time of a control step (s).
+        action_delay: how late a command reaches the station (s), whole periods.
+        observation_delay: how old a reading is when it is heard (s), whole periods.
     """
 
     model: Model
     task: Task
     pressure: float
     period: float
+    action_delay: float = 0.0
+    observation_delay: float = 0.0
+
+    def position(self, reading: "Reading") -> float:
+        """The position that the task asks for, as the sensors say it (m or rad)."""
+        if self.task.protocol.quantity == "rotation":
+            return reading.rotation
+        return reading.extension
 
 
 class Reading(NamedTuple):

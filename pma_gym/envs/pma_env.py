@@ -290,8 +290,16 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def station(self) -> Station:
-        """What a controller may know: the nominal model, the task, the pressure, the period."""
-        return Station(self.nominal_plant.model, self.task, self.pressure, self.options.period)
+        """What a controller may know: what it was designed with and how it is driven."""
+        options = self.options
+        return Station(
+            self.nominal_plant.model,
+            self.task,
+            self.pressure,
+            options.period,
+            options.action_delay * options.period,
+            options.observation_delay * options.period,
+        )
 
     @property
     def error(self) -> float:
