@@ -31,6 +31,7 @@ SI_FACTORS: dict[str, float] = {
     "1/N": 1.0,
     "mm/s": 1e-3,
     "deg/s": math.pi / 180.0,
+    "kPa/s": 1e3,
     "N/kPa": 1e-3,
     "N/bar": 1e-5,
     "N/bar/%": 1e-3,

@@ -19,7 +19,7 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.envs import ENVIRONMENTS, Options
 from pma_gym.plant.model import load_model, shipped_models
 from pma_gym.studies import compare_all
-from pma_gym.tasks import RANDOMISATIONS, REWARDS
+from pma_gym.tasks import DISTURBANCES, EVERY_TASK, RANDOMISATIONS, REWARDS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -96,7 +96,7 @@ def test_every_error_of_the_source_is_listed(page):
 def test_environments_page_is_complete(page):
     text = page("environments.md")
     names = [field.name for field in fields(Options)]
-    for name in (*names, *REWARDS, *RANDOMISATIONS, *ENVIRONMENTS):
+    for name in (*names, *REWARDS, *RANDOMISATIONS, *DISTURBANCES, *EVERY_TASK, *ENVIRONMENTS):
         assert f"`{name}`" in text
 
 

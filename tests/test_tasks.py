@@ -1,24 +1,35 @@
 """Tasks: scores, rewards, limits."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pma_gym.data.protocol import DISPLACEMENT, ROTATION
+from pma_gym.data.serres2008 import load_table
 from pma_gym.metrics import phase_times
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import (
+    EVERY_TASK,
+    ISOTONIC,
     REWARDS,
     TASKS,
     TRIAL_TAIL_S,
+    UNSEEN,
     broken,
     broken_limit,
+    following,
+    isotonic,
     limit_in_words,
     missed_reward,
+    multisine,
+    named_task,
+    obstacle,
     phase_errors,
     phase_rmse,
 )
+from pma_gym.units import SI_FACTORS
 
 SAMPLES = {"displacement": 1923, "rotation": 5763}
 
@@ -76,6 +87,105 @@ def test_a_missed_step_is_worth_no_more_than_the_worst_that_follows():
 def test_errors_are_given_in_percent_of_the_range():
     assert TASKS["displacement"].error_percent(0.25e-3) == pytest.approx(1.0)
     assert TASKS["rotation"].error_percent(math.radians(0.9)) == pytest.approx(1.0)
+
+
+def test_names_of_tasks_are_their_keys():
+    assert all(task.name == name for name, task in EVERY_TASK.items())
+    assert set(TASKS) == {"displacement", "rotation"}
+    assert set(ISOTONIC) == {"isotonic", "triangle_low", "triangle_high"}
+    kinds = ("sine", "multisine", "steps", "speeds")
+    assert set(UNSEEN) == {f"{base}_{kind}" for base in TASKS for kind in kinds}
+    assert len(EVERY_TASK) == len(TASKS) + len(UNSEEN) + len(ISOTONIC)
+
+
+@pytest.mark.parametrize("task", UNSEEN.values(), ids=UNSEEN)
+def test_unseen_references_begin_at_rest_and_stay_within_the_range(task):
+    base = TASKS["rotation" if task.name.startswith("rotation") else "displacement"]
+    assert (task.actuator, task.protocol.quantity) == ("motor", base.protocol.quantity)
+    assert task.starts == base.starts and task.protocol.span == base.protocol.span
+    assert task.steps(100.0) == 1001
+    share = task.protocol.reference(np.arange(3841) / 384.0) / task.protocol.span
+    assert share[0] == 0.0 and share.min() >= 0.0 and 0.6 < share.max() <= 0.95 + 1e-9
+    if "sine" in task.name:
+        assert abs(share[1] - share[0]) * 384.0 < 1e-3
+    if "steps" not in task.name:
+        # Five times the dissertation's speed at most, also while they fade in.
+        assert np.abs(np.diff(share)).max() * 384.0 < 5 * 0.2
+
+
+def test_drawn_tasks_are_known_by_their_number():
+    task = named_task("rotation_multisine_17")
+    assert task == multisine("rotation", 17) and task.name == "rotation_multisine_17"
+    assert task != multisine("rotation", 18)
+    assert (
+        named_task("rotation_multisine").protocol.phases == multisine("rotation", 0).protocol.phases
+    )
+    assert named_task("displacement") is TASKS["displacement"]
+    for name in ("rotation_sine_1", "displacement_steps_", "displacement_steps_01", "steps_1", ""):
+        assert named_task(name) is None
+
+
+@pytest.mark.parametrize("pressure", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("name", EVERY_TASK)
+def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(name, pressure):
+    task = EVERY_TASK[name]
+    low, high = task.starts
+    found = obstacle(task, "station", low + pressure * (high - low))
+    if name.endswith("steps"):
+        jump = np.abs(np.diff(task.protocol.reference(np.arange(3841) / 384.0)))
+        size = jump[jump > 0.0][0] / SI_FACTORS[task.protocol.unit]
+        assert found == f"the reference jumps by {size:.3g} {task.protocol.unit} at 0.5 s"
+    elif name == "rotation":
+        assert "the cable would have to push" in found and "first at 14." in found
+    else:
+        assert found is None
+
+
+def test_obstacles_say_what_is_lacking():
+    far = following("far", "extension", _far, duration=4.0)
+    assert "the motor would need more than 10 V" in obstacle(far, "station", 575e3)
+    short = isotonic(stroke=30e-3)
+    assert "the regulator would need more than 10 V" in obstacle(short, "station", 350e3)
+    assert obstacle(short, "station", 150e3) is None
+    with pytest.raises(ValueError, match="must be of a station"):
+        obstacle(TASKS["displacement"], "cascade", 300e3)
+
+
+def _far(time):
+    return 15e-3 * time
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (
+            lambda: following("a", "contraction", _far),
+            "quantity must be one of extension, rotation",
+        ),
+        (lambda: following("a", "extension", np.cos), "must begin at 0.*got 1.*ramp it in"),
+        (lambda: following("a", "extension", lambda t: t / (4.0 - t)), "finite"),
+        (lambda: replace(TASKS["rotation"], actuator="regulator", load=9.0), "got rotation by the"),
+        (lambda: replace(ISOTONIC["isotonic"], load=0.0), "positive load .*got 0.0 N"),
+        (lambda: replace(TASKS["rotation"], load=100.0), "0 where the motor moves, got 100.0 N"),
+    ],
+)
+def test_tasks_that_no_environment_can_do_are_refused(make, words):
+    with np.errstate(divide="ignore"), pytest.raises(ValueError, match=words):
+        make()
+
+
+def test_the_isotonic_stroke_is_within_what_table_i3_shows():
+    """Our choice of stroke, held against the measured contractions under about 205 N."""
+    rows = load_table("I3").where(load_nominal_n=225)
+    reached = {}
+    for kpa in (350.0, 575.0):
+        own = rows.where(pressure_nominal_kpa=kpa)
+        reached[kpa] = np.mean(own["no_load_contraction_mm"] - own["extension_mm"])
+    assert reached[350.0] == pytest.approx(39.2, abs=0.05)
+    assert reached[575.0] == pytest.approx(55.9, abs=0.05)
+    task = ISOTONIC["isotonic"]
+    assert task.starts[1] == 350e3
+    assert 1e3 * task.protocol.span < reached[575.0] - reached[350.0]
 
 
 SAFE = {"contraction": 0.04, "load": 300.0, "pressure": 300e3}

@@ -10,7 +10,14 @@ from textwrap import indent
 
 from generators.catalogue import effects, overview
 from generators.commands import commands
-from generators.environments import docstring, options, randomisations, rewards
+from generators.environments import (
+    disturbances,
+    docstring,
+    options,
+    randomisations,
+    rewards,
+    tasks,
+)
 from generators.equations import equations, ports, written
 from generators.files import calibrations, columns, raw_columns, tables
 from generators.models import differences, identification, misfit, parameters, shipped
@@ -21,6 +28,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
     function.__name__: function
     for function in (
         *(effects, overview, commands, docstring, options, randomisations, rewards),
+        *(disturbances, tasks),
         *(equations, ports, written, calibrations, columns, raw_columns, tables),
         *(differences, identification, misfit, parameters, shipped),
         *(misprints, rates, verdicts, wrong_in_print),

@@ -4,7 +4,8 @@ from dataclasses import MISSING, fields
 
 from generators.text import code, entries, sections, summary, table
 from pma_gym.envs import Options, PMAEnv
-from pma_gym.tasks import RANDOMISATIONS, REWARDS
+from pma_gym.tasks import DISTURBANCES, EVERY_TASK, RANDOMISATIONS, REWARDS
+from pma_gym.units import SI_FACTORS
 
 
 def docstring() -> str:
@@ -37,3 +38,38 @@ def randomisations() -> str:
         [code(name), " ".join(sections(draw)[""].split())] for name, draw in RANDOMISATIONS.items()
     ]
     return table(["Randomisation", "What is drawn at every reset"], rows)
+
+
+def disturbances() -> str:
+    """Disturbances by name, and their sizes."""
+    rows = []
+    for name, sizes in DISTURBANCES.items():
+        said = []
+        if sizes.regulator_step:
+            said.append(f"jumps of the regulator by {sizes.regulator_step / 1e3:g} kPa")
+        if sizes.operator_force:
+            said.append(f"pulses of {sizes.operator_force:g} N at the slide, 0.5 s long")
+        rows.append([code(name), ", ".join(said)])
+    return table(["Disturbances", "What comes at random times, with a random sign"], rows)
+
+
+def tasks() -> str:
+    """All tasks: who moves, what follows, how long, at which pressures and loads."""
+    rows = []
+    for name, task in EVERY_TASK.items():
+        protocol = task.protocol
+        low, high = (f"{pressure / 1e3:g}" for pressure in task.starts)
+        rows.append(
+            [
+                code(name),
+                task.actuator,
+                protocol.quantity,
+                f"{protocol.span / SI_FACTORS[protocol.unit]:g} {protocol.unit}",
+                f"{protocol.duration:g} s",
+                ", ".join(phase.name for phase in protocol.phases),
+                low if low == high else f"{low}-{high}",
+                f"{task.load:g} N" if task.load else "",
+            ]
+        )
+    header = ["Task", "Actuator", "Quantity", "Range", "Duration", "Phases"]
+    return table([*header, "Begins at (kPa)", "Load"], rows)

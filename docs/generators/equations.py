@@ -46,12 +46,16 @@ class _Text:
         return self.text if self.binds >= binds else f"({self.text})"
 
     def __add__(self, other: Any) -> "_Text":  # noqa: ANN401
+        if _text(other).text == "0.0":
+            return self
         return _Text(f"{self.text} + {_text(other).within(1)}", 1)
 
     def __sub__(self, other: Any) -> "_Text":  # noqa: ANN401
         return _Text(f"{self.text} - {_text(other).within(2)}", 1)
 
     def __mul__(self, other: Any) -> "_Text":  # noqa: ANN401
+        if _text(other).text == "1.0":
+            return self
         return _Text(f"{self.within(2)} * {_text(other).within(2)}", 2)
 
     def __truediv__(self, other: Any) -> "_Text":  # noqa: ANN401
@@ -89,10 +93,17 @@ class _Words(Notation):
         """The rate of a state."""
         self.rates.append(f"d({name})/dt = {_text(rate).text}")
 
-    def add_decaying(self, name: str, rate: Any, scale: float | None) -> None:  # noqa: ANN401
+    def add_decaying(
+        self,
+        name: str,
+        rate: Any,  # noqa: ANN401
+        scale: float | None,
+        beside: str = "",
+    ) -> None:
         """The rate of a state whose law gives its source and its decay."""
         self.lines.append(f"source_{name}, decay_{name} = {_text(rate).text}")
-        self.rates.append(f"d({name})/dt = source_{name} - decay_{name} * {name}")
+        own = _Text(f"source_{name} - decay_{name} * {name}", 1)
+        self.rates.append(f"d({name})/dt = {(own + self.total(beside)).text}")
 
     def path(self, name: str, effect: Effect) -> str:
         """A memory of the way travelled, from where a step began."""

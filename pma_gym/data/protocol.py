@@ -1,28 +1,43 @@
-"""The two tasks of the dissertation: what the ideal motion is, phase by phase."""
+"""What the ideal motion of a task is, phase by phase; the two tasks of the dissertation."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pma_gym.metrics import PHASE_DURATION
+from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ
 from pma_gym.units import SI_FACTORS
 
 _MM = SI_FACTORS["mm"]
 _DEG = SI_FACTORS["deg"]
 
+Motion = Callable[[Any], Any]
+"""Ideal position (m or rad) by time since the start of the trial (s): of an array one of the same
+shape, of a number one."""
+
+Followed = Literal["extension", "rotation", "contraction"]
+"""What a task asks for, from where the trial began: how far the muscle is pulled out (m), how far
+the pulley has turned (rad), or how far the muscle has shortened (m)."""
+
+OVERTIME = PHASE_SAMPLES - round(PHASE_DURATION * SAMPLE_RATE_HZ)
+"""Samples of a phase beyond those of its duration, as in the dissertation's tables: the first and
+two more."""
+
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of a task with one ideal speed, regressed and scored on its own.
+    """A part of a task that is scored on its own: one ideal speed, or a piece of a motion.
 
     Attributes:
         name: as the dissertation's tables call it.
         start: when it begins, from the start of the trial (s).
         duration: how long it lasts (s).
         initial: ideal position at its start (m or rad).
-        slope: ideal speed (m/s or rad/s).
+        slope: ideal speed (m/s or rad/s); of a motion, the mean one.
+        motion: ideal position by the trial's time, the same function for all phases of a protocol;
+            None where it is the line of `initial` and `slope`.
     """
 
     name: str
@@ -30,18 +45,41 @@ class Phase:
     duration: float
     initial: float
     slope: float
+    motion: Motion | None = None
 
     def reference(self, time: ArrayLike) -> NDArray[np.float64]:
-        """Ideal position at times on the phase's own clock, as a line without end.
+        """Ideal position at times on the phase's own clock, as a line or a motion without end.
 
-        A phase is scored 5 ms past its duration (`metrics.phase_times`), on this line.
+        A phase is scored 5 ms past its duration (`metrics.phase_times`), on this.
 
         Args:
             time: time since the start of the phase (s), any shape.
         Returns:
             Position (m or rad), same shape.
         """
-        return self.initial + self.slope * np.asarray(time, dtype=np.float64)
+        own = np.asarray(time, dtype=np.float64)
+        if self.motion is not None:
+            return self.motion(self.start + own)
+        return self.initial + self.slope * own
+
+    @property
+    def first(self) -> int:
+        """Number of its first sample at 384 Hz."""
+        return round(self.start * SAMPLE_RATE_HZ)
+
+    @property
+    def samples(self) -> int:
+        """How many samples it is scored at.
+
+        >>> DISPLACEMENT.phases[0].samples
+        1923
+        """
+        return round(self.duration * SAMPLE_RATE_HZ) + OVERTIME
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """When it is scored, on its own clock (s), shape (samples,)."""
+        return np.arange(self.samples) / SAMPLE_RATE_HZ
 
 
 @dataclass(frozen=True)
@@ -50,17 +88,40 @@ class Protocol:
 
     Attributes:
         name: how the task is called.
-        quantity: what is to follow: extension (m) or rotation (rad), both from the trial's start.
+        quantity: what is to follow.
         unit: the quantity's unit where people read it.
-        span: range that the reference covers (m or rad); an RMSE is given in percent of it.
+        span: range that an error is given in percent of (m or rad): what the reference covers, or
+            may cover.
         phases: in order, each beginning where the one before ends.
     """
 
     name: str
-    quantity: Literal["extension", "rotation"]
+    quantity: Followed
     unit: str
     span: float
     phases: tuple[Phase, ...]
+
+    def __post_init__(self) -> None:
+        """Refuse phases that do not follow each other, and two motions at once."""
+        end = 0.0
+        for phase in self.phases:
+            if abs(phase.start - end) > 1e-9 or not 0.0 < phase.duration < float("inf"):
+                raise ValueError(
+                    f"phase {phase.name} of {self.name} must begin where the one before ends, at "
+                    f"{end:g} s, and last a positive time, got {phase.start:g} s and "
+                    f"{phase.duration:g} s"
+                )
+            end = phase.start + phase.duration
+        if len({phase.motion for phase in self.phases}) != 1:
+            raise ValueError(
+                f"phases of {self.name} must be one or more, all lines or all of one motion; write "
+                "it as one function of the trial's time"
+            )
+
+    @property
+    def motion(self) -> Motion | None:
+        """What the phases are pieces of; None where they are lines."""
+        return self.phases[0].motion
 
     @property
     def duration(self) -> float:
@@ -76,10 +137,19 @@ class Protocol:
         Returns:
             Position (m or rad), same shape; held at its ends before the start and after the end.
         """
+        if self.motion is not None:
+            own = np.asarray(time, dtype=np.float64)
+            return np.asarray(self.motion(np.clip(own, 0.0, self.duration)), dtype=np.float64)
         last = self.phases[-1]
         times = [*(phase.start for phase in self.phases), self.duration]
         positions = [*(phase.initial for phase in self.phases), last.reference(last.duration)]
         return np.asarray(np.interp(np.asarray(time, dtype=np.float64), times, positions))
+
+    def at(self, time: float) -> float:
+        """Ideal position (m or rad) at one time (s), as `reference`; faster."""
+        if self.motion is not None:
+            return float(self.motion(min(max(float(time), 0.0), self.duration)))
+        return float(self.reference(time))
 
 
 DISPLACEMENT = Protocol(
@@ -106,4 +176,4 @@ ROTATION = Protocol(
 tables 24-30)."""
 
 PROTOCOLS = {protocol.name: protocol for protocol in (DISPLACEMENT, ROTATION)}
-"""The tasks by name."""
+"""The dissertation's two by name."""

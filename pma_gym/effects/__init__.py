@@ -4,9 +4,14 @@ from pma_gym.effects.cable import CABLE
 from pma_gym.effects.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.coulomb_friction import COULOMB_FRICTION
+from pma_gym.effects.creep import CREEP, SLOW_CREEP
 from pma_gym.effects.damping import DAMPING, SYMMETRIC_DAMPING
 from pma_gym.effects.drive import DRIVE
+from pma_gym.effects.drive_dead_zone import DRIVE_DEAD_ZONE
+from pma_gym.effects.drive_lag import DRIVE_LAG
+from pma_gym.effects.drive_saturation import DRIVE_SATURATION
 from pma_gym.effects.effect import Effect
+from pma_gym.effects.filling import FILLING
 from pma_gym.effects.geometric_force import (
     CALDWELL_FORCE,
     CHOU_HANNAFORD_FORCE,
@@ -16,17 +21,28 @@ from pma_gym.effects.geometric_force import (
 )
 from pma_gym.effects.hysteresis import HYSTERESIS
 from pma_gym.effects.limits import LIMITS, VALIDITY
+from pma_gym.effects.load_dependent_damping import LOAD_DEPENDENT_DAMPING
+from pma_gym.effects.operator import OPERATOR
+from pma_gym.effects.passive_stretch import PASSIVE_STRETCH
 from pma_gym.effects.position_map import POSITION_MAP
 from pma_gym.effects.pressure_curvature import PRESSURE_CURVATURE
 from pma_gym.effects.regulator import REGULATOR_LAG, REGULATOR_LINE
 from pma_gym.effects.regulator_asymmetry import REGULATOR_ASYMMETRY
+from pma_gym.effects.regulator_rate_limit import REGULATOR_RATE_LIMIT
 from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.rotor import ROTOR
 from pma_gym.effects.sarosi import SAROSI_FORCE
+from pma_gym.effects.sensor_errors import (
+    LOAD_CELL_ERROR,
+    LVDT_ERROR,
+    POTENTIOMETER_ERROR,
+    PRESSURE_TRANSDUCER_ERROR,
+)
 from pma_gym.effects.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
 from pma_gym.effects.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.slide import SLIDE
 from pma_gym.effects.stiffness import STIFFNESS
+from pma_gym.effects.torque_ripple import TORQUE_RIPPLE
 
 CATALOGUE: dict[str, Effect] = {
     effect.name: effect
@@ -42,18 +58,29 @@ CATALOGUE: dict[str, Effect] = {
         COLBRUNN_SPRING,
         REPPERGER_SPRING,
         PRESSURE_CURVATURE,
+        PASSIVE_STRETCH,
         DAMPING,
         SYMMETRIC_DAMPING,
         REPPERGER_DAMPING,
+        LOAD_DEPENDENT_DAMPING,
+        CREEP,
+        SLOW_CREEP,
         HYSTERESIS,
         COULOMB_FRICTION,
+        OPERATOR,
         CABLE,
         DRIVE,
+        DRIVE_DEAD_ZONE,
+        DRIVE_SATURATION,
+        DRIVE_LAG,
+        TORQUE_RIPPLE,
         ROTOR,
         SLIDE,
         REGULATOR_LINE,
         REGULATOR_LAG,
         REGULATOR_ASYMMETRY,
+        REGULATOR_RATE_LIMIT,
+        FILLING,
         POSITION_MAP,
         SERVO,
         SERVO_INERTIA,
@@ -61,6 +88,10 @@ CATALOGUE: dict[str, Effect] = {
         LOAD_CELL,
         PRESSURE_TRANSDUCER,
         POTENTIOMETER,
+        LVDT_ERROR,
+        LOAD_CELL_ERROR,
+        PRESSURE_TRANSDUCER_ERROR,
+        POTENTIOMETER_ERROR,
         LIMITS,
         VALIDITY,
     )

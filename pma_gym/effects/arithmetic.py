@@ -60,6 +60,27 @@ def exponential(value):
     return root
 
 
+def cosine(value):
+    """cos(value) from 1 - cos by Taylor's series at value/256, its angle doubled eight times.
+
+    Absolute error below 1e-11 for |value| <= 300. 1 - cos keeps its digits where it is small:
+    doubling an angle takes u to 2 u (2 - u).
+
+    >>> import math
+    >>> max(abs(cosine(0.5 * i) - math.cos(0.5 * i)) for i in range(-600, 601)) < 1e-11
+    True
+    """
+    z = value * (1.0 / 256.0)
+    square = z * z
+    rest = 1.0 - square * (1.0 / 182.0) * (1.0 - square * (1.0 / 240.0))
+    rest = 1.0 - square * (1.0 / 90.0) * (1.0 - square * (1.0 / 132.0) * rest)
+    rest = 1.0 - square * (1.0 / 30.0) * (1.0 - square * (1.0 / 56.0) * rest)
+    below = 0.5 * square * (1.0 - square * (1.0 / 12.0) * rest)
+    for _ in range(8):
+        below = 2.0 * below * (2.0 - below)
+    return 1.0 - below
+
+
 def interpolate(value, knots, heights):
     """Linear between knots, constant outside them.
 

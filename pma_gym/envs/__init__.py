@@ -10,8 +10,9 @@ from pma_gym.envs.vector import PMAVectorEnv
 ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
     "pma_gym/IsokineticRotation-v0": "rotation",
+    "pma_gym/IsotonicContraction-v0": "isotonic",
 }
-"""Registered environments, and the task of each."""
+"""Registered environments, and the task of each; `task=` gives another."""
 
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.

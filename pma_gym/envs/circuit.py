@@ -3,25 +3,32 @@
 From the action to the drive, from the plant's state to reading, observation, reward and end.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.observation import BOUND, ObservationTable
-from pma_gym.envs.record import PARTS, TRUTH, Record
+from pma_gym.envs.observation import BOUND, ObservationTable, heard_position
+from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH, Record
+from pma_gym.envs.scoring import position_of
 from pma_gym.kernels.generic import to_real, where
-from pma_gym.kernels.graph import CHANGING, Graph, Value
+from pma_gym.kernels.graph import CHANGING, HELD, Graph, Value
 from pma_gym.kernels.random import normals, philox
 from pma_gym.kernels.substitute import substitute
 from pma_gym.plant import sensors
 from pma_gym.plant.attempt import first_size
 from pma_gym.plant.compose import COMMANDS, ZERO, Equations
 from pma_gym.plant.program import at_rest
-from pma_gym.tasks import REWARDS, broken, missed_reward
+from pma_gym.tasks import PULSE_S, REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 
-NOISE, TARE, DRAW = 0, 1, 2
-"""Streams of random numbers: sensors in a step, sensors at rest, what an episode begins with."""
+NOISE, TARE, DRAW, DISTURB = 0, 1, 2, 3
+"""Streams of random numbers: sensors in a step, sensors at rest, what an episode begins with, what
+disturbs it."""
+
+FORCE_OF_A_VOLT = 100.0
+"""Jump of the operator's force (N) after which steps begin as small as after one of 1 V: about what
+the motor pulls with."""
 
 PRESSURE_TOLERANCE = 1.0
 """How far a pressure may leave the trials' range before it counts (Pa): a settled pressure is
@@ -49,6 +56,8 @@ class Circuit:
         """A number of the record, as an input; states and commands are the plant's own."""
         if name in self.record.states or name in (*COMMANDS, ZERO):
             return self.equations[name]
+        if name == START:
+            return self.graph.input(START, HELD)
         return self.graph.input(f"record.{name}", CHANGING, self.record.kind(name))
 
     def action(self, i: int) -> Value:
@@ -78,10 +87,12 @@ class Circuit:
                 found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
         else:
             heard = volts
-        found["motor_voltage"] = heard[0]
-        found["regulator_voltage"] = (
-            heard[1] if options.regulator_action else self.slot("rest_regulator")
-        )
+        if record.task.actuator == "regulator":
+            found["motor_voltage"], regulator = self.slot("rest_motor"), heard[0]
+        else:
+            found["motor_voltage"] = heard[0]
+            regulator = heard[1] if options.regulator_action else self.slot("rest_regulator")
+        found["regulator_voltage"] = self._disturbed(regulator)
         change = self.graph.constant(0.0)
         for i, value in enumerate(held):
             moved = abs(value - self.slot(f"action_{i}"))
@@ -90,8 +101,34 @@ class Circuit:
         jump = abs(found["motor_voltage"] - self.slot("motor_voltage"))
         other = abs(found["regulator_voltage"] - self.slot("regulator_voltage"))
         jump = where(other > jump, other, jump)
+        if any(name.startswith("pulse_") for name in self.record.events):
+            found[OPERATOR] = self._pulse()
+            pulled = abs(found[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
+            jump = where(pulled > jump, pulled, jump)
         found["size"] = first_size(self.slot("size"), jump)
         return found
+
+    def _disturbed(self, regulator: Value) -> Value:
+        """Regulator voltage that the station hears of one that is commanded (V)."""
+        jumps = [name for name in self.record.events if name.startswith("jump_step_")]
+        if not jumps:
+            return regulator
+        now, volts = to_real(self.slot("count")), regulator
+        for name in jumps:
+            size = self.slot(name.replace("_step", ""))
+            volts = volts + where(now >= self.slot(name), size, 0.0)
+        return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
+
+    def _pulse(self) -> Value:
+        """Force of the operator in the step that begins (N)."""
+        now, force = to_real(self.slot("count")), self.graph.constant(0.0)
+        last = math.ceil(PULSE_S * self.record.options.control_rate_hz - 1e-9)
+        for name in self.record.events:
+            if name.startswith("pulse_step_"):
+                begun = self.slot(name)
+                during = (now >= begun) & (now < begun + last)
+                force = force + where(during, self.slot(name.replace("_step", "")), 0.0)
+        return force
 
     def truth(self) -> dict[str, Value]:
         """True outputs at the plant's state."""
@@ -156,7 +193,9 @@ class Circuit:
         high = where(valid.highest < task.highest_pressure, valid.highest, task.highest_pressure)
         pressure = found["true_pressure"]
         inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
-        heard = found[f"{quantity}_{record.options.observation_delay}"]
+        heard = heard_position(
+            quantity, lambda part: found[f"{part}_{record.options.observation_delay}"]
+        )
         values = [
             count * record.options.period,
             position * factor,
@@ -173,9 +212,8 @@ class Circuit:
 
     def position(self, found: Mapping[str, Value]) -> Value:
         """True position that the task asks for (m or rad)."""
-        if self.record.task.protocol.quantity == "extension":
-            return self.slot("zero_contraction") - found["true_contraction"]
-        return found["true_rotation"]
+        task, eq = self.record.task, self.equations
+        return position_of(eq, task, found["true_contraction"], found["true_rotation"])
 
     def reward(self, found: Mapping[str, Value]) -> Value:
         """Reward of a step; the action's change stands where the reward will."""

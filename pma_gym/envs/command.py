@@ -7,6 +7,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from pma_gym.envs.options import Options
+from pma_gym.tasks import Actuator
 
 HIGHEST_VOLTAGE = 10.0
 """What an action of 1 stands for (V); -1 stands for 0 V."""
@@ -17,13 +18,15 @@ class CommandLine:
 
     Args:
         options: the environment's options.
+        actuator: whose voltage the (first) action is.
 
     Attributes:
         space: the action space.
     """
 
-    def __init__(self, options: Options) -> None:
+    def __init__(self, options: Options, actuator: Actuator = "motor") -> None:
         """Size the action space."""
+        self._actuator = actuator
         self._size = 2 if options.regulator_action else 1
         self.space = spaces.Box(-1.0, 1.0, (self._size,), np.float32)
         self.begin(0.0)
@@ -32,12 +35,10 @@ class CommandLine:
         """Start a trial from a station that was settled at a regulator voltage (V)."""
         self._rest = regulator_voltage
 
-    def action_for(
-        self, motor_voltage: float, regulator_voltage: float | None
-    ) -> NDArray[np.float64]:
+    def action_for(self, voltage: float, regulator_voltage: float | None) -> NDArray[np.float64]:
         """The action that commands these voltages (V), held to 0-10 V."""
         regulator = self._rest if regulator_voltage is None else regulator_voltage
-        volts = (motor_voltage, regulator)[: self._size]
+        volts = (voltage, regulator)[: self._size]
         scaled = (2.0 / HIGHEST_VOLTAGE * value - 1.0 for value in volts)
         return np.array([min(max(value, -1.0), 1.0) for value in scaled])
 
@@ -68,7 +69,8 @@ class CommandLine:
         return values
 
     def _rule(self) -> str:
-        names = "motor voltage, regulator voltage" if self._size == 2 else "motor voltage"
+        both = self._size == 2
+        names = "motor voltage, regulator voltage" if both else f"{self._actuator} voltage"
         return (
             f"action must have shape ({self._size},): {names}, each -1 to 1 for "
             f"0 to {HIGHEST_VOLTAGE:g} V"

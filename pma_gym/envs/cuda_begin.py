@@ -78,7 +78,7 @@ class BeginWriter(ThreadMemory):
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
         real |= {"sample": ir.Constant(DOUBLE, 1.0), **self._asked_before(b, regulator)}
         # At rest the position is 0 exactly.
-        initial = self.record.task.protocol.phases[0].initial
+        initial = float(self.record.task.protocol.phases[0].reference(0.0))
         real[self.sums[0]] = ir.Constant(DOUBLE, initial * initial)
         whole = {"episode": episode, "count": integer(0)}
         for name in self.places:

@@ -46,6 +46,7 @@ Name = Literal["step", "begin"]
 ARGUMENTS = (
     *("count", "choices", "records", "tables", "references", "actions", "observations"),
     *("rewards", "terminated", "truncated", "faults", "attempts", "finals", "scores", "pressures"),
+    "ideals",
 )
 """Arguments of `step` and `begin`: numbers of environments and of pressures to draw from, then
 addresses; behind them the table's numbers, where all environments share one."""
@@ -114,7 +115,7 @@ class CudaKernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, record.task.name, self.single),
+            *(options.regulator_action, self.single, record.task.structure, record.events),
             *(self.own_tables, self.draws, self.ranged),
         )
         return ["threads", *structure(self.program.model), *map(str, said)]

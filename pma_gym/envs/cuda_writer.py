@@ -108,7 +108,7 @@ class ThreadWriter(BeginWriter):
                 cells.put_vector("clock", narrowed(b, time, self.element))
                 b.store(time, self._clock)
                 known = self._fixed(b, lanes, tables, 0)
-                for name in ("motor_voltage", "regulator_voltage", "zero_contraction"):
+                for name in self.record.held:
                     if name in self.places:
                         known[self.circuit.slot(name).id] = self._number(b, records, name)
                 found = lanes.emit(b, self.layout.held, known)

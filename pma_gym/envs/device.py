@@ -1,8 +1,8 @@
 """Environments whose numbers lie on a device, as arrays of it: a GPU, or a stand-in for one.
 
 The device computes everything, new episodes included, and nothing is copied from it or to it while
-it does. Where a station is drawn anew at every reset, or does not hang slack at rest, the processor
-makes the beginnings; then a step waits for the flags of those that ended.
+it does. Where a station is drawn anew at every reset, is disturbed, or does not hang slack at rest,
+the processor makes the beginnings; then a step waits for the flags of those that ended.
 """
 
 from collections.abc import Mapping, Sequence
@@ -14,10 +14,9 @@ from numpy.typing import NDArray
 from pma_gym.envs.cuda_kernel import THREADS, CudaKernel, Name
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import Options
+from pma_gym.envs.options import Options, rig_model
 from pma_gym.envs.record import Record
 from pma_gym.plant import settle
-from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import vector
 from pma_gym.tasks import Task
@@ -94,12 +93,14 @@ class DeviceEngine:
         if precision not in ("double", "single"):
             raise ValueError(f"precision must be double or single, got {precision!r}")
         self.task, self.options, self.count, self._device = task, options, count, device
-        self.nominal = Plant(load_model(options.model))
+        self.nominal = Plant(rig_model(task, options))
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self._own_tables = options.randomisation != "none"
         pressures = self._pressures()
-        self._draws = not self._own_tables and self._hangs_slack(pressures)
+        # What comes beside pressure and rest is drawn by the processor.
+        alone = not self._own_tables and not self.record.events and not task.load
+        self._draws = alone and self._hangs_slack(pressures)
         self.kernel = CudaKernel(
             self.nominal.program,
             self.record,
@@ -118,7 +119,7 @@ class DeviceEngine:
         """Range of the episodes' pressures, or those they are drawn from (Pa)."""
         wanted = self.options.pressure_kpa
         if isinstance(wanted, str):
-            return np.array([self.task.lowest_pressure, self.task.highest_pressure])
+            return np.array(self.task.starts)
         several = wanted if isinstance(wanted, Sequence) else [wanted]
         return np.array([1e3 * float(one) for one in several])
 
@@ -141,6 +142,10 @@ class DeviceEngine:
         self._references = made.put(
             np.pad(self.table.references, (0, 2), mode="edge").astype(kernel.element)
         )
+        steps = self.task.steps(self.options.control_rate_hz)
+        moves = self.task.protocol.motion is not None
+        samples = int((steps + 2) * self.options.period * 384.0) + 8 if moves else 1
+        self._ideals = made.put(self.task.ideals(samples).astype(kernel.element))
         self.observations = zeros((n, entries), np.float32)
         self.final_observations = zeros((n, entries), np.float32)
         self.rewards = zeros((n,), kernel.element)
@@ -156,6 +161,7 @@ class DeviceEngine:
             "records": self.records,
             "tables": self.tables,
             "references": self._references,
+            "ideals": self._ideals,
             "actions": self._references,
             "observations": self.observations,
             "rewards": self.rewards,

@@ -1,22 +1,28 @@
 """Environments as arrays: one, or many that step together."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pma_gym.envs.circuit import DRAW
+from pma_gym.envs.beginning import (
+    Settled,
+    drawn_events,
+    drawn_pressures,
+    holding_voltages,
+    settled_at_no_load,
+    settled_under_load,
+)
 from pma_gym.envs.kernel import ARGUMENTS, BAD_ACTION, Kernel
 from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import Options, Pressure
-from pma_gym.envs.record import Record
+from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model
+from pma_gym.envs.record import START, Record
 from pma_gym.kernels.crew import Crew
-from pma_gym.kernels.random import philox, uniform
-from pma_gym.plant import settle
 from pma_gym.plant.model import load_model
-from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
-from pma_gym.tasks import RANDOMISATIONS, Task
+from pma_gym.tasks import RANDOMISATIONS, Events, Task
 
 WIDTH = 16
 """Environments that share a block, one lane each."""
@@ -40,7 +46,8 @@ class Engine:
         count: how many environments.
         record: places of an environment's numbers.
         table: the observation's entries.
-        nominal: the Plant of the nominal model.
+        told: the nominal model that controllers are told.
+        nominal: the Plant of the nominal model, with what `disturbances` need.
         models: the Model of every environment's episode.
         pressures: gauge pressure that every episode began at (Pa), shape (n,).
         observations: of the last step or reset, float32, shape (n, entries).
@@ -48,7 +55,10 @@ class Engine:
         terminated: of the last step, bool, shape (n,).
         truncated: of the last step, bool, shape (n,).
         trace: true position at k / 384 s of a single environment (m or rad).
-        voltages: motor voltage that a single environment's station heard in every step (V).
+        voltages: voltage of the task's actuator that a single environment's station heard in every
+            step (V).
+        rest_motor: motor voltage that episodes begin at (V): it holds the load of a regulator's
+            task, by the nominal drive.
     """
 
     def __init__(
@@ -63,7 +73,10 @@ class Engine:
         """Compile, and make room."""
         self.task, self.options, self.count = task, options, count
         self.wanted = list(pressures) if pressures is not None else [options.pressure_kpa] * count
-        self.nominal = Plant(load_model(options.model))
+        self.told = load_model(options.model)
+        # The very same model where nothing is added: its plant is known by that.
+        self.nominal = Plant(rig_model(task, replace(options, model=self.told)))
+        self.rest_motor = motor_at_rest(self.told, task)
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self.width = 1 if count == 1 else WIDTH
@@ -97,7 +110,10 @@ class Engine:
         self.rewards = self._all_rewards[: self.count]
         self.terminated, self.truncated = self._all_flags[:, : self.count]
         duration = (steps + 2) * options.period
-        self.trace = np.zeros(int(duration * 384.0) + 8 if width == 1 else 1)
+        samples = int(duration * 384.0) + 8
+        self.trace = np.zeros(samples if width == 1 else 1)
+        moves = self.task.protocol.motion is not None
+        self._ideals = self.task.ideals(samples if moves else 1)
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)
         self._attempts = np.zeros((256, 8), np.int64)
@@ -122,6 +138,7 @@ class Engine:
             "indices": self._indices.ctypes.data,
             "attempts": self._attempts.ctypes.data,
             "voltages": self.voltages.ctypes.data,
+            "ideals": self._ideals.ctypes.data,
         }
         self._arguments[:] = [given[name] for name in ARGUMENTS]
         self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
@@ -174,19 +191,15 @@ class Engine:
             indices: which environments, shape (m,).
             wanted: pressure of each for this episode; the option's if not given.
         Raises:
-            ValueError: a pressure that the regulator does not reach.
+            ValueError: a pressure that the regulator does not reach, or at which nothing balances
+                the task's load.
         """
         self._episodes[indices] += 1
         asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
-        pressures = self._drawn_pressures(indices, asked)
+        pressures = drawn_pressures(self.task, self._keys[indices], self._episodes[indices], asked)
         vectors = self._drawn_models(indices)
-        regulator = np.array(
-            [
-                regulator_voltage(self.models[i], pressure)
-                for i, pressure in zip(indices.tolist(), pressures.tolist(), strict=True)
-            ]
-        )
-        states, zero = self._settled(indices, pressures, vectors)
+        regulator = holding_voltages([self.models[i] for i in indices.tolist()], pressures)
+        states, zero = self._settled(indices, pressures, regulator, vectors)
         self.pressures[indices] = pressures
         self._fill(indices, states, zero, regulator)
         arguments = self._arguments.copy()
@@ -194,26 +207,6 @@ class Engine:
         arguments[ARGUMENTS.index("last")] = len(indices)
         self.kernel.begin(arguments.ctypes.data)
         self._score_first_sample(indices)
-
-    def _drawn_pressures(
-        self, indices: NDArray[np.int64], wanted: Sequence[Pressure]
-    ) -> NDArray[np.float64]:
-        """Gauge pressures of episodes (Pa)."""
-        keys = self._keys[indices].astype(np.uint64)
-        stream = (self._episodes[indices] * 4 + DRAW).astype(np.uint64)
-        nothing = np.zeros(len(indices), np.uint64)
-        word = philox((nothing, stream, nothing, nothing), (keys[:, 0], keys[:, 1]))[0]
-        shares = uniform(word)
-        low, high = self.task.lowest_pressure, self.task.highest_pressure
-        found = []
-        for share, one in zip(shares.tolist(), wanted, strict=True):
-            if isinstance(one, str):
-                found.append(low + share * (high - low))
-            elif isinstance(one, Sequence):
-                found.append(1e3 * float(one[int(share * len(one))]))
-            else:
-                found.append(1e3 * float(one))
-        return np.array(found)
 
     def _drawn_models(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """Draw the stations of episodes; their vectors, or None if all are nominal."""
@@ -235,18 +228,14 @@ class Engine:
         self,
         indices: NDArray[np.int64],
         pressures: NDArray[np.float64],
+        regulator: NDArray[np.float64],
         vectors: NDArray[np.float64] | None,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        found = settle.at_no_load(self.nominal, pressures, vectors)
-        if found is not None:
-            return found
-        conditions = []
-        for index, pressure in zip(indices.tolist(), pressures.tolist(), strict=True):
-            model = self.models[index]
-            plant = self.nominal if model is self.nominal.model else Plant(model)
-            conditions.append(plant.settle(motor_voltage=0.0, pressure=pressure))
-        zero = np.array([condition.zero_contraction for condition in conditions])
-        return np.array([condition.state for condition in conditions]), zero
+    ) -> Settled:
+        if self.task.load:
+            held = self.rest_motor, regulator, pressures, vectors
+            return settled_under_load(self.nominal, *held)
+        models = [self.models[i] for i in indices.tolist()]
+        return settled_at_no_load(self.nominal, models, pressures, vectors)
 
     def _fill(
         self,
@@ -266,11 +255,41 @@ class Engine:
         for i in range(2):
             self._set(indices, f"key_{i}", self._keys[indices, i])
         self._set(indices, "episode", self._episodes[indices])
-        rest = (-1.0, np.clip(0.2 * regulator - 1.0, -1.0, 1.0))
+        volts: list[ArrayLike] = [0.0, regulator]
+        actions: list[ArrayLike] = [-1.0, np.clip(0.2 * regulator - 1.0, -1.0, 1.0)]
+        if self.task.actuator == "regulator":
+            for name in ("motor_voltage", "rest_motor"):
+                self._set(indices, name, self.rest_motor)
+            self._set(indices, START, states[:, self.record.states.index("contraction")])
+            volts, actions = volts[1:], actions[1:]
         for i in range(self.record.actions):
-            self._set(indices, f"action_{i}", rest[i])
+            self._set(indices, f"action_{i}", actions[i])
             for k in range(self.options.action_delay):
-                self._set(indices, f"wire_{k}_{i}", (0.0, regulator)[i])
+                self._set(indices, f"wire_{k}_{i}", volts[i])
+        if self.record.events:
+            self._set_events(indices)
+
+    def _set_events(self, indices: NDArray[np.int64]) -> None:
+        """Draw what will disturb episodes: the control steps it comes with, and its sizes."""
+        events = self._events(indices)
+        gain = self.told.parameters["regulator_line"].gain
+        rate = self.options.control_rate_hz
+        for what, times, sizes in (
+            ("jump", events.step_times, events.step_sizes / gain),
+            ("pulse", events.pulse_times, events.pulse_forces),
+        ):
+            for i in range(times.shape[1]):
+                self._set(indices, f"{what}_step_{i}", np.ceil(times[:, i] * rate))
+                self._set(indices, f"{what}_{i}", sizes[:, i])
+
+    def _events(self, indices: NDArray[np.int64]) -> Events:
+        """What disturbs the episodes of environments."""
+        drawn_by = self._keys[indices], self._episodes[indices]
+        return drawn_events(self.task, self.options, *drawn_by)
+
+    def events(self, index: int = 0) -> Events:
+        """What disturbs the episode of an environment, each of shape (events,)."""
+        return Events(*(row[0] for row in self._events(np.array([index]))))
 
     def _score_first_sample(self, indices: NDArray[np.int64]) -> None:
         phase = self.task.protocol.phases[0]
@@ -278,11 +297,15 @@ class Engine:
         quantity = self.task.protocol.quantity
         true = {
             name: self.records[block, self.record.places[name], lane]
-            for name in ("zero_contraction", "true_contraction", "true_rotation")
+            for name in ("zero_contraction", "true_contraction", "true_rotation", START)
+            if name in self.record.places
         }
-        extension = true["zero_contraction"] - true["true_contraction"]
-        position = extension if quantity == "extension" else true["true_rotation"]
-        self._set(indices, f"sum_{phase.name}", (position - phase.initial) ** 2)
+        position = true["true_rotation"]
+        if quantity == "extension":
+            position = true["zero_contraction"] - true["true_contraction"]
+        elif quantity == "contraction":
+            position = true["true_contraction"] - true[START]
+        self._set(indices, f"sum_{phase.name}", (position - float(phase.reference(0.0))) ** 2)
         self._set(indices, "sample", 1.0)
         if self.width == 1:
             self.trace[0] = position[0]
@@ -290,8 +313,9 @@ class Engine:
     def park(self, indices: NDArray[np.int64]) -> None:
         """Put stations that broke a limit at rest until they are reset."""
         block, lane = np.divmod(indices, self.width)
-        for name in (*self.record.states, "motor_voltage", "size"):
-            self.records[block, self.record.places[name], lane] = 0.0
+        for name in (*self.record.states, "motor_voltage", "rest_motor", "size"):
+            if name in self.record.places:
+                self.records[block, self.record.places[name], lane] = 0.0
 
     # -- steps -------------------------------------------------------------------------------------
 

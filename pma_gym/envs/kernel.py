@@ -41,7 +41,7 @@ TARE_READINGS = 192
 ARGUMENTS = (
     *("first", "last", "count", "records", "tables", "table_stride", "references"),
     *("actions", "observations", "rewards", "terminated", "truncated", "trace", "indices"),
-    *("attempts", "voltages"),
+    *("attempts", "voltages", "ideals"),
 )
 """Entries of a call's arguments: numbers of blocks and environments, then addresses."""
 
@@ -82,7 +82,8 @@ class Kernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, record.task.name, self.width, self.single),
+            *(options.regulator_action, self.width, self.single),
+            *(record.task.structure, record.events),
         )
         return ["environment", *structure(self.program.model), *map(str, said)]
 
@@ -363,7 +364,8 @@ class Writer:
                 b.store(job, lane.job(k))
                 if self.width == 1:
                     steps = b.load(address(job, "count"), typ=INTEGER)
-                    b.store(number(job, "motor_voltage"), offset(b, given["voltages"], steps))
+                    heard = number(job, f"{self.record.task.actuator}_voltage")
+                    b.store(heard, offset(b, given["voltages"], steps))
                 for name in kept:
                     lane.put(values[name], k, lane.narrow(number(job, name)))
                 for name in own:
@@ -374,7 +376,7 @@ class Writer:
                 lane.put("clock", k, lane.narrow(time))
                 inputs = {
                     self.circuit.slot(name).id: lane.narrow(number(job, name))
-                    for name in ("motor_voltage", "regulator_voltage", "zero_contraction")
+                    for name in self.record.held
                 }
                 block, rest = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
                 _, tables = self._block(b, given, block)
@@ -419,8 +421,14 @@ class Writer:
                 known[graph.input(f"record.{name}", 2).id] = lane.vector(name)
             known |= self._exact_times(b, one, known)
             outputs = [one.due, one.position, one.sample, *one.sums]
+            if one.ideal is not None:
+                # Whoever passes no sample looks nothing up.
+                known = lanes.emit(b, [one.due], known)
+                leave_if(b.not_(lanes.any(b, known[one.due.id])))
+                known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
             taken = lanes.emit(b, outputs, known)
-            leave_if(b.not_(lanes.any(b, taken[one.due.id])))
+            if one.ideal is None:
+                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
             if self.traces:
                 number = known[graph.input("record.sample", 2).id]
                 index = b.fptoui(number, INTEGER)
@@ -429,6 +437,17 @@ class Writer:
             lane.put_vector("sample", taken[one.sample.id])
             for phase, value in zip(phases, one.sums, strict=True):
                 lane.put_vector(f"sum_{phase.name}", taken[value.id])
+
+    def _ideals(
+        self, b: Builder, lanes: Lanes, given: dict[str, Operand], samples: Operand
+    ) -> Operand:
+        """Ideal position at the next sample of every lane, from the table."""
+        found = []
+        for k in range(lanes.width):
+            index = b.fptoui(lanes.extract(b, samples, k), INTEGER)
+            where = offset(b, given["ideals"], index, self.element)
+            found.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
+        return self._gathered(b, lanes, found)
 
     # -- what comes of it --------------------------------------------------------------------------
 

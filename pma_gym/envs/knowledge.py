@@ -27,11 +27,17 @@ class Station:
     action_delay: float = 0.0
     observation_delay: float = 0.0
 
+    @property
+    def load(self) -> float:
+        """Load that the motor holds while the regulator moves (N); 0 where the motor moves."""
+        return self.task.load
+
     def position(self, reading: "Reading") -> float:
         """The position that the task asks for, as the sensors say it (m or rad)."""
-        if self.task.protocol.quantity == "rotation":
+        quantity = self.task.protocol.quantity
+        if quantity == "rotation":
             return reading.rotation
-        return reading.extension
+        return -reading.extension if quantity == "contraction" else reading.extension
 
 
 class Reading(NamedTuple):
@@ -39,7 +45,9 @@ class Reading(NamedTuple):
 
     Attributes:
         time: when it was taken, since the trial began (s).
-        extension: how far the muscle was pulled out of its no-load contraction (m).
+        extension: how far the muscle was pulled out of the contraction that the trial began at (m):
+            that at no load, or under the load of a regulator's task, where it is negative while the
+            muscle shortens.
         rotation: pulley angle (rad).
         load: cable tension (N).
         pressure: gauge pressure (Pa).

@@ -78,7 +78,11 @@ class ObservationTable:
             reference: reference (m or rad) so many control steps ahead.
             action: the last action, -1 to 1.
         """
-        delay, quantity = self._delay, self._quantity
+        delay = self._delay
+
+        def position(steps: int) -> Any:  # noqa: ANN401
+            return heard_position(self._quantity, lambda part: reading(part, steps))
+
         now = reference(0) * (1.0 / self._span)
         return [
             reading("extension", delay) * (1.0 / EXTENSION_SCALE),
@@ -86,14 +90,16 @@ class ObservationTable:
             reading("load", delay) * (1.0 / LOAD_SCALE),
             reading("pressure", delay) * (1.0 / PRESSURE_SCALE),
             now,
-            now - reading(quantity, delay) * (1.0 / self._span),
+            now - position(delay) * (1.0 / self._span),
             *(reference(k) * (1.0 / self._span) for k in range(1, self._preview + 1)),
             *action,
-            *(
-                reading(quantity, delay + k) * (1.0 / self._span)
-                for k in range(1, self._history + 1)
-            ),
+            *(position(delay + k) * (1.0 / self._span) for k in range(1, self._history + 1)),
         ]
+
+
+def heard_position(quantity: str, reading: Callable[[str], Any]) -> Any:  # noqa: ANN401
+    """The position that a task asks for (m or rad), from parts of a reading by their names."""
+    return -reading("extension") if quantity == "contraction" else reading(quantity)
 
 
 def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
@@ -108,7 +114,7 @@ def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
         ("reference now", span),
         ("reference now less measured position", span),
         *((f"reference {_steps(k)} ahead", span) for k in range(1, options.preview + 1)),
-        ("last motor action", volts),
+        (f"last {task.actuator} action", volts),
         *([("last regulator action", volts)] if options.regulator_action else []),
         *((f"position heard {_steps(k)} before", span) for k in range(1, options.history + 1)),
     ]

@@ -9,8 +9,16 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from pma_gym.plant.model import Model
-from pma_gym.tasks import RANDOMISATIONS, REWARDS, TASKS, Task
+from pma_gym.plant.model import Model, load_model
+from pma_gym.tasks import (
+    DISTURBANCES,
+    EVERY_TASK,
+    RANDOMISATIONS,
+    REWARDS,
+    Disturbances,
+    Task,
+    named_task,
+)
 
 LOWEST_PRESSURE_KPA = 150.0
 HIGHEST_PRESSURE_KPA = 575.0
@@ -27,7 +35,7 @@ class Options:
 
     Attributes:
         pressure_kpa: gauge pressure of the episodes (kPa): a number, a list to draw from, or
-            "random" for any pressure of the task's trials.
+            "random" for any that the task's trials begin at.
         model: name of a shipped model, path of a TOML file, or a Model.
         control_rate_hz: control steps a second (Hz).
         preview: how many future references the observation holds, one a control step.
@@ -38,6 +46,7 @@ class Options:
         reward: name of a reward in `pma_gym.tasks.REWARDS`.
         randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`.
         regulator_action: whether a second action commands the regulator (0-10 V).
+        disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
     """
 
     pressure_kpa: Pressure = "random"
@@ -51,6 +60,12 @@ class Options:
     reward: str = "absolute"
     randomisation: str = "none"
     regulator_action: bool = False
+    disturbances: str = "none"
+
+    @property
+    def disturbing(self) -> Disturbances:
+        """Sizes of what disturbs."""
+        return DISTURBANCES[self.disturbances]
 
     @property
     def period(self) -> float:
@@ -86,18 +101,67 @@ def parse_options(given: Mapping[str, Any]) -> Options:
             raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
     check_named("reward", options.reward, REWARDS)
     check_named("randomisation", options.randomisation, RANDOMISATIONS)
+    check_named("disturbances", options.disturbances, DISTURBANCES)
     check_pressure(options.pressure_kpa)
     return options
 
 
-def parse_task(name: str) -> Task:
-    """The task of a name.
+def parse_task(given: str | Task, options: Options) -> Task:
+    """The task of a name, or a task as it is, if the options suit it.
 
     Raises:
-        ValueError: an unknown name, with the nearest known one.
+        ValueError: an unknown name, with the nearest known one; or an option that the task has no
+            use for.
     """
-    check_named("task", name, TASKS)
-    return TASKS[name]
+    task = named_task(given) if isinstance(given, str) else given
+    if not isinstance(task, Task):
+        raise _unknown("task", given, list(EVERY_TASK))
+    if task.actuator == "regulator" and options.regulator_action:
+        raise ValueError(
+            f"regulator_action gives the motor's tasks a second action; the only action of task "
+            f"{task.name} is the regulator's already: leave the option out"
+        )
+    return task
+
+
+def rig_model(task: Task, options: Options) -> Model:
+    """The nominal model with all that the options ask for: somebody at the slide, if they do.
+
+    Raises:
+        ModelError: no such model, or one that cannot be used.
+        ValueError: a cascade where there must be a station.
+    """
+    model = load_model(options.model)
+    operated = options.disturbing.operator_force != 0.0
+    if model.plant != "station" and (operated or task.load):
+        what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
+        why = "somebody pulls at its slide" if operated else "the motor holds a load"
+        raise ValueError(
+            f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
+            "take station or serres2008"
+        )
+    if not operated or "operator" in model.parameters:
+        return model
+    return model.with_effects({"operator": {"share": 1.0}})
+
+
+def motor_at_rest(model: Model, task: Task) -> float:
+    """Motor voltage that episodes begin at (V): what a nominal drive needs for the task's load.
+
+    Raises:
+        ValueError: the drive does not hold such a load.
+    """
+    if not task.load:
+        return 0.0
+    drive = model.parameters["drive"]
+    volts = (task.load - drive.offset) / drive.gain
+    if not 0.0 <= volts <= 10.0:
+        raise ValueError(
+            f"task {task.name}: the load must lie in {max(0.0, drive.offset):.4g} to "
+            f"{10.0 * drive.gain + drive.offset:.4g} N, what the drive of model {model.name} holds "
+            f"with 0-10 V; got {task.load:g} N"
+        )
+    return volts
 
 
 def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
@@ -121,9 +185,7 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
     """
     names = list(known)
     if not isinstance(value, str) or value not in names:
-        raise ValueError(
-            f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
-        )
+        raise _unknown(what, value, names)
 
 
 def check_pressure(pressure: object) -> None:
@@ -210,6 +272,12 @@ def _is_real(value: object) -> TypeGuard[float]:
 
 def _is_whole(value: object) -> TypeGuard[int]:
     return isinstance(value, numbers.Integral) and not isinstance(value, bool)
+
+
+def _unknown(what: str, value: object, names: Sequence[str]) -> ValueError:
+    return ValueError(
+        f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
+    )
 
 
 def _nearest(name: object, known: Sequence[str]) -> str:

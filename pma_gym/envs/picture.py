@@ -59,8 +59,8 @@ class Picture:
         self._rig.update(env)
         position = env.trajectory()[::STRIDE] / self._factor
         self._actual.set_data(np.arange(len(position)) * STRIDE / SAMPLE_RATE_HZ, position)
-        self._now.set_data([env.time], [env.truth[env.task.protocol.quantity] / self._factor])
-        held = np.append(env.motor_voltages, env.motor_voltages[-1:])
+        self._now.set_data([env.time], [env.position / self._factor])
+        held = np.append(env.voltages, env.voltages[-1:])
         self._volts.set_data(np.arange(len(held)) * env.options.period, held)
         self._canvas.restore_region(self._still)
         for axes, artist in self._moving:
@@ -99,7 +99,7 @@ class Picture:
         axes = self._plot((0.545, 0.13, 0.435, 0.27), task)
         axes.set_ylim(-0.5, 10.5)
         axes.set_yticks([0, 5, 10])
-        axes.set_ylabel("motor (V)")
+        axes.set_ylabel(f"{task.actuator} (V)")
         axes.set_xlabel("time (s)")
         (self._volts,) = axes.plot([], [], color=VOLTAGE, lw=1.2, drawstyle="steps-post")
         self._moving.append((axes, self._volts))

@@ -21,10 +21,10 @@ from pma_gym.envs.options import (
     parse_options,
     parse_task,
 )
-from pma_gym.envs.record import PARTS, TRUTH
+from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
 from pma_gym.envs.summary import info_maker, summary
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.tasks import limit_in_words
+from pma_gym.tasks import Events, Task, limit_in_words
 
 if TYPE_CHECKING:
     from pma_gym.envs.picture import Picture
@@ -34,26 +34,43 @@ NOT_BEGUN = "no episode has begun"
 
 
 class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
-    """Isokinetic tracking with a pneumatic muscle that a servo drive pulls through a cable.
+    """Tracking with a pneumatic muscle that a servo drive pulls through a cable.
 
-    An episode begins pressurised and settled, with no load. In every control step kT the agent
-    commands the motor's voltage, which is held until (k+1)T; the muscle's extension (task
-    `displacement`: 5 mm/s for 5 s) or the pulley's rotation (task `rotation`: 0-90 deg in 5 s,
-    held 5 s, back in 5 s) is to follow the reference.
+    In every control step kT the agent commands a voltage, which is held until (k+1)T; a position is
+    to follow the task's reference. An episode begins settled.
+
+    ## Tasks
+    | task | what follows what | actuator |
+    |---|---|---|
+    | `displacement` | the muscle's extension: 5 mm/s for 5 s | motor |
+    | `rotation` | the pulley's rotation: 0-90 deg in 5 s, held 5 s, back in 5 s | motor |
+    | `displacement_sine`, `_multisine`, `_steps`, `_speeds` | extension, 10 s in 25 mm | motor |
+    | `rotation_sine`, `_multisine`, `_steps`, `_speeds` | rotation, 10 s in 90 deg | motor |
+    | `isotonic` | contraction: 12.5 mm in 2.5 s, held 2.5 s, back in 2.5 s | regulator |
+    | `triangle_low` | contraction: 11.4 mm up and down in 4 s, three times | regulator |
+    | `triangle_high` | contraction: 5.5 mm up and down in 10 s, three times | regulator |
+
+    The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
+    begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
+    drive needs for it; contraction counts from there. Drawn references come by number too:
+    `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
+    `pma_gym.tasks.following` makes of a function, can be given instead of a name.
 
     ## Action
     A Box of shape (1,), or (2,) with `regulator_action`; beyond -1 to 1 it is held there.
 
     | index | meaning | range | physical |
     |---|---|---|---|
-    | 0 | motor voltage | -1 to 1 | 0 to 10 V |
+    | 0 | voltage of the task's actuator | -1 to 1 | 0 to 10 V |
     | 1, only with `regulator_action` | regulator voltage | -1 to 1 | 0 to 10 V |
 
     `action(volts)` gives the action of a voltage.
 
     ## Observation
     A float32 Box, each entry clipped to -5 to 5. "Position" is the quantity that the task asks
-    for, and its range 25 mm or 90 deg. With `observation_delay_s` everything measured is so old.
+    for, and its range 25 mm, 90 deg, or the contraction's stroke. Extension and rotation count from
+    the trial's beginning, so that extension is negative while a regulator's task contracts the
+    muscle. With `observation_delay_s` everything measured is so old.
 
     | index | entry | 1.0 = |
     |---|---|---|
@@ -93,14 +110,29 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | pressure | 600 kPa |
 
     `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
-    is reached: at 100 Hz after 501 steps (displacement) or 1501 (rotation).
+    is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
+    references), 751 (isotonic), 1201 or 3001 (triangles).
+
+    ## Disturbances
+    By name, `disturbances`; drawn at every reset, at random times, by the environment's seed:
+
+    | name | what comes, every 2.5 s on average |
+    |---|---|
+    | `none` (default) | |
+    | `regulator` | the regulator's pressure jumps by 25 kPa, away from its line and back in turn |
+    | `operator` | somebody at the slide pulls or pushes with 50 N for 0.5 s |
+    | `regulator_and_operator` | both |
+
+    A jump is volts that the regulator hears beside its command, by the nominal line and as far as
+    0-10 V go; the operator's force adds to the muscle's at the slide. Both come with the control
+    step after their time. `env.disturbance` and `env.events` tell, but not controllers.
 
     ## Info
     | key | value | unit |
     |---|---|---|
     | `time_s` | since the trial began | s |
-    | `extension_mm` or `rotation_deg` | true position | mm, deg |
-    | `measured_extension_mm` or `measured_rotation_deg` | as heard by the agent | mm, deg |
+    | `extension_mm`, `rotation_deg` or `contraction_mm` | true position | mm, deg |
+    | `measured_` and the same | as heard by the agent | mm, deg |
     | `reference_mm` or `reference_deg` | reference now | mm, deg |
     | `error_mm` or `error_deg` | true position less reference | mm, deg |
     | `motor_voltage_v`, `regulator_voltage_v` | as heard by the station in this step | V |
@@ -117,7 +149,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | v0 | first |
 
     Args:
-        task: `displacement` or `rotation`.
+        task: name of a task, or a Task.
         render_mode: None or `rgb_array`.
         options: keyword arguments, see `Options`.
 
@@ -142,19 +174,19 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}
 
     def __init__(
-        self, task: str = "displacement", render_mode: str | None = None, **options: Any
+        self, task: str | Task = "displacement", render_mode: str | None = None, **options: Any
     ) -> None:
         """Check the options and compile the plant."""
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.task = parse_task(task)
         self.options = parse_options(options)
+        self.task = parse_task(task, self.options)
         self._engine = Engine(self.task, self.options)
         self.nominal_plant = self._engine.nominal
         self.table = self._engine.table
         self.observation_space = self.table.space
-        self._commands = CommandLine(self.options)
+        self._commands = CommandLine(self.options, self.task.actuator)
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
@@ -169,6 +201,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._entry: Any = memoryview(self._given)
         self._shape = self._given.shape
         self._run, self._arguments = self._engine.call
+        self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
         self._idle: str | None = NOT_BEGUN
 
@@ -284,16 +317,44 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def truth(self) -> dict[str, float]:
-        """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa)."""
+        """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa).
+
+        Contraction is from the muscle's resting length, extension from the trial's beginning;
+        rotation from where the cable begins to be wound in with no load.
+        """
         truth = {name: self._number(f"true_{name}") for name in TRUTH}
-        return truth | {"extension": self._number("zero_contraction") - truth["contraction"]}
+        return truth | {"extension": self._number(self._datum) - truth["contraction"]}
+
+    @property
+    def position(self) -> float:
+        """True position that the task asks for (m or rad)."""
+        truth = self.truth
+        if self.task.protocol.quantity == "contraction":
+            return truth["contraction"] - self._number(START)
+        return truth[self.task.protocol.quantity]
+
+    @property
+    def disturbance(self) -> tuple[float, float]:
+        """What disturbed the last step: the regulator's jump (V) and the operator's force (N)."""
+        jumps = [name for name in self._places if name.startswith("jump_step_")]
+        count = self._count - 1
+        volts = [
+            self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
+        ]
+        force = self._number(OPERATOR) if OPERATOR in self._places else 0.0
+        return sum(volts), force
+
+    @property
+    def events(self) -> Events:
+        """What disturbs this episode, and when; not for controllers."""
+        return self._engine.events()
 
     @property
     def station(self) -> Station:
         """What a controller may know: what it was designed with and how it is driven."""
         options = self.options
         return Station(
-            self.nominal_plant.model,
+            self._engine.told,
             self.task,
             self.pressure,
             options.period,
@@ -304,7 +365,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def error(self) -> float:
         """True position less reference (m or rad)."""
-        return self.truth[self.task.protocol.quantity] - float(self.table.references[self._count])
+        return self.position - float(self.table.references[self._count])
 
     @property
     def extrapolated(self) -> bool:
@@ -324,25 +385,30 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
         """Motor voltage that the station heard in every step so far (V), shape (steps,)."""
+        if self.task.actuator == "motor":
+            return self.voltages
+        return np.full(self._count, self.motor_voltage)
+
+    @property
+    def voltages(self) -> NDArray[np.float64]:
+        """Voltage of the task's actuator that the station heard in every step so far (V)."""
         return self._engine.voltages[: self._count].copy()
 
     def reference(self, time: float) -> float:
-        """The reference at a time (s): extension (m) or rotation (rad)."""
-        return float(self.task.protocol.reference(time))
+        """The reference at a time (s): extension, contraction (m) or rotation (rad)."""
+        return self.task.protocol.at(time)
 
-    def action(
-        self, motor_voltage: float, regulator_voltage: float | None = None
-    ) -> NDArray[np.float64]:
+    def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
         """The action that commands these voltages (V), held to 0-10 V.
 
         In float64, which `step` takes as it is: float32 would move a voltage by up to 0.3 uV.
 
         Args:
-            motor_voltage: motor command (V).
+            voltage: command (V) of the task's actuator: motor or regulator.
             regulator_voltage: regulator command (V), with `regulator_action`; if not given, the
                 one that holds the pressure of the episode's start.
         """
-        return self._commands.action_for(motor_voltage, regulator_voltage)
+        return self._commands.action_for(voltage, regulator_voltage)
 
     def trajectory(self) -> NDArray[np.float64]:
         """True position (m or rad) at k / 384 s so far, whatever the control rate, shape (k,)."""
@@ -353,8 +419,9 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
         Returns:
             `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
-            each phase begun, by its name; `percent_of_range`: the first, of 25 mm or 90 deg;
-            `ended_by`: the limit that ended the episode, in words, or None.
+            each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
+            or the contraction's stroke; `ended_by`: the limit that ended the episode, in words, or
+            None.
         """
         sums = {p.name: self._number(f"sum_{p.name}") for p in self.task.protocol.phases}
         return summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}

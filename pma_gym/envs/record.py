@@ -12,6 +12,12 @@ Part = Literal["extension", "rotation", "load", "pressure"]
 PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
 """What a reading consists of, in order."""
 
+START = "start_contraction"
+"""Place of the contraction that an episode began at (m), from which a regulator's task counts."""
+
+OPERATOR = "memory_operator"
+"""Place of the force that an operator puts on the slide (N)."""
+
 TRUTH = ("contraction", "rotation", "load", "pressure")
 """True outputs, in the order of the plant's."""
 
@@ -57,6 +63,25 @@ class Record:
             "extrapolated",
         ]
 
+    @property
+    def held(self) -> list[str]:
+        """What the march needs that stays during a control step."""
+        own = [START] if self.task.actuator == "regulator" else []
+        return ["motor_voltage", "regulator_voltage", "zero_contraction", *own]
+
+    @cached_property
+    def events(self) -> list[str]:
+        """Places of what disturbs: of each event its control step and its size.
+
+        The step is a whole number, kept as a real: which is the same in every precision.
+        """
+        disturbing, duration = self.options.disturbing, self.task.duration
+        steps, pulses = disturbing.regulator_steps(duration), disturbing.pulses(duration)
+        return [
+            *(f"{what}_{i}" for i in range(steps) for what in ("jump_step", "jump")),
+            *(f"{what}_{i}" for i in range(pulses) for what in ("pulse_step", "pulse")),
+        ]
+
     @cached_property
     def places(self) -> dict[str, int]:
         """Place of every number by name."""
@@ -64,6 +89,8 @@ class Record:
         names = [
             *self.states,
             *("size", "zero_contraction", "motor_voltage", "regulator_voltage"),
+            *(("rest_motor", START) if self.task.actuator == "regulator" else ()),
+            *self.events,
             *("rest_regulator", "count", "sample", "tare_contraction", "tare_rotation"),
             *("key_0", "key_1", "episode"),
             *(f"sum_{phase.name}" for phase in self.task.protocol.phases),

@@ -72,14 +72,16 @@ class RigDrawing:
         self._move_muscle(end, bulged_radius(truth["contraction"]))
         self._move_pulley(end, truth["rotation"], truth["load"])
         self._move_mark(env, end)
-        gauges = (truth["pressure"] / 1e3, truth["load"], env.motor_voltage, env.time)
+        motor = self._task.actuator == "motor"
+        volts = env.motor_voltage if motor else env.regulator_voltage
+        gauges = (truth["pressure"] / 1e3, truth["load"], volts, env.time)
         for text, form, value in zip(self._gauges, GAUGES.values(), gauges, strict=True):
             text.set_text(form.format(value))
         self._ended.set_text(f"ended: {env.ended_by}" if env.ended_by else "")
 
     def _draw_frame(self) -> None:
         axes = self.axes
-        axes.text(-8, 125, f"Isokinetic {self._task.name}", size=13, color=INK, weight="bold")
+        axes.text(-8, 125, self._task.title, size=13, color=INK, weight="bold")
         axes.add_patch(Rectangle((-22, -52), 14, 104, fc=FAINT, ec=STEEL, hatch="////", lw=1))
         axes.add_patch(Rectangle((165, -42), 118, 5, fc=FAINT, ec=STEEL, lw=0.8))
         foot = [
@@ -91,7 +93,8 @@ class RigDrawing:
         axes.add_patch(Polygon(foot, fc=FAINT, ec=STEEL, lw=0.8))
         axes.plot([-22, 361], [-72, -72], color=STEEL, lw=1.2)
         for i, name in enumerate(GAUGES):
-            axes.text(_gauge_x(i), -128, name, size=8, color=STEEL, ha="center")
+            shown = self._task.actuator if name == "actuator" else name
+            axes.text(_gauge_x(i), -128, shown, size=8, color=STEEL, ha="center")
 
     def _make_muscle(self) -> None:
         self._body = Polygon([(0, 0)], fc=RUBBER, ec=INK, lw=1.2)
@@ -146,8 +149,9 @@ class RigDrawing:
         self._dot.set_data(x, y)
 
     def _move_mark(self, env: "PMAEnv", end: float) -> None:
-        if self._task.protocol.quantity == "extension":
-            x = end - 1e3 * env.error + 0.5 * SLIDE_WIDTH
+        if self._task.protocol.quantity != "rotation":
+            outwards = -1.0 if self._task.protocol.quantity == "contraction" else 1.0
+            x = end - 1e3 * outwards * env.error + 0.5 * SLIDE_WIDTH
             self._mark.set_data([x, x], [-64.0, -45.0])
         else:
             reference = env.truth["rotation"] - env.error
@@ -158,7 +162,7 @@ class RigDrawing:
 GAUGES = {
     "pressure": "{:.0f} kPa",
     "cable tension": "{:.0f} N",
-    "motor": "{:.2f} V",
+    "actuator": "{:.2f} V",
     "time": "{:.2f} s",
 }
 """What the gauges show, and how."""

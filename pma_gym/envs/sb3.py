@@ -11,6 +11,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvO
 
 from pma_gym.envs.options import check_known
 from pma_gym.envs.vector import PMAVectorEnv
+from pma_gym.tasks import Task
 
 
 class SB3VecEnv(VecEnv):
@@ -22,7 +23,7 @@ class SB3VecEnv(VecEnv):
 
     Args:
         num_envs: how many environments.
-        task: `displacement` or `rotation`.
+        task: name of a task, or a Task; as `PMAEnv`.
         options: as `PMAVectorEnv`, but for the autoreset mode, which is SAME_STEP.
 
     Attributes:
@@ -35,7 +36,7 @@ class SB3VecEnv(VecEnv):
         >>> _ = model.learn(4096)
     """
 
-    def __init__(self, num_envs: int, task: str = "displacement", **options: Any) -> None:
+    def __init__(self, num_envs: int, task: str | Task = "displacement", **options: Any) -> None:
         """Make the environments."""
         check_known("option", [name for name in options if name == "autoreset_mode"], ())
         self.envs = PMAVectorEnv(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, **options)

@@ -2,10 +2,11 @@
 
 from dataclasses import dataclass
 
+from pma_gym.envs.record import START
 from pma_gym.kernels.derivative import derivatives
 from pma_gym.kernels.graph import CHANGING, HELD, Value
 from pma_gym.kernels.substitute import substitute
-from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
+from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.attempt import Attempt
 from pma_gym.plant.compose import Equations
 from pma_gym.tasks import Task
@@ -40,16 +41,22 @@ class Course:
 
 def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
     """How the task's position moves during an attempt."""
-    if task.protocol.quantity == "extension":
-        position = eq["zero_contraction"] - eq.outputs["contraction"]
-    else:
-        position = eq.outputs["rotation"]
+    position = position_of(eq, task, eq.outputs["contraction"], eq.outputs["rotation"])
     speed = _rate(eq, position)
     bend = _rate(eq, speed)
     begin = {**attempt.frozen, **attempt.here}
     start = substitute([position, speed, bend], begin)
     end = substitute([position, speed], {**attempt.frozen, **attempt.moved})
     return Course(*start, *end)
+
+
+def position_of(eq: Equations, task: Task, contraction: Value, rotation: Value) -> Value:
+    """The position that a task asks for (m or rad), from the plant's outputs."""
+    if task.protocol.quantity == "extension":
+        return eq["zero_contraction"] - contraction
+    if task.protocol.quantity == "contraction":
+        return contraction - eq.graph.input(START, HELD)
+    return rotation
 
 
 def _rate(eq: Equations, value: Value) -> Value:
@@ -72,6 +79,8 @@ class Sampling:
         sums: sums of squared errors by phase, with it if it is due.
         when: time from the attempt's beginning to it (s): a difference of times since the trial
             began, for which single precision is too little.
+        ideal: ideal position at it (m or rad), an input that the sums need; None where they know it
+            from lines.
     """
 
     due: Value
@@ -79,6 +88,7 @@ class Sampling:
     sample: Value
     sums: list[Value]
     when: Value
+    ideal: Value | None = None
 
 
 def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Sampling:
@@ -102,14 +112,15 @@ def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Samp
     e, f = 4.0 * rest - slope, slope - 3.0 * rest
     position = c.start + share * (b + share * (d + share * (e + share * f)))
     sums = []
+    moved = None if task.protocol.motion is None else graph.input("ideal", CHANGING)
     for phase in task.protocol.phases:
         before = graph.input(f"record.sum_{phase.name}", CHANGING)
-        first = float(round(phase.start * SAMPLE_RATE_HZ))
-        ideal = phase.initial + phase.slope * ((sample - first) * SAMPLE_PERIOD)
-        error = position - ideal
-        inside = due & (sample >= first) & (sample < first + PHASE_SAMPLES)
+        first = float(phase.first)
+        line = phase.initial + phase.slope * ((sample - first) * SAMPLE_PERIOD)
+        error = position - (line if moved is None else moved)
+        inside = due & (sample >= first) & (sample < first + phase.samples)
         sums.append(graph.select(inside, before + error * error, before))
-    return Sampling(due, position, graph.select(due, sample + 1.0, sample), sums, when)
+    return Sampling(due, position, graph.select(due, sample + 1.0, sample), sums, when, moved)
 
 
 COURSE = ("start", "speed", "bend", "end", "end_speed")

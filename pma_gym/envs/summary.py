@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ, percent_of_range
+from pma_gym.metrics import percent_of_range
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
@@ -67,8 +67,7 @@ def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, 
     protocol = task.protocol
     unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
     counts = {
-        phase.name: min(max(samples - round(phase.start * SAMPLE_RATE_HZ), 0.0), PHASE_SAMPLES)
-        for phase in protocol.phases
+        phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in protocol.phases
     }
     begun = {name: count for name, count in counts.items() if count > 0.0}
     total = math.sqrt(sum(sums[name] for name in begun) / sum(begun.values()))
@@ -95,7 +94,7 @@ def summaries(
     unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
     total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
     for phase in protocol.phases:
-        count = np.clip(samples - round(phase.start * SAMPLE_RATE_HZ), 0.0, PHASE_SAMPLES)
+        count = np.clip(samples - phase.first, 0.0, phase.samples)
         begun = count > 0.0
         # A phase that has not begun adds nothing: its sum is 0.
         total, number = total + sums[phase.name], number + count

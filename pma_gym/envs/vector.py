@@ -23,7 +23,7 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.summary import summaries
-from pma_gym.tasks import limit_in_words
+from pma_gym.tasks import Task, limit_in_words
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
@@ -40,7 +40,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     Args:
         num_envs: how many.
-        task: `displacement` or `rotation`.
+        task: name of a task, or a Task; as `PMAEnv`.
         autoreset_mode: NEXT_STEP (default), SAME_STEP or DISABLED (then `reset` takes the option
             `reset_mask`).
         threads: how many threads step them, at most one for every 16 environments.
@@ -72,7 +72,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     def __init__(
         self,
         num_envs: int = 1,
-        task: str = "displacement",
+        task: str | Task = "displacement",
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int = 1,
         precision: str = "double",
@@ -93,7 +93,8 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             )
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.task, self.options = parse_task(task), parse_options(options)
+        self.options = parse_options(options)
+        self.task = parse_task(task, self.options)
         self.metadata = self.metadata | {
             "render_fps": round(self.options.control_rate_hz),
             "autoreset_mode": self.autoreset_mode,
@@ -106,7 +107,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
         self.table: ObservationTable = self.engine.table
         self.single_observation_space = self.table.space
-        self.single_action_space = CommandLine(self.options).space
+        self.single_action_space = CommandLine(self.options, self.task.actuator).space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.arange(num_envs)

@@ -65,6 +65,7 @@ def write_equations(equations: Equations) -> None:
     eq = equations
     stiffness, force = eq.parameters["stiffness"], eq.parameters["contractile_force"]
     eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     eq.let("displacement_input", eq.one("position_map"))
     eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))

@@ -217,6 +217,19 @@ class Equations:
                 factor = factor * self.call(effect, effect.law)
         return factor
 
+    def chain(self, port: str, name: str, value: Value) -> Value:
+        """A value that the effects at a port change one after the other, in catalogue order.
+
+        Args:
+            port: the port.
+            name: the signal by which their laws know the value.
+            value: the value before them.
+        """
+        for effect in self.at(port):
+            if effect.law:
+                value = self.call(effect, effect.law, **{name: value})
+        return value
+
     def one(self, port: str, **other: Value) -> Any:  # noqa: ANN401
         """What the law of the only effect at a port returns."""
         (effect,) = self.at(port)
@@ -227,10 +240,12 @@ class Equations:
         """Add a state by its rate, and what an error of it is counted against."""
         self.states.append(State(name, self[name], self.graph.value(rate), scale))
 
-    def add_decaying(self, name: str, rate: tuple[Value, Value], scale: float | None) -> None:
-        """Add a state whose rate law returns (source, decay)."""
+    def add_decaying(
+        self, name: str, rate: tuple[Value, Value], scale: float | None, beside: str = ""
+    ) -> None:
+        """Add a state whose rate law returns (source, decay), and rates of a port `beside` it."""
         source, decay = rate
-        self.add_state(name, source - decay * self[name], scale)
+        self.add_state(name, source - decay * self[name] + self.total(beside), scale)
 
     def add_memories(self, ports: Sequence[str]) -> None:
         """Add the memory of every effect that has one at these ports."""
@@ -249,9 +264,18 @@ class Equations:
         self.switches.append(Switch(name, value, rate, overshoot, turning))
 
     def add_sensors(self, scales: Mapping[str, float]) -> None:
-        """Add the lag of every sensor, by what an error of its output is counted against."""
+        """Add the lag of every sensor, by what an error of its output is counted against.
+
+        It follows its output, and whatever errors stand at the same port.
+        """
         for effect in self.effects.values():
             if effect.port.startswith("sensor:") and effect.rate:
                 output = effect.port.removeprefix("sensor:")
-                rate = self.call(effect, effect.rate, signal=self.outputs[output])
+                truth = self.outputs[output]
+                errors = [
+                    self.call(error, error.law, signal=truth)
+                    for error in self.at(effect.port)
+                    if error.law
+                ]
+                rate = self.call(effect, effect.rate, signal=sum(errors, truth))
                 self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])

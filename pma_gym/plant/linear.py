@@ -15,6 +15,9 @@ SEEN = (*OUTPUTS, "extension")
 DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 """Sign of the velocity by direction of motion."""
 
+FOLLOWING = ("memory_drive_lag",)
+"""Memories that follow a command within milliseconds, and so belong to the linear system."""
+
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or 1/s of them; Pa; V."""
 
@@ -28,8 +31,8 @@ def linearize(
     """The plant near rest at a pressure and a contraction, as a linear system.
 
     Damping has two values at rest, so a direction is named; a regulator with two paces gets their
-    mean. Memories (dry friction, hysteresis) stay where they are: the system slides. Sensor lags
-    are left out.
+    mean. Memories (dry friction, hysteresis, creep) stay where they are: the system slides. Sensor
+    lags are left out.
 
     Args:
         plant: the plant.
@@ -42,18 +45,36 @@ def linearize(
     Raises:
         ValueError: an unknown direction, or a contraction that no load of 0-10 V holds.
     """
+    rest, commands = operating_point(plant, pressure, contraction)
+    return linearize_at(plant, rest, commands, direction)
+
+
+def linearize_at(
+    plant: Plant, rest: Condition, commands: tuple[float, float], direction: str = "relaxing"
+) -> "control.StateSpace":
+    """The plant near a condition at rest, as `linearize`; it need not be searched for.
+
+    Args:
+        plant: the plant.
+        rest: where it stands at rest.
+        commands: motor and regulator voltage that hold it there (V).
+        direction: `relaxing` (the motor pulls) or `contracting`.
+    """
     import control
 
     if direction not in DIRECTIONS:
         raise ValueError(f"direction must be one of {', '.join(DIRECTIONS)}, got {direction!r}")
-    rest, commands = operating_point(plant, pressure, contraction)
     base = Condition(rest.state.copy(), rest.zero_contraction)
     if "velocity" in plant.states:
         base.state[plant.states.index("velocity")] += _AWAY * DIRECTIONS[direction]
     else:
         # The cascade's muscle shortens where its motor stands behind it.
         base.state[plant.states.index("servo")] -= _AWAY * DIRECTIONS[direction]
-    kept = [i for i, name in enumerate(plant.states) if not name.startswith(("memory_", "lag_"))]
+    kept = [
+        i
+        for i, name in enumerate(plant.states)
+        if name in FOLLOWING or not name.startswith(("memory_", "lag_"))
+    ]
     return control.StateSpace(
         _by_state(plant, base, commands, kept),
         _by_input(plant, base, commands)[kept],

@@ -1,7 +1,7 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -113,6 +113,59 @@ class Model:
             raise ModelError(str(error)) from error
         notes = {path: note for path, note in self.notes.items() if path not in values}
         return replace(self, name=name or self.name, parameters=parameters, notes=notes)
+
+    def with_effects(
+        self, effects: Mapping[str, Mapping[str, Value]] | Iterable[str], name: str | None = None
+    ) -> "Model":
+        """A model with effects of the catalogue added; the order given does not matter.
+
+        Args:
+            effects: values by effect and `parameter_unit`, in the unit at the door; or names
+                alone. What is not given is as the model has it, else neutral: the effect is there
+                and does nothing.
+            name: name of the new model; this one's if not given.
+        Raises:
+            ModelError: an unknown effect or parameter, one out of bounds, one that is neither
+                given nor neutral, or an effect that this plant does not take.
+
+        Example:
+            >>> drags = load_model("serres2008").with_effects({"hysteresis": {"force_n": 12.0}})
+            >>> round(drags.parameters["hysteresis"].force)
+            12
+        """
+        if isinstance(effects, str):
+            raise ModelError(f"with_effects takes a list of names or a dict, got {effects!r}")
+        given = effects if isinstance(effects, Mapping) else dict.fromkeys(effects, {})
+        parameters = dict(self.parameters)
+        for effect, values in given.items():
+            parameters[effect] = self._added(effect, values)
+        kept = {
+            path: note
+            for path, note in self.notes.items()
+            if path.partition(".")[2] not in given.get(path.partition(".")[0], {})
+        }
+        return replace(self, name=name or self.name, parameters=parameters, notes=kept)
+
+    def _added(self, effect: str, values: Mapping[str, Value]) -> Parameters:
+        """Parameters of an effect to be added, some of them given."""
+        known = _known(effect)
+        before = self.parameters.get(effect, known.neutral)
+        missing = [door for door in known.names_at_the_door() if door not in values]
+        if before is None and missing:
+            raise ModelError(
+                f"[{effect}] is never absent: it has no neutral values; give {', '.join(missing)}"
+            )
+        if before is None:
+            return _parse(effect, values)
+        try:
+            return known.changed(before, values)
+        except KeyError as error:
+            raise ModelError(
+                f"[{effect}] has no parameter {error.args[0]}; it has "
+                f"{', '.join(known.names_at_the_door())}"
+            ) from None
+        except ValueError as error:
+            raise ModelError(str(error)) from error
 
     def at_the_door(self, effect: str) -> dict[str, Value]:
         """One effect's values by their names at the door."""

@@ -21,8 +21,8 @@ def at_rest(
         motor_voltage: motor command (V).
         regulator_voltage: regulator command (V).
     Returns:
-        State vector (SI) with memories at zero, and the contraction x0 (m) that the muscle would
-        have with no load at this pressure.
+        State vector (SI) with memories at zero, but for a load that has long arrived, and the
+        contraction x0 (m) that the muscle would have with no load at this pressure.
     Raises:
         ValueError: no contraction within twice the limits balances the load.
     """
@@ -62,7 +62,9 @@ def _search(
     vectors: np.ndarray | None,
 ) -> "_Search":
     search = _Search(plant, motor_voltages, regulator_voltages, vectors)
-    search.relax("pressure")
+    _settle_pressure(search)
+    if (late := "memory_drive_lag") in plant.states:
+        search.relax(late)
     find = _station if plant.model.plant == "station" else _cascade
     find(search)
     for name in plant.states:
@@ -112,14 +114,17 @@ class _Search:
         self.plant.program.derivative(len(out), states, commands, vectors, stride, out.ctypes.data)
         return out[:, self.names[name]]
 
-    def relax(self, name: str, of: str = "") -> None:
-        """Put a state where a rate vanishes that is linear in it: its own, or that `of` another."""
+    def relax(self, name: str, of: str = "", about: np.ndarray | float = 0.0) -> None:
+        """Put a state where a rate vanishes that is linear in it `about` a value.
+
+        The rate is its own, or that `of` another.
+        """
         rates = []
         for value in (0.0, 1.0):
-            self[name] = value
+            self[name] = about + value
             rates.append(self.rate(of or name))
         slope = rates[1] - rates[0]
-        self[name] = -rates[0] / slope
+        self[name] = about - rates[0] / slope
         # From there again: the difference above has lost digits, and a rate may have a kink.
         for _ in range(3):
             self[name] -= self.rate(of or name) / slope
@@ -133,6 +138,24 @@ class _Search:
         # With the zero at the contraction itself the cable is slack.
         self["contraction"] = contraction
         return self.parameters("slide")["mass"] * self.rate("velocity", zero=contraction)
+
+
+_STEADY = 1.0
+"""Rate (Pa/s) under which a pressure has settled."""
+
+
+def _settle_pressure(search: _Search) -> None:
+    """Pressures at which the regulators rest; a limit on their rate has them searched for there."""
+    if "regulator_rate_limit" not in search.plant.model.effects:
+        search.relax("pressure")
+        return
+    with np.errstate(divide="ignore", invalid="ignore"):
+        search.relax("pressure")
+    found, line = search["pressure"].copy(), search.parameters("regulator_line")
+    settled = np.abs(search.rate("pressure")) <= _STEADY
+    asked = np.maximum(line["gain"] * search.inputs[:, 1] + line["offset"], 0.0)
+    search.relax("pressure", about=asked)
+    search["pressure"] = np.where(settled, found, search["pressure"])
 
 
 def _cascade(search: _Search) -> None:
@@ -155,6 +178,46 @@ def _station(search: _Search) -> None:
     load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
     search["contraction"] = _balance(search, np.maximum(load, 0.0))
     search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+    if any(effect.port == RIPPLE for effect in search.plant.model.effects.values()):
+        _settle_by_angle(search)
+
+
+RIPPLE = "drive_ripple"
+"""Port whose effects make the load depend on where the motor stands."""
+
+_CLEAR_M, _NEAR_RAD, _MOST_APPROACHES = 1e-3, 1e-13, 100
+"""Slack (m) that shows a drive's load without the cable; by how much an angle may still miss, and
+how often it is tried anew."""
+
+
+def _settle_by_angle(search: _Search) -> None:
+    """Bring contractions and angles to where the loads at those angles hold them.
+
+    How far to go towards the angle that the load asks for is told by how that changed the last time
+    (Wegstein 1958). Each row stops by itself.
+    """
+    rotor = search.parameters("rotor")
+    angle, contraction = search["angle"].copy(), search["contraction"].copy()
+    done = np.zeros(angle.shape, bool)
+    before, asked = np.full((2, *angle.shape), np.nan)
+    for _ in range(_MOST_APPROACHES):
+        search["angle"] = angle
+        search["contraction"] = search.zero - rotor["radius"] * angle - _CLEAR_M
+        load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
+        search["angle"] = 0.0
+        search["contraction"] = _balance(search, np.maximum(load, 0.0))
+        found = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+        near = ~(np.abs(found - angle) > _NEAR_RAD)
+        contraction = np.where(done, contraction, search["contraction"])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = (angle - before) / (angle - before - (found - asked))
+        share = np.where(np.isfinite(share), np.clip(share, 0.2, 2.0), 0.5)
+        before, asked = angle, found
+        angle = np.where(done, angle, np.where(near, found, angle + share * (found - angle)))
+        done = done | near
+        if np.all(done):
+            break
+    search["angle"], search["contraction"] = angle, contraction
 
 
 def _balance(search: _Search, loads: np.ndarray) -> np.ndarray:
@@ -265,9 +328,13 @@ def at_no_load(
         vectors: parameters of each, shape (n, numbers); the plant's own if not given.
     Returns:
         State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the cable
-        does not hang slack at 0 V, or a muscle finds no balance: `Plant.settle` knows those.
+        does not hang slack at 0 V, a muscle finds no balance, or sensors do not rest at the truth:
+        `Plant.settle` knows those.
     """
     if plant.model.plant != "station":
+        return None
+    effects = plant.model.effects.values()
+    if any(effect.port.startswith("sensor:") and effect.law for effect in effects):
         return None
     limits, drive = (_columns(plant, vectors, effect) for effect in ("limits", "drive"))
     zero = balances(plant, pressures, np.zeros(len(pressures)), vectors)

@@ -1,7 +1,7 @@
 """The station: muscle and slide, cable, rotor, regulator, sensors; a balance of forces.
 
     m x'' + B x' = F(P, x, memories) - T              muscle and slide, x contraction
-    J theta'' + B_M theta' = r (L - T)                 rotor, L what the drive asks for
+    J theta'' + B_M theta' = r (L - T)                 rotor, L the load that the drive gives
     T = tension(s, s'),  s = r theta - (x0 - x)        cable, x0 the contraction at no load
     P' from the regulator's lag                        regulator
 
@@ -16,12 +16,17 @@ from pma_gym.plant.compose import Equations, Port
 PORTS: dict[str, Port] = {
     "muscle_force": Port("force on the slide (N), added; positive shortens the muscle", least=1),
     "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
+    "damping_factor": Port("factor on the damping coefficient, multiplied"),
     "slide_force": Port("force on the slide (N), added; positive shortens the muscle"),
     "cable": Port("tension of the cable (N)", least=1, most=1),
     "drive": Port("load that the drive asks for (N)", least=1, most=1),
+    "drive_shape": Port("that load (N), changed by one effect after the other"),
+    "drive_lag": Port("load that arrives at the pulley (N)", most=1),
+    "drive_ripple": Port("load on top of what arrives (N), added"),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": Port("factor on the regulator's rate, multiplied"),
+    "chamber": Port("rate of the pressure beside the regulator's (Pa/s), added"),
 }
 """Ports of the station: how many effects each takes, and what becomes of their results."""
 
@@ -45,7 +50,7 @@ SCALES: dict[str, float] = {
 
 
 TURNING_M, TIGHTENING_M = 2e-10, 1e-8
-"""Ways (m) by which a step may miss where the slide turns, and where the cable tightens."""
+"""Ways (m) by which a step may miss where the slide turns, and where cable or muscle tighten."""
 
 
 def write_equations(equations: Equations) -> None:
@@ -53,15 +58,16 @@ def write_equations(equations: Equations) -> None:
     eq = equations
     rotor = eq.parameters["rotor"]
     eq.travelled = (eq["contraction"], eq["velocity"])
-    eq.let("load_command", eq.one("drive"))
+    _write_drive(eq)
     eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     eq.let("stretch", rotor.radius * eq["angle"] + (eq["contraction"] - eq["zero_contraction"]))
     eq.let("stretch_rate", rotor.radius * eq["spin"] + eq["velocity"])
     eq.let("cable_tension", eq.one("cable"))
     eq.let("muscle_force", eq.total("muscle_force"))
     eq.let("slide_force", eq.total("slide_force"))
-    eq.let("resistance", eq.total("muscle_damping"))
+    eq.let("resistance", eq.total("muscle_damping") * eq.product("damping_factor"))
     eq.outputs = {
         "contraction": eq["contraction"],
         "rotation": eq["angle"],
@@ -79,20 +85,29 @@ def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
     ) ** 0.5
 
 
+def _write_drive(eq: Equations) -> None:
+    """The load on its way from the command to the pulley."""
+    eq.let("load_command", eq.chain("drive_shape", "load", eq.one("drive")))
+    late = eq.at("drive_lag")
+    eq.let("load_arriving", eq.one("drive_lag") if late else eq["load_command"])
+
+
 def _write_states(eq: Equations) -> None:
     rotor, slide = eq.parameters["rotor"], eq.parameters["slide"]
     force = eq["muscle_force"] + eq["slide_force"] - eq["cable_tension"]
-    torque = rotor.radius * (eq["load_command"] - eq["cable_tension"])
+    load = eq["load_arriving"] + eq.total("drive_ripple")
+    torque = rotor.radius * (load - eq["cable_tension"])
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state(
         "velocity", (force - eq["resistance"] * eq["velocity"]) / slide.mass, SCALES["velocity"]
     )
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / rotor.inertia, SCALES["spin"])
-    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
-    eq.add_memories(("muscle_force", "slide_force", "cable", "drive"))
+    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
+    eq.add_memories(("muscle_force", "slide_force", "cable", "drive_lag"))
     eq.add_sensors(SCALES)
     eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
-    for effect in eq.at("cable"):
+    for effect in (*eq.at("cable"), *eq.at("muscle_force")):
         if effect.switch:
-            eq.add_switch("tightness", eq.call(effect, effect.switch), TIGHTENING_M)
+            name = effect.switch.__name__
+            eq.add_switch(name, eq.call(effect, effect.switch), TIGHTENING_M)

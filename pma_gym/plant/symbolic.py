@@ -52,6 +52,7 @@ class _Expressions(Notation):
             "positive": lambda value: sympy.Max(0, value),
             "clip": lambda value, lower, upper: sympy.Min(sympy.Max(value, lower), upper),
             "exponential": sympy.exp,
+            "cosine": sympy.cos,
             "interpolate": interpolate,
         }
 

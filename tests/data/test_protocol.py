@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pma_gym.data.protocol import DISPLACEMENT, PROTOCOLS, ROTATION
+from pma_gym.data.protocol import DISPLACEMENT, PROTOCOLS, ROTATION, Phase, Protocol
 from pma_gym.metrics import phase_times
 from pma_gym.units import SI_FACTORS
 
@@ -39,6 +39,37 @@ def test_phases_join_and_follow_their_lines(protocol):
         assert_allclose(protocol.reference(phase.start + own), phase.reference(own), atol=1e-15)
     assert np.ptp(protocol.reference(np.linspace(0, end, 16))) == pytest.approx(protocol.span)
     assert protocol.unit in SI_FACTORS
+
+
+def test_a_motion_is_the_reference_of_its_phases_and_held_at_its_ends():
+    phases = tuple(Phase(n, s, 2.0, 0.0, 0.0, np.square) for n, s in (("I", 0.0), ("II", 2.0)))
+    protocol = Protocol("bow", "extension", "mm", 16.0, phases)
+    assert protocol.motion is np.square and protocol.duration == 4.0
+    assert_allclose(protocol.reference(np.array([-1.0, 0.0, 3.0, 9.0])), [0.0, 0.0, 9.0, 16.0])
+    assert [protocol.at(t) for t in (-1, 0.0, 3.0, 9.0)] == [0.0, 0.0, 9.0, 16.0]
+    assert_allclose(phases[1].reference(np.array([0.0, 1.0, 2.5])), [4.0, 9.0, 20.25])
+    assert [ROTATION.at(t) for t in (2.0, 16.0)] == ROTATION.reference([2.0, 16.0]).tolist()
+
+
+@pytest.mark.parametrize(
+    ("phases", "words"),
+    [
+        ((), "one or more"),
+        ((Phase("I", 0.0, 5.0, 0.0, 1.0), Phase("II", 4.0, 5.0, 5.0, 0.0)), "at 5 s.*got 4 s"),
+        ((Phase("I", 0.0, 0.0, 0.0, 1.0),), "a positive time, got 0 s and 0 s"),
+        ((Phase("I", 0.0, 5.0, 0.0, 1.0), Phase("II", 5.0, 5.0, 5.0, 0.0, np.square)), "all lines"),
+    ],
+)
+def test_phases_that_do_not_belong_together_are_refused(phases, words):
+    with pytest.raises(ValueError, match=words):
+        Protocol("broken", "extension", "mm", 1.0, phases)
+
+
+def test_a_phase_has_two_samples_more_than_its_duration():
+    assert [p.samples for p in ROTATION.phases] == [1923] * 3
+    assert [p.first for p in ROTATION.phases] == [0, 1920, 3840]
+    assert Phase("whole", 0.0, 10.0, 0.0, 0.0).samples == 3843
+    assert_allclose(ROTATION.phases[0].times, phase_times(), rtol=0)
 
 
 def test_a_phase_is_scored_on_its_line_beyond_its_end():

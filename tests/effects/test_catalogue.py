@@ -36,8 +36,27 @@ SIGNALS = {
     "signal": (-0.01, 500e3),
     "travel": (0.0, 30e-6),
     "direction": (1.0, 1.0),
+    "cable_tension": (0.0, 1000.0),
+    "load": (0.0, 1000.0),
+    "load_command": (0.0, 1000.0),
+    "load_arriving": (0.0, 1000.0),
+    "angle": (-0.1, 2.5),
+    "regulator_time_constant": (0.01, 0.2),
 }
 """Ranges of what laws are given (SI)."""
+
+PHENOMENA = (
+    "muscle_force",
+    "muscle_damping",
+    "damping_factor",
+    "slide_force",
+    "drive_shape",
+    "drive_lag",
+    "drive_ripple",
+    "regulator_pace",
+    "chamber",
+)
+"""Ports that a station can do without, effect by effect."""
 
 LAWS = [
     pytest.param(effect, law, id=law.__name__ if law is effect.law else f"{effect.name}-rate")
@@ -156,17 +175,12 @@ def test_a_signature_sets_every_phenomenon_apart():
     told = [
         effect.signature
         for effect in CATALOGUE.values()
-        if effect.port in ("muscle_force", "muscle_damping", "slide_force", "regulator_pace")
+        if effect.port in PHENOMENA or (effect.port.startswith("sensor:") and effect.law)
     ]
     assert all(told)
 
 
-ADDED = [
-    effect
-    for effect in CATALOGUE.values()
-    if effect.port in station.PORTS
-    and effect.port in ("muscle_force", "muscle_damping", "slide_force", "regulator_pace")
-]
+ADDED = [effect for effect in CATALOGUE.values() if effect.port in PHENOMENA]
 
 
 SHIPPED = load_model("serres2008")

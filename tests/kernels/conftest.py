@@ -35,6 +35,12 @@ SIGNALS = {
     "displacement_input": (0.0, 0.05),
     "displacement": (0.0, 0.05),
     "displacement_rate": (-0.5, 0.5),
+    "cable_tension": (0.0, 1000.0),
+    "load": (0.0, 1000.0),
+    "load_command": (0.0, 1000.0),
+    "load_arriving": (0.0, 1000.0),
+    "angle": (-0.1, 2.5),
+    "regulator_time_constant": (0.01, 0.2),
 }
 LAWS = {f"{e.name}.{law.__name__}": (e, law) for e in CATALOGUE.values() for law in e.laws()}
 

@@ -1,0 +1,58 @@
+"""The drive's load follows its command late: the current loop has a bandwidth."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+
+class DriveLag(NamedTuple):
+    """Parameters of `late_load`."""
+
+    share: Annotated[
+        float, Quantity("1", 0, 1, "1 for a first-order lag, the usual current loop", 0.0)
+    ]
+    time_constant: Annotated[
+        float, Quantity("ms", 0.1, 200, "assumption: 1-5 for a current loop, 20 if filtered")
+    ]
+
+
+def late_load(load_command, memory, p):
+    """Load that has arrived at the pulley.
+
+        L_out = (1 - share) L + m
+
+    Args:
+        load_command: load L that the drive asks for (N).
+        memory: part m that comes late (N); share L once it is there.
+        p: DriveLag: share, time_constant (s).
+    Returns:
+        Load (N).
+    Source:
+        First-order lag; a share less than 1 lets the rest through at once, and 0 everything.
+    """
+    return (load_command - p.share * load_command) + memory
+
+
+def late_rate(load_command, p):
+    """Rate of the part that comes late: m' = (share L - m) / time_constant.
+
+    Args:
+        load_command: load L that the drive asks for (N).
+        p: DriveLag.
+    Returns:
+        (source, decay) with m' = source - decay * m (N/s).
+    """
+    decay = 1.0 / p.time_constant
+    return decay * (p.share * load_command), decay
+
+
+DRIVE_LAG = Effect(
+    name="drive_lag",
+    port="drive_lag",
+    parameters=DriveLag,
+    law=late_load,
+    rate=late_rate,
+    signature="load cell late, phase proportional to frequency; statically absent",
+    memory_scale=50.0,
+)

@@ -1,0 +1,54 @@
+"""Damping that depends on how much of its force the muscle gives."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.arithmetic import clip, positive
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+BEND = 0.1
+"""Half of the range of loads in which their share bends over to 1: our choice."""
+
+_PEAK = "Serres 2008, table I2 at 250 kPa, 1.3 to 5.2 N s/mm at middle load"
+
+
+class LoadDependentDamping(NamedTuple):
+    """Parameters of `load_factor`."""
+
+    linear: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: 12", 0.0)]
+    quadratic: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: -12", 0.0)]
+    force_slope: Annotated[float, Quantity("N/kPa", 0, 20, "Serres 2008, section 5.1.1: 2.91")]
+    force_intercept: Annotated[float, Quantity("N", 1, 500, "Serres 2008, section 5.1.1: 44.6")]
+
+
+def load_factor(pressure, cable_tension, p):
+    """Factor on the damping coefficient.
+
+        B = B_plain max(0, 1 + linear u + quadratic u^2),   u = T / F_ce, at most 1
+        F_ce = force_slope P + force_intercept
+
+    u bends over to 1 as a parabola from 0.9 to 1.1: a cable that whips goes through there fast,
+    and a kink would cost accuracy.
+
+    Args:
+        pressure: gauge pressure P (Pa).
+        cable_tension: load T of the muscle (N).
+        p: LoadDependentDamping: linear, quadratic, force_slope (N/Pa), force_intercept (N).
+    Returns:
+        Factor, not negative.
+    Source:
+        Our parabola; Serres 2008, table I2 has damping peak at middle load.
+    """
+    share = cable_tension / (p.force_slope * pressure + p.force_intercept)
+    over = clip((share - (1.0 - BEND)) * (0.5 / BEND), 0.0, 1.0)
+    share = clip(share, 0.0, 1.0 + BEND) - BEND * over * over
+    return positive(1.0 + share * (p.linear + p.quadratic * share))
+
+
+LOAD_DEPENDENT_DAMPING = Effect(
+    name="load_dependent_damping",
+    port="damping_factor",
+    parameters=LoadDependentDamping,
+    law=load_factor,
+    signature="force proportional to speed, by a factor that depends on the load",
+)

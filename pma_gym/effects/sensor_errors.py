@@ -1,0 +1,79 @@
+"""Sensors that read wrong: a gain and an offset each, before their lag.
+
+A sensor has them only together with its own table (`lvdt`, `load_cell`, ...), whose lag they enter.
+The zeros of contraction and rotation are free in every trial, so those two offsets show only
+where a sensor's zero is not taken anew.
+"""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+_GAIN = Quantity("%", -50, 50, "assumption: calibrations hold to 1-2", 0.0)
+
+
+class LvdtError(NamedTuple):
+    """Error of the measured contraction."""
+
+    gain: Annotated[float, _GAIN]
+    offset: Annotated[float, Quantity("mm", -20, 20, "assumption: 0.5", 0.0)]
+
+
+class LoadCellError(NamedTuple):
+    """Error of the measured tension."""
+
+    gain: Annotated[float, _GAIN]
+    offset: Annotated[float, Quantity("N", -200, 200, "assumption: 5", 0.0)]
+
+
+class PressureTransducerError(NamedTuple):
+    """Error of the measured pressure."""
+
+    gain: Annotated[
+        float,
+        Quantity("%", -50, 50, "Serres 2008, tables I2 and I3 read 1.016 P + 3.4 kPa: 1.6", 0.0),
+    ]
+    offset: Annotated[float, Quantity("kPa", -100, 100, "the same: 3.4", 0.0)]
+
+
+class PotentiometerError(NamedTuple):
+    """Error of the measured angle."""
+
+    gain: Annotated[float, _GAIN]
+    offset: Annotated[float, Quantity("deg", -45, 45, "assumption: 1", 0.0)]
+
+
+def sensor_error(signal, p):
+    """What a sensor stands on beside the truth.
+
+        error = gain signal + offset
+
+    Args:
+        signal: the truth (SI).
+        p: the sensor's error: gain (share), offset (SI).
+    Returns:
+        Error (SI), added to the truth.
+    Source:
+        A straight calibration line, wrong in both of its numbers.
+    """
+    return p.gain * signal + p.offset
+
+
+_SIGNATURE = "sensors disagree with each other statically, in proportion or by a constant"
+
+
+def _error(sensor: str, output: str, parameters: type) -> Effect:
+    return Effect(
+        name=f"{sensor}_error",
+        port=f"sensor:{output}",
+        parameters=parameters,
+        law=sensor_error,
+        signature=_SIGNATURE,
+    )
+
+
+LVDT_ERROR = _error("lvdt", "contraction", LvdtError)
+LOAD_CELL_ERROR = _error("load_cell", "load", LoadCellError)
+PRESSURE_TRANSDUCER_ERROR = _error("pressure_transducer", "pressure", PressureTransducerError)
+POTENTIOMETER_ERROR = _error("potentiometer", "rotation", PotentiometerError)

@@ -1,0 +1,45 @@
+"""The motor's torque varies with its angle, as often a turn as it has slots or commutator bars."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.arithmetic import cosine
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+
+class TorqueRipple(NamedTuple):
+    """Parameters of `ripple_load`."""
+
+    amplitude: Annotated[
+        float, Quantity("%", 0, 1, "servo motors' data sheets: at most 1 of the torque", 0.0)
+    ]
+    periods: Annotated[
+        float, Quantity("1", 1, 60, "assumption: 24 a turn, slots or commutator bars")
+    ]
+    phase: Annotated[float, Quantity("deg", -180, 180, "where the motor happens to stand: 0")]
+
+
+def ripple_load(load_arriving, angle, p):
+    """Load on top of the motor's mean, by its angle.
+
+        L = amplitude L_mean cos(periods theta + phase)
+
+    Args:
+        load_arriving: mean load L_mean (N).
+        angle: pulley angle theta (rad) from where it stands with no load.
+        p: TorqueRipple: amplitude (share), periods a turn, phase (rad).
+    Returns:
+        Load (N), added.
+    Source:
+        Textbooks on servo motors: ripple proportional to the current.
+    """
+    return p.amplitude * load_arriving * cosine(p.periods * angle + p.phase)
+
+
+TORQUE_RIPPLE = Effect(
+    name="torque_ripple",
+    port="drive_ripple",
+    parameters=TorqueRipple,
+    law=ripple_load,
+    signature="load cell periodic in the angle, whatever the speed",
+)

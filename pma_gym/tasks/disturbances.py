@@ -1,0 +1,107 @@
+"""What disturbs an episode: the regulator jumps, somebody pulls or pushes at the slide."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.kernels.random import philox, uniforms
+from pma_gym.units import SI_FACTORS
+
+SPACING_S = 2.5
+"""An event of each sort comes at a random time in every such part of an episode (s)."""
+
+PULSE_S = 0.5
+"""How long a pulse lasts (s)."""
+
+
+class Disturbances(NamedTuple):
+    """Sizes of what disturbs an episode.
+
+    Attributes:
+        regulator_step: by how much the regulator's pressure jumps (Pa); 0 for never.
+        operator_force: force of an operator's pulses at the slide (N); 0 for none.
+    """
+
+    regulator_step: float = 0.0
+    operator_force: float = 0.0
+
+    def regulator_steps(self, duration: float) -> int:
+        """How often the regulator jumps in an episode of a duration (s)."""
+        return _count(duration) if self.regulator_step else 0
+
+    def pulses(self, duration: float) -> int:
+        """How many pulses there are in an episode of a duration (s)."""
+        return _count(duration) if self.operator_force else 0
+
+    def draw(
+        self, duration: float, keys: NDArray[np.int64], streams: NDArray[np.int64]
+    ) -> "Events":
+        """Events of episodes, by their counters alone.
+
+        Args:
+            duration: of an episode (s).
+            keys: two words for each, shape (n, 2).
+            streams: a word for each, shape (n,).
+        """
+        steps, pulses = self.regulator_steps(duration), self.pulses(duration)
+        shares = _shares(keys, streams, max(steps, pulses))
+        part = duration / max(_count(duration), 1)
+        starts = part * np.arange(max(steps, pulses))
+        signs = np.where(shares[1] < 0.5, -1.0, 1.0)
+        # Away by so much, then back; the next time away in a direction of its own.
+        away = np.arange(steps) % 2 == 0
+        jumps = np.where(away, signs[:, :steps], -np.roll(signs[:, :steps], 1, axis=1))
+        pulse_signs = np.where(shares[3] < 0.5, -1.0, 1.0)
+        late = shares[2] * max(part - PULSE_S, 0.0)
+        return Events(
+            (starts + shares[0] * part)[:, :steps],
+            self.regulator_step * jumps,
+            (starts + late)[:, :pulses],
+            (self.operator_force * pulse_signs)[:, :pulses],
+        )
+
+
+class Events(NamedTuple):
+    """When what disturbs episodes, a row an episode; it comes with the next control step.
+
+    Attributes:
+        step_times: when the regulator jumps (s), shape (n, steps).
+        step_sizes: by how much (Pa): away from its line and back in turn.
+        pulse_times: when pulses of 0.5 s begin (s), shape (n, pulses).
+        pulse_forces: force on the slide during them (N); positive shortens the muscle.
+    """
+
+    step_times: NDArray[np.float64]
+    step_sizes: NDArray[np.float64]
+    pulse_times: NDArray[np.float64]
+    pulse_forces: NDArray[np.float64]
+
+
+def _count(duration: float) -> int:
+    return math.floor(duration / SPACING_S)
+
+
+def _shares(
+    keys: NDArray[np.int64], streams: NDArray[np.int64], count: int
+) -> tuple[NDArray[np.float64], ...]:
+    """Four random numbers between 0 and 1 for each event, shape (n, count) each."""
+    shape = len(streams), count
+    words = [np.broadcast_to(keys[:, [i]].astype(np.uint64), shape) for i in range(2)]
+    events = np.broadcast_to(np.arange(count, dtype=np.uint64), shape)
+    streamed = np.broadcast_to(streams[:, None].astype(np.uint64), shape)
+    nothing = np.zeros(shape, np.uint64)
+    return uniforms(philox((events, streamed, nothing, nothing), (words[0], words[1])))
+
+
+_STEP, _FORCE = 25.0 * SI_FACTORS["kPa"], 50.0
+
+DISTURBANCES: dict[str, Disturbances] = {
+    "none": Disturbances(),
+    "regulator": Disturbances(regulator_step=_STEP),
+    "operator": Disturbances(operator_force=_FORCE),
+    "regulator_and_operator": Disturbances(_STEP, _FORCE),
+}
+"""What disturbs episodes, by name: jumps of the regulator by 25 kPa away from its line and back,
+and pulses of 50 N at the slide, both at random times and of random sign."""

@@ -1,0 +1,133 @@
+"""What of the station is drawn anew at every reset, by name."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from pma_gym.effects import Effect
+from pma_gym.effects.effect import Value
+from pma_gym.plant.model import Model
+from pma_gym.plant.statics import muscle_force
+from pma_gym.tasks.task import TASKS
+from pma_gym.units import Quantity
+
+
+def nominal_station(model: Model, generator: np.random.Generator) -> Model:
+    """The model as it is."""
+    return model
+
+
+FORCE_TOLERANCE = 40.0
+"""How far a drawn static force may lie from the nominal one (N): some 2 mm of contraction, twice
+what the identified station misses table I3 by."""
+
+CORNERS = np.array([[150, 24], [150, 0], [350, 52], [350, 20], [575, 65], [575, 30]]) * (1e3, 1e-3)
+"""Pressure (Pa) and contraction (m) where table I3 ends: at no load, and at its greatest."""
+
+
+def station_within_intervals(model: Model, generator: np.random.Generator) -> Model:
+    """Every parameter that has an interval drawn uniformly from it, as far as they go together.
+
+    A fit's parameters make up for each other: drawn one by one, those of a force law give muscles
+    that no data allow (no-load contractions of 26 to 129 mm). So those of the muscle's force, and
+    those of the regulator's line and of the drive, are brought back together, halfway to the
+    nominal at a time, until the force lies within 40 N of the nominal at the corners of table I3,
+    the regulator reaches the trials' highest pressure, and the drive lets go at 0 V, as a trial
+    that begins with no load needs.
+    """
+    drawn: dict[str, Value] = {}
+    for path, note in model.notes.items():
+        share = float(generator.random())
+        if note.low is not None and note.high is not None:
+            drawn[path] = _bounded(model, path, note.low + share * (note.high - note.low))
+    drawn = _brought_back(model, drawn, "muscle_force", _pulling_as(model))
+    drawn = _brought_back(model, drawn, "regulator_line", _reaches_highest_pressure)
+    drawn = _brought_back(model, drawn, "drive", _lets_go)
+    return model.replace(drawn)
+
+
+def _brought_back(
+    model: Model, drawn: dict[str, Value], port: str, holds: Callable[[Model], bool]
+) -> dict[str, Value]:
+    names = [name for name, effect in model.effects.items() if effect.port == port]
+    paths = [path for path in drawn if path.partition(".")[0] in names]
+    nominal = {f"{n}.{door}": value for n in names for door, value in model.at_the_door(n).items()}
+    for _ in range(10 if paths else 0):
+        if holds(model.replace({path: drawn[path] for path in paths})):
+            break
+        drawn = drawn | {path: 0.5 * (drawn[path] + nominal[path]) for path in paths}  # type: ignore[operator]
+    return drawn
+
+
+def _pulling_as(nominal: Model) -> Callable[[Model], bool]:
+    """Whether a model's muscle pulls about as a nominal one's."""
+    pressure, contraction = CORNERS.T
+    # A muscle without an interval is asked for nothing: a cascade has none at all.
+    usual = muscle_force(nominal)(pressure, contraction)
+
+    def holds(drawn: Model) -> bool:
+        difference = muscle_force(drawn)(pressure, contraction) - usual
+        return bool(np.all(np.abs(difference) <= FORCE_TOLERANCE))
+
+    return holds
+
+
+def _reaches_highest_pressure(drawn: Model) -> bool:
+    line = drawn.parameters["regulator_line"]
+    return all(10.0 * line.gain + line.offset >= task.highest_pressure for task in TASKS.values())
+
+
+def _lets_go(drawn: Model) -> bool:
+    return drawn.parameters["drive"].offset <= 0.0
+
+
+VARIATION = 0.2
+"""How far `varied` scales damping and force either way."""
+
+
+def varied_station(
+    model: Model, generator: np.random.Generator, variation: float = VARIATION
+) -> Model:
+    """As `intervals`, then damping and the muscle's force each scaled by up to 20 % either way.
+
+    What is scaled is every parameter in newtons per whatever (N, N/kPa, N s/mm) of the effects at
+    the muscle's ports. A geometric force law has none and keeps its force.
+    """
+    drawn = station_within_intervals(model, generator)
+    factors = 1.0 + variation * generator.uniform(-1.0, 1.0, 2)
+    by_port = dict(zip(("muscle_damping", "muscle_force"), map(float, factors), strict=True))
+    scaled: dict[str, Value] = {}
+    for effect in drawn.effects.values():
+        if effect.port in by_port:
+            scaled |= _scaled(drawn, effect, by_port[effect.port])
+    return drawn.replace(scaled)
+
+
+def _scaled(model: Model, effect: Effect, factor: float) -> dict[str, Value]:
+    """An effect's parameters in newtons, scaled; lengths and breakpoints stay."""
+    paths = {
+        f"{effect.name}.{door}": value for door, value in model.at_the_door(effect.name).items()
+    }
+    return {
+        path: _bounded(model, path, value * factor)
+        for path, value in paths.items()
+        if isinstance(value, float) and _quantity(model, path).unit.startswith("N")
+    }
+
+
+def _bounded(model: Model, path: str, value: float) -> float:
+    quantity = _quantity(model, path)
+    return min(max(value, quantity.lower), quantity.upper)
+
+
+def _quantity(model: Model, path: str) -> Quantity:
+    effect, _, door = path.partition(".")
+    return model.effects[effect].quantities[model.effects[effect].names_at_the_door()[door]]
+
+
+RANDOMISATIONS: dict[str, Callable[[Model, np.random.Generator], Model]] = {
+    "none": nominal_station,
+    "intervals": station_within_intervals,
+    "varied": varied_station,
+}
+"""What of the station is drawn anew at every reset, by name."""

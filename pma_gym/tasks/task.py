@@ -1,0 +1,167 @@
+"""What a task is: a protocol, who moves, and the pressures it is done at; how it is scored."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.protocol import DISPLACEMENT, ROTATION, Protocol
+from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
+
+TRIAL_TAIL_S = (PHASE_SAMPLES - 1) / SAMPLE_RATE_HZ - PHASE_DURATION
+"""How far past its 5 s the last phase is recorded (s): its last sample is at 1922 / 384 s."""
+
+Actuator = Literal["motor", "regulator"]
+"""Which of the two voltages a task's controller gives; the other one is held."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A protocol to follow, who moves, and the pressures to do it at.
+
+    Attributes:
+        name: such as `displacement`.
+        protocol: phases and ideal reference.
+        lowest_pressure: lower end of the pressures of the dissertation's trials (Pa).
+        highest_pressure: upper end (Pa).
+        actuator: whose voltage the action is. The regulator's contracts the muscle against `load`,
+            and the quantity is `contraction`; the motor's pulls it at one pressure.
+        load: load that the motor holds where the regulator moves (N); 0 where the motor moves.
+        start_pressures: range of the pressures that episodes begin at (Pa); the trials' if None.
+    """
+
+    name: str
+    protocol: Protocol
+    lowest_pressure: float
+    highest_pressure: float
+    actuator: Actuator = "motor"
+    load: float = 0.0
+    start_pressures: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what no environment can do."""
+        if (self.actuator == "regulator") != (self.protocol.quantity == "contraction"):
+            raise ValueError(
+                f"task {self.name}: the regulator contracts (quantity contraction) and the motor "
+                f"pulls (extension or rotation), got {self.protocol.quantity} by the "
+                f"{self.actuator}"
+            )
+        if (self.actuator == "regulator") != (self.load > 0.0):
+            raise ValueError(
+                f"task {self.name}: load must be the positive load (N) that the motor holds while "
+                f"the regulator moves, and 0 where the motor moves, got {self.load!r} N"
+            )
+        self._check_reference()
+
+    def _check_reference(self) -> None:
+        every = np.concatenate([phase.reference(phase.times) for phase in self.protocol.phases])
+        if not np.all(np.isfinite(every)):
+            raise ValueError(f"task {self.name}: the reference must be finite throughout")
+        if abs(every[0]) > 1e-9 * self.protocol.span:
+            raise ValueError(
+                f"task {self.name}: the reference must begin at 0, where a trial begins, got "
+                f"{every[0]:g} (m or rad); ramp it in"
+            )
+
+    @property
+    def duration(self) -> float:
+        """How long an episode lasts (s): to the last scored sample."""
+        return self.protocol.duration + TRIAL_TAIL_S
+
+    @property
+    def starts(self) -> tuple[float, float]:
+        """Range of the pressures that episodes begin at (Pa)."""
+        return self.start_pressures or (self.lowest_pressure, self.highest_pressure)
+
+    @property
+    def title(self) -> str:
+        """Its name for people.
+
+        >>> TASKS["rotation"].title
+        'Isokinetic rotation'
+        """
+        words = self.name.replace("_", " ")
+        if self.name in TASKS:
+            return f"Isokinetic {words}"
+        return words.capitalize() + (" contraction" if self.actuator == "regulator" else "")
+
+    @property
+    def structure(self) -> tuple[str, ...]:
+        """What compiled environments depend on: nothing of a motion, and no name.
+
+        Two tasks of one structure share their compiled code, however their references differ.
+        """
+        protocol = self.protocol
+        phases = [
+            (p.start, p.duration, *((p.initial, p.slope) if p.motion is None else ("motion",)))
+            for p in protocol.phases
+        ]
+        numbers = protocol.span, self.lowest_pressure, self.highest_pressure
+        said = (self.actuator, protocol.quantity, protocol.unit, *numbers, *phases)
+        return tuple(map(repr, said))
+
+    def steps(self, control_rate: float) -> int:
+        """Control steps of an episode at a rate (Hz): the last one reaches the last sample.
+
+        >>> [task.steps(100.0) for task in TASKS.values()]
+        [501, 1501]
+        """
+        # Less than a sample's rounding: 384 Hz needs 1922 steps, not 1923.
+        return math.ceil(self.duration * control_rate - 1e-9)
+
+    def error_percent(self, error: Any) -> Any:  # noqa: ANN401
+        """An error (m or rad) in percent of the task's range."""
+        return 100.0 * error / self.protocol.span
+
+    def ideals(self, samples: int) -> NDArray[np.float64]:
+        """Ideal position (m or rad) at k / 384 s, shape (samples,), as a motion is scored.
+
+        Args:
+            samples: how many; beyond the last one that is scored the position stays.
+        """
+        time = np.arange(samples) / SAMPLE_RATE_HZ
+        last = self.protocol.phases[-1]
+        scored = (last.first + last.samples - 1) / SAMPLE_RATE_HZ
+        return self.protocol.phases[0].reference(np.minimum(time, scored))
+
+
+TASKS: dict[str, Task] = {
+    "displacement": Task("displacement", DISPLACEMENT, 150e3, 575e3),
+    "rotation": Task("rotation", ROTATION, 275e3, 575e3),
+}
+"""The dissertation's two tasks; figures 31-36 show them. `EVERY_TASK` has the others too."""
+
+
+def phase_errors(
+    protocol: Protocol, position: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Error of a position on the 384 Hz grid, phase by phase, each on its own ideal line.
+
+    Args:
+        protocol: the protocol.
+        position: extension (m), rotation (rad) or contraction (m) at k / 384 s, shape (n,).
+    Returns:
+        Error (m or rad) by phase name: 1923 samples of 5 s, or as many as there are.
+    """
+    errors = {}
+    for phase in protocol.phases:
+        actual = position[phase.first : phase.first + phase.samples]
+        errors[phase.name] = actual - phase.reference(phase.times[: len(actual)])
+    return errors
+
+
+def phase_rmse(protocol: Protocol, position: NDArray[np.float64]) -> dict[str, float]:
+    """RMSE of a position on the 384 Hz grid, of each phase begun and of them all together.
+
+    Args:
+        protocol: the protocol.
+        position: extension (m), rotation (rad) or contraction (m) at k / 384 s, shape (n,), n at
+            least 1.
+    Returns:
+        RMSE (m or rad) by phase name, and `all`: over the samples of all phases.
+    """
+    begun = {name: e for name, e in phase_errors(protocol, position).items() if len(e)}
+    known = {name: rmse(error) for name, error in begun.items()}
+    return known | {"all": rmse(np.concatenate(list(begun.values())))}

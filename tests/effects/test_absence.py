@@ -1,0 +1,105 @@
+"""At its neutral value an effect leaves a simulation the bits that it has without the effect."""
+
+import numpy as np
+import pytest
+
+from benchmarks.reference import TRIALS
+from pma_gym.effects import CATALOGUE
+
+WITHOUT_MEMORY = (
+    "passive_stretch",
+    "load_dependent_damping",
+    "drive_dead_zone",
+    "drive_saturation",
+    "torque_ripple",
+    "regulator_rate_limit",
+    "lvdt_error",
+    "load_cell_error",
+    "pressure_transducer_error",
+    "potentiometer_error",
+)
+WITH_A_STATE_OR_A_COUPLING = ("creep", "slow_creep", "drive_lag", "filling")
+"""Effects that change the linear equations of a step, whose rounding then differs."""
+
+EVERY = (*WITHOUT_MEMORY, *WITH_A_STATE_OR_A_COUPLING)
+
+
+def simulated(plant, trial, joined):
+    start = plant.settle(1.5, 300e3)
+    told = TRIALS[trial](plant, 300e3)
+    states, zero = plant.run(told.time, told.motor, told.regulator, joined, start)
+    return start, states, plant.observe(states, zero)
+
+
+@pytest.fixture(scope="module", params=[("demanding", False), ("random", False), ("gentle", True)])
+def case(request, station):
+    return request.param, simulated(station, *request.param)
+
+
+def kept(plant, station):
+    return [plant.states.index(name) for name in station.states]
+
+
+@pytest.mark.parametrize("name", WITHOUT_MEMORY)
+def test_a_neutral_effect_leaves_every_bit(name, case, station, station_with):
+    trial, (start, states, truth) = case
+    plant = station_with(name, neutral=True)
+    assert plant.states == station.states
+    begun, found, seen = simulated(plant, *trial)
+    np.testing.assert_array_equal(begun.state, start.state)
+    np.testing.assert_array_equal(found, states)
+    for output, values in truth.items():
+        np.testing.assert_array_equal(seen[output], values)
+
+
+@pytest.mark.parametrize("name", WITH_A_STATE_OR_A_COUPLING)
+def test_a_neutral_effect_in_the_linear_equations_leaves_all_but_rounding(
+    name, case, station, station_with
+):
+    trial, (start, states, _) = case
+    plant = station_with(name, neutral=True)
+    begun, found, _ = simulated(plant, *trial)
+    columns = kept(plant, station)
+    np.testing.assert_array_equal(begun.state[columns], start.state)
+    moved = np.abs(states).max(axis=0)
+    assert np.all(np.abs(found[:, columns] - states) <= 1e-10 * moved)
+    own = [i for i in range(len(plant.states)) if i not in columns]
+    assert np.all(found[:, own] == 0.0)
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_neutral_effect_leaves_every_rate(name, station, station_with):
+    plant, generator = station_with(name, neutral=True), np.random.default_rng(3)
+    columns = kept(plant, station)
+    rest = station.settle(2.0, 300e3)
+    for _ in range(50):
+        state = rest.state * (1.0 + 0.1 * generator.standard_normal(rest.state.shape))
+        wide = np.zeros(len(plant.states))
+        wide[columns] = state
+        commands = generator.uniform(0, 10), generator.uniform(2, 9), 0.04
+        found = plant.derivative(wide, *commands)[columns]
+        np.testing.assert_array_equal(found, station.derivative(state, *commands))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_an_effect_that_is_there_changes_something(name, station, station_with):
+    plant = station_with(name)
+    if name == "passive_stretch":
+        laws = CATALOGUE[name]
+        assert laws.law(-1e-3, plant.model.parameters[name]) > 30.0
+        return
+    _, found, _ = simulated(plant, "random", False)
+    _, states, _ = simulated(station, "random", False)
+    change = np.abs(found[:, kept(plant, station)] - states).max(axis=0)
+    assert np.any(change > 1e-3 * np.ptp(states, axis=0))
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_nothing_moves_at_rest_with_an_effect(name, station_with):
+    plant = station_with(name)
+    regulator = plant.regulator_voltage(300e3)
+    for voltage in (0.0, 0.5, 2.0, 4.5):
+        rest = plant.settle(voltage, 300e3)
+        rates = plant.derivative(rest.state, voltage, regulator, rest.zero_contraction)
+        assert np.all(np.abs(rates) < 1e-5)
+        assert rest.state[plant.states.index("pressure")] == pytest.approx(300e3, rel=1e-12)

@@ -1,0 +1,45 @@
+"""With an effect the integration stays as exact as without, and nearly as cheap."""
+
+import numpy as np
+import pytest
+
+from benchmarks.reference import TRIALS
+from pma_gym.plant.simulation import Run, simulate_all
+
+EVERY = (
+    "passive_stretch",
+    "load_dependent_damping",
+    "creep",
+    "slow_creep",
+    "drive_dead_zone",
+    "drive_saturation",
+    "drive_lag",
+    "torque_ripple",
+    "regulator_rate_limit",
+    "filling",
+)
+PRESSURES = (200e3, 550e3)
+
+
+def marched(plant, trial, pressure):
+    """States at every command, and attempts at steps."""
+    start, told = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
+    columns = (told.time, told.motor, told.regulator)
+    run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+    attempts = simulate_all(plant.program, [run])
+    return run.states, attempts
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+@pytest.mark.parametrize("name", EVERY)
+def test_positions_keep_their_limit_with_an_effect(name, trial, station_with, station):
+    plant, fine = station_with(name), station_with(name, tolerance=1e-6)
+    positions = [plant.states.index(state) for state in ("contraction", "angle")]
+    made = plain = 0
+    for pressure in PRESSURES:
+        found, attempts = marched(plant, trial, pressure)
+        truth, _ = marched(fine, trial, pressure)
+        error = np.abs(found - truth)[:, positions].max(axis=0)
+        assert np.all(error <= 1e-6 * np.ptp(truth[:, positions], axis=0))
+        made, plain = made + attempts, plain + marched(station, trial, pressure)[1]
+    assert made <= 1.6 * plain

@@ -1,0 +1,225 @@
+"""The regulator contracts the muscle against a constant load that the motor holds."""
+
+from dataclasses import replace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs.device import DeviceEngine
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.options import Options
+from pma_gym.envs.stand_in import StandIn
+from pma_gym.plant.model import load_model
+from pma_gym.plant.statics import contraction_at, muscle_force
+from pma_gym.tasks import ISOTONIC, TASKS, isotonic, phase_rmse
+
+FRICTIONLESS = load_model("serres2008").replace(
+    {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
+)
+
+
+def static(model, pressure_kpa: float, load: float) -> float:
+    """Contraction (m) at which the muscle balances a load."""
+    at = np.array([1e3 * pressure_kpa]), np.array([load])
+    return float(contraction_at(muscle_force(model), *at)[0])
+
+
+@pytest.mark.parametrize("name", ISOTONIC)
+@pytest.mark.parametrize("model", ["station", "serres2008"])
+def test_an_episode_begins_settled_under_its_load(name, model):
+    env = PMAEnv(name, model=model, noise=False)
+    _, info = env.reset(seed=3)
+    load = env.task.load
+    assert info["load_n"] == pytest.approx(load, rel=1e-9) == env.station.load
+    drive = env.station.model.parameters["drive"]
+    assert env.motor_voltage == pytest.approx((load - drive.offset) / drive.gain)
+    low, high = env.task.starts
+    assert low - 1.0 <= 1e3 * info["pressure_kpa"] <= high + 1.0 and not info["extrapolated"]
+    balanced = static(env.station.model, info["pressure_kpa"], load)
+    assert env.truth["contraction"] == pytest.approx(balanced, abs=1e-9)
+    assert info["contraction_mm"] == info["measured_contraction_mm"] == 0.0
+    for _ in range(100):
+        *_, info = env.step(env.action(env.regulator_voltage))
+    # It stays where it is, but for rounding.
+    assert abs(info["contraction_mm"]) < 1e-6 and info["load_n"] == pytest.approx(load, rel=1e-6)
+
+
+@pytest.mark.parametrize("pressure_kpa", [150.0, 350.0])
+def test_contraction_comes_to_rest_where_the_forces_balance(pressure_kpa):
+    env = PMAEnv("isotonic", model=FRICTIONLESS, noise=False, pressure_kpa=pressure_kpa)
+    env.reset(seed=0)
+    for end_kpa in (pressure_kpa + 100.0, pressure_kpa + 40.0):
+        for _ in range(300):
+            *_, info = env.step(env.action(env.nominal_plant.regulator_voltage(1e3 * end_kpa)))
+        moved = static(FRICTIONLESS, end_kpa, 200.0) - static(FRICTIONLESS, pressure_kpa, 200.0)
+        assert info["pressure_kpa"] == pytest.approx(end_kpa, rel=1e-6)
+        assert 1e-3 * info["contraction_mm"] == pytest.approx(moved, abs=2e-6)
+
+
+def test_a_slow_triangle_of_pressure_contracts_as_the_forces_balance():
+    """Section 4.1.5, at its slow limit: 450 to 550 kPa against 400 N in half a minute."""
+    slow = replace(ISOTONIC["triangle_high"], protocol=isotonic(part=10.0).protocol)
+    env = PMAEnv(slow, model=FRICTIONLESS, noise=False, control_rate_hz=20.0)
+    env.reset(seed=0)
+    start = static(FRICTIONLESS, 450.0, 400.0)
+    off = []
+    for k in range(600):
+        wanted = 450.0 + 100.0 * (1.0 - abs(k / 300.0 - 1.0))
+        *_, info = env.step(env.action(env.nominal_plant.regulator_voltage(1e3 * wanted)))
+        balanced = static(FRICTIONLESS, info["pressure_kpa"], 400.0) - start
+        off.append(1e-3 * info["contraction_mm"] - balanced)
+    # The muscle lags behind its balance by B v / K: 2.9 N s/mm * 0.55 mm/s / 26 N/mm.
+    assert np.abs(off).max() < 0.08e-3
+
+
+def test_the_regulator_is_the_actuator(make):
+    env = make("isotonic", noise=False, action_delay_s=0.02)
+    env.reset(seed=0)
+    held, rest = env.motor_voltage, env.regulator_voltage
+    for k in range(50):
+        observation, *_, info = env.step(env.action(6.0))
+        assert info["motor_voltage_v"] == held
+        assert info["regulator_voltage_v"] == pytest.approx(rest if k < 2 else 6.0)
+        assert observation[6] == pytest.approx(0.2)
+    assert env.station.task.actuator == "regulator"
+    assert env.voltages == pytest.approx([rest] * 2 + [6.0] * 48)
+    assert env.motor_voltages == pytest.approx([held] * 50)
+    assert env.condition.commands == pytest.approx((held, 6.0))
+    assert env.table.rows[6] == ("last regulator action", "10 V, -1.0 = 0 V")
+    assert env.action_space.shape == (1,)
+
+
+def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
+    env = make("isotonic", history=2, preview=1)
+    env.reset(seed=2)
+    start = env.truth["contraction"]
+    heard = [env.reading] * 2
+    for _ in range(80):
+        observation, *_, info = env.step(env.action(7.0))
+        heard.append(env.reading)
+    position = env.station.position(env.reading)
+    assert position == -env.reading.extension > 5e-3
+    assert 1e-3 * info["measured_contraction_mm"] == pytest.approx(position)
+    assert 1e-3 * info["contraction_mm"] == pytest.approx(env.truth["contraction"] - start)
+    assert env.position == pytest.approx(-env.truth["extension"])
+    # The LVDT lags by 1.6 ms, has 0.02 mm of noise and steps of 0.05 mm.
+    assert position == pytest.approx(env.position, abs=0.2e-3)
+    past = [env.station.position(reading) / env.task.protocol.span for reading in heard[-2:-4:-1]]
+    np.testing.assert_allclose(observation[[8, 9]], past, rtol=1e-6)
+    off = env.reference(env.time) / env.task.protocol.span - position / env.task.protocol.span
+    assert observation[5] == pytest.approx(off, rel=1e-5)
+
+
+@pytest.mark.parametrize("name", ISOTONIC)
+def test_rmse_is_that_of_the_trajectory(name):
+    env = PMAEnv(name, control_rate_hz=25.0)
+    env.reset(seed=1)
+    rest, ended = env.regulator_voltage, False
+    while not ended:
+        volts = rest + 0.3e2 * env.reference(env.time)
+        *_, terminated, truncated, info = env.step(env.action(volts))
+        ended = terminated or truncated
+    found = phase_rmse(env.task.protocol, env.trajectory())
+    assert info["rmse_mm"] == pytest.approx(1e3 * found.pop("all"), rel=1e-12)
+    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in found.items()}
+    assert info["rmse_by_phase_mm"] == by_phase and list(found) == ["I", "II", "III"]
+    share = 100.0 * info["rmse_mm"] / (1e3 * env.task.protocol.span)
+    assert info["percent_of_range"] == pytest.approx(share)
+
+
+def test_the_triangles_are_the_dissertations_trials():
+    low, high = ISOTONIC["triangle_low"], ISOTONIC["triangle_high"]
+    # Section 5.1.5: 1.94 mm are 17 % and 1.38 mm are 25 % of the total contraction.
+    assert 1e3 * low.protocol.span == pytest.approx(1.94 / 0.17, abs=0.05)
+    assert 1e3 * high.protocol.span == pytest.approx(1.38 / 0.25, abs=0.05)
+    assert (low.load, low.starts, low.protocol.duration) == (150.0, (150e3, 150e3), 12.0)
+    assert (high.load, high.starts, high.protocol.duration) == (400.0, (450e3, 450e3), 30.0)
+    for task, period in ((low, 4.0), (high, 10.0)):
+        turns = task.protocol.reference(np.arange(7) * 0.5 * period) / task.protocol.span
+        np.testing.assert_allclose(turns, [0, 1, 0, 1, 0, 1, 0], atol=1e-12)
+
+
+OPTIONS = [
+    {"randomisation": "varied", "action_delay_s": 0.1, "history": 2, "preview": 1},
+    {"disturbances": "regulator_and_operator", "reward": "smooth"},
+]
+
+
+@pytest.mark.parametrize("options", OPTIONS, ids=",".join)
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_a_batch_has_the_bits_of_environments_alone(twins, options, mode):
+    limited = load_model("station").replace({"limits.contraction_mm": 49.0})
+    both = twins(17, "isotonic", mode, model=limited, **options)
+    both.reset(seed=3)
+    for k in range(160):
+        both.step(-0.2, 1.0 if 60 < k < 80 else 0.2)
+    assert both.ends[0].sum() > 5 and both.ends[1].sum() > 5
+
+
+def test_threads_have_the_bits_of_the_processor():
+    task, options = ISOTONIC["triangle_low"], Options(control_rate_hz=20.0)
+    own = Engine(task, options, 7)
+    other = DeviceEngine(task, options, 7, "double", StandIn(3))
+    every = np.arange(7)
+    own.seed(every, [7 + i for i in range(7)])
+    own.reset(every)
+    assert np.array_equal(other.reset(7), own.observations)
+    for k in range(250):
+        actions = np.full((7, 1), -0.3 + 0.1 * np.sin(0.1 * k))
+        own.actions[:7] = actions
+        own.step()
+        seen, rewards, terminated, truncated = other.step(actions)
+        assert np.array_equal(own.rewards, rewards)
+        over = np.flatnonzero(terminated | truncated)
+        if len(over):
+            own.reset(over)
+        assert np.array_equal(own.observations, seen)
+
+
+def test_the_picture_names_the_regulator(make):
+    env = make("isotonic", render_mode="rgb_array", noise=False)
+    env.reset(seed=0)
+    first = env.render()
+    for _ in range(40):
+        env.step(env.action(7.0))
+    assert first is not None and np.any(env.render() != first)
+
+
+def test_the_id_takes_other_tasks():
+    env = gym.make("pma_gym/IsotonicContraction-v0", task="triangle_low").unwrapped
+    assert env.task is ISOTONIC["triangle_low"]
+    assert gym.make("pma_gym/IsotonicContraction-v0").unwrapped.task.name == "isotonic"
+
+
+@pytest.mark.parametrize(
+    ("task", "options", "words"),
+    [
+        ("isotonic", {"regulator_action": True}, ["regulator_action", "isotonic", "leave"]),
+        ("isotonic", {"model": "cascade"}, ["isotonic", "station", "cascade"]),
+        (isotonic(load=5e3), {}, ["load must lie in 0 to 976.4 N", "5000 N"]),
+        ("isotonix", {}, ["task must be one of", "did you mean 'isotonic'?"]),
+        (3, {}, ["task must be one of", "got 3"]),
+    ],
+)
+def test_what_cannot_be_is_refused(task, options, words):
+    with pytest.raises(ValueError) as caught:
+        PMAEnv(task, **({"model": "serres2008"} | options))
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_load_that_nothing_balances_is_refused():
+    short = load_model("serres2008").replace({"limits.stretch_mm": 2.0})
+    env = PMAEnv(isotonic(load=900.0), model=short, pressure_kpa=150.0)
+    with pytest.raises(ValueError, match="balances the load .* at 150 kPa; give a higher"):
+        env.reset(seed=0)
+
+
+def test_a_station_that_pulls_is_told_positions_as_before(make):
+    env = make("rotation")
+    env.reset(seed=0)
+    reading = Reading(0.0, 1.0, 2.0, 3.0, 4.0)
+    assert env.station.position(reading) == 2.0 and env.station.load == 0.0
+    assert replace(env.station, task=TASKS["displacement"]).position(reading) == 1.0

@@ -1,0 +1,142 @@
+"""Tasks whose reference is any function of time."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pma_gym.data.protocol import Phase, Protocol
+from pma_gym.envs import PMAEnv
+from pma_gym.envs.device import DeviceEngine
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.kernel import Kernel
+from pma_gym.envs.options import Options
+from pma_gym.envs.stand_in import StandIn
+from pma_gym.metrics import rmse
+from pma_gym.tasks import TASKS, UNSEEN, following, multisine, phase_rmse, steps
+
+FACTORS = {"mm": 1e-3, "deg": np.pi / 180}
+
+
+def volts(env: PMAEnv) -> float:
+    """A pull that follows roughly, whatever the task."""
+    return 1.0 + 3.0 * env.reference(env.time) / env.task.protocol.span
+
+
+def run(env: PMAEnv, seed: int = 0) -> dict:
+    env.reset(seed=seed)
+    for _ in range(100_000):
+        *_, terminated, truncated, info = env.step(env.action(volts(env)))
+        if terminated or truncated:
+            return info
+    raise AssertionError("the episode never ended")
+
+
+@pytest.mark.parametrize(
+    ("name", "rate"), [("displacement_sine", 100.0), ("rotation_speeds", 37.0)]
+)
+def test_rmse_is_that_of_the_trajectory(make, name, rate):
+    env = make(name, control_rate_hz=rate)
+    info = run(env)
+    unit = env.task.protocol.unit
+    time = np.arange(3843) / 384.0
+    # Two samples lie beyond the 10 s: the motion goes on for them, it does not stop.
+    error = env.trajectory()[:3843] - env.task.protocol.motion(time)
+    expected = rmse(error) / FACTORS[unit]
+    assert info[f"rmse_{unit}"] == pytest.approx(expected, rel=1e-12)
+    assert info[f"rmse_by_phase_{unit}"] == {"whole": pytest.approx(expected, rel=1e-12)}
+    found = phase_rmse(env.task.protocol, env.trajectory())
+    assert found["all"] / FACTORS[unit] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_motion_that_is_a_line_scores_as_the_line(make):
+    """The table of ideals and the constants of lines are two ways to one figure."""
+    line = make("displacement")
+    table = make(following("mine", "extension", _ramp, duration=5.0))
+    first, second = run(line), run(table)
+    assert second["rmse_mm"] == pytest.approx(first["rmse_mm"], rel=1e-12)
+    assert second["time_s"] == first["time_s"]
+    # The volts differ by the rounding of the reference.
+    np.testing.assert_allclose(line.trajectory(), table.trajectory(), rtol=1e-9, atol=1e-15)
+
+
+def _ramp(time):
+    return 5e-3 * time
+
+
+def test_phases_of_one_motion_are_scored_apart(make):
+    bow = Protocol(
+        "bow", "extension", "mm", 10e-3,
+        tuple(Phase(n, s, 1.5, 0.0, 0.0, _bow) for n, s in (("out", 0.0), ("back", 1.5))),
+    )  # fmt: skip
+    env = make(replace(TASKS["displacement"], name="bow", protocol=bow))
+    info = run(env)
+    error = env.trajectory()[:1155] - _bow(np.arange(1155) / 384.0)
+    expected = {"out": rmse(error[:579]) * 1e3, "back": rmse(error[576:1155]) * 1e3}
+    assert info["rmse_by_phase_mm"] == pytest.approx(expected, rel=1e-12)
+
+
+def _bow(time):
+    return 4.4e-3 * time * (3.0 - time)
+
+
+@pytest.mark.parametrize("options", [{}, {"control_rate_hz": 37.0, "randomisation": "varied"}])
+def test_a_batch_has_the_bits_of_environments_alone(twins, options):
+    both = twins(17, multisine("extension", 5), **({"pressure_kpa": "random"} | options))
+    both.reset(seed=3)
+    for _ in range(120 if options else 110):
+        both.step(-0.8, -0.3)
+    assert both.ends.sum() >= (0 if options else 17)
+
+
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_threads_have_the_bits_of_the_processor(precision):
+    task, options = steps("rotation", 2), Options(control_rate_hz=20.0)
+    own = Engine(task, options, 7)
+    other = DeviceEngine(task, options, 7, precision, StandIn(3))
+    every = np.arange(7)
+    own.seed(every, [7 + i for i in range(7)])
+    own.reset(every)
+    other.reset(7)
+    for k in range(150):
+        actions = np.full((7, 1), -0.6 + 0.2 * np.sin(0.1 * k))
+        own.actions[:7] = actions
+        own.step()
+        seen, rewards, *_ = other.step(actions)
+        sums = own.numbers("sum_whole"), other.numbers("sum_whole")
+        if precision == "double":
+            assert np.array_equal(own.observations, seen) and np.array_equal(own.rewards, rewards)
+            assert np.array_equal(*sums)
+        else:
+            np.testing.assert_allclose(*sums, rtol=1e-3)
+
+
+def test_references_of_one_structure_share_their_code(make, monkeypatch):
+    libraries = {make(multisine("extension", seed))._engine.kernel.library for seed in range(4)}
+    libraries.add(make("displacement_steps")._engine.kernel.library)
+    assert len(libraries) == 1
+    # A known name with other content has code of its own, and so has another range.
+    impostor = replace(TASKS["displacement"], protocol=UNSEEN["displacement_sine"].protocol)
+    assert make(impostor)._engine.kernel.library in libraries
+    assert make("displacement")._engine.kernel.library not in libraries
+    narrow = following("narrow", "extension", _ramp, span=10e-3)
+    assert make(narrow)._engine.kernel.library not in libraries
+    built: list[Kernel] = []
+    monkeypatch.setattr(Kernel, "_build", built.append)
+    make(multisine("extension", 99))
+    assert built == []
+
+
+@pytest.mark.parametrize("name", UNSEEN)
+def test_what_the_agent_sees_is_what_is_scored(make, name):
+    env = make(name, preview=1, noise=False)
+    observation, _ = env.reset(seed=0)
+    protocol, span = env.task.protocol, env.task.protocol.span
+    for _ in range(60):
+        now = [protocol.at(env.time), protocol.at(env.time + 0.01)]
+        np.testing.assert_allclose(observation[[4, 6]], np.array(now) / span, atol=1e-6)
+        assert env.reference(env.time) == now[0]
+        observation, *_, info = env.step(env.action(1.0))
+        reference = info[f"reference_{protocol.unit}"] * FACTORS[protocol.unit]
+        assert reference == pytest.approx(protocol.at(env.time), abs=1e-12)
+        assert env.error == pytest.approx(env.position - reference, abs=1e-12)
