@@ -93,11 +93,143 @@ def _reproduce(
 
 
 @app.command()
+def run(
+    suite: Annotated[str, typer.Option(help="Name, see `suites`, or path of a TOML file.")],
+    controllers: Annotated[
+        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
+    ] = "all",
+    jobs: Jobs = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results; results/SUITE if not given.")
+    ] = None,
+) -> None:
+    """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
+    from rich.console import Console
+
+    from benchmarks.comparison.job import chosen, run_comparison
+    from benchmarks.comparison.suite import frozen_suite
+    from benchmarks.contender import ControllerError
+    from benchmarks.suite import SuiteError
+
+    try:
+        if suite == "reproduction":
+            every = "" if controllers == "all" else controllers
+            raise typer.Exit(_reproduce(out or RESULTS / suite, every, "", "", "", jobs))
+        frozen = frozen_suite(suite)
+        entries = chosen(frozen, controllers)
+        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, jobs, Console())
+    except (ControllerError, SuiteError) as error:
+        _refuse(error)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case; run it again", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+@app.command()
+def report(
+    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of the run; results/SUITE if not given.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the page; that of the run if not given.")
+    ] = None,
+) -> None:
+    """Write a suite's leaderboard from the journal of its run."""
+    from benchmarks.comparison.publish import run_report
+    from benchmarks.comparison.suite import frozen_suite
+    from benchmarks.suite import SuiteError
+
+    try:
+        frozen = frozen_suite(suite)
+        folder = results or RESULTS / frozen.name
+        print(f"Report: {run_report(frozen, folder, out or folder)}")
+    except SuiteError as error:
+        _refuse(error)
+
+
+@app.command()
+def add(
+    controller: Annotated[str, typer.Argument(help="path/to/file.py:ClassName")],
+    suite: Annotated[str, typer.Option(help="Suites by commas; all frozen ones if empty.")] = "",
+    jobs: Jobs = 2,
+    results: Annotated[
+        Path, typer.Option(help="Folder with a folder of results for each suite.")
+    ] = RESULTS,
+) -> None:
+    """Score your own controller on all suites, and say where it stands or what to mend."""
+    from rich.console import Console
+
+    from benchmarks.comparison.add import own_contender, run_add
+    from benchmarks.comparison.suite import frozen_suite, suite_names
+    from benchmarks.contender import ControllerError
+    from benchmarks.suite import SuiteError
+
+    try:
+        frozen = [frozen_suite(name) for name in _listed(suite) or suite_names()]
+        code = run_add(own_contender(controller), frozen, results, jobs, Console())
+    except (ControllerError, SuiteError) as error:
+        _refuse(error)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case; run it again", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+@app.command()
+def suites() -> None:
+    """List the frozen suites: their versions, cases and controllers."""
+    from rich.console import Console
+
+    from benchmarks.comparison.listing import print_suites
+
+    print_suites(Console())
+
+
+@app.command()
 def profiles(out: Out) -> None:
     """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
     from benchmarks.profiles import run_profiles
 
     print(f"{run_profiles(out)} rows in {out}")
+
+
+@app.command()
+def budget(
+    out: Annotated[
+        Path, typer.Option(help="Folder of tables (CSV, Markdown) and pictures.")
+    ] = RESULTS / "budget",
+) -> None:
+    """Say why the dissertation's feed-forward misses what it misses, at every pressure."""
+    from benchmarks.budget.job import run_budget
+
+    if out.exists() and not out.is_dir():
+        _refuse(ValueError(f"--out {out} is a file; name a folder for the results"))
+    run_budget(out)
+
+
+@app.command()
+def voltages(
+    controller: Annotated[
+        str, typer.Option(help="serres_replay, serres_feedforward or improved_feedforward.")
+    ],
+    task: Annotated[str, typer.Option(help="Name of a task, such as displacement or rotation.")],
+    pressure: Annotated[float, typer.Option(help="Gauge pressure (kPa).")],
+    out: Out,
+    rate: Annotated[float, typer.Option(help="Rows a second (Hz), each held.")] = 100.0,
+    model: Annotated[
+        str, typer.Option(help="Nominal model: shipped name or TOML file.")
+    ] = "station",
+) -> None:
+    """Write a feed-forward's voltages for a real rig as CSV."""
+    from benchmarks.voltages import Order, run_voltages
+
+    try:
+        rows = run_voltages(Order(controller, task, pressure, rate, model), out)
+    except ValueError as error:
+        _refuse(error)
+    print(f"{rows} rows in {out}")
 
 
 @app.command()
@@ -126,6 +258,9 @@ def tune(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     model: Annotated[str, typer.Option(help="Shipped name or TOML file.")] = "station",
     jobs: Jobs = 2,
+    only: Annotated[
+        str, typer.Option(help="Tables by loop and kind of task, such as '50hz*/rotation'.")
+    ] = "*",
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
     from benchmarks.tune import GAINS_FILE, TuneError, run_tune
@@ -133,13 +268,36 @@ def tune(
     out = out or GAINS_FILE
     _writable(out)
     try:
-        written = run_tune(out, seed, model, jobs)
+        written = run_tune(out, seed, model, jobs, only)
     except ValueError as error:
         _refuse(error)
     except TuneError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(1) from None
     raise typer.Exit(0 if written else INTERRUPTED)
+
+
+@app.command()
+def design(
+    controllers: Annotated[
+        str, typer.Option(help="Names by commas; all that have settings if empty.")
+    ] = "",
+    out: OptionalOut = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
+    jobs: Jobs = 2,
+    again: Annotated[
+        bool, typer.Option(help="Also what the file has already; else only what is missing.")
+    ] = False,
+) -> None:
+    """Search the settings of controllers on training stations; without --out, the shipped file."""
+    from benchmarks.design import DesignError, run_design
+    from controllers.designs import DESIGNS_FILE
+
+    try:
+        complete = run_design(_listed(controllers), out or DESIGNS_FILE, seed, jobs, again)
+    except DesignError as error:
+        _refuse(error)
+    raise typer.Exit(0 if complete else INTERRUPTED)
 
 
 @app.command()

@@ -1,9 +1,11 @@
-"""One case, run: a controller drives an environment, and what happened comes back as a trial."""
+"""One case, run: a controller drives an environment, and what happened comes back."""
 
 import math
 import numbers
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import gymnasium as gym
 import numpy as np
@@ -12,8 +14,10 @@ from numpy.typing import NDArray
 from benchmarks.contender import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
-from pma_gym.envs import ENVIRONMENTS, PMAEnv
-from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
+from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
 
 # 5 s in steps of 0.01 s are 499.99999999999994 steps.
 _ROUNDING = 1e-9
@@ -21,19 +25,62 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Rollout:
-    """A trial that a controller drove.
+    """What happened in an episode that a controller drove, to its end or to a physical limit.
 
     Attributes:
-        trial: on the 384 Hz grid: the true position, the commands in force, the last reading.
-        steps: control steps.
+        task: the task.
+        period: of the control steps (s).
+        start: contraction that extension is counted from (m).
+        position: true position (m or rad) at k / 384 s.
+        commands: motor and regulator voltage (V) in force in every control step, shape (steps, 2).
+        readings: at the steps' beginnings and the end: extension, rotation, load, pressure (SI),
+            shape (steps + 1, 4).
+        truth: true contraction (m), load (N) and pressure (Pa) at the same instants.
+        act_seconds: computing time of every `act` (s), shape (steps,).
         step_seconds: time spent inside the environment's steps (s).
         ended_by: the physical limit that ended it early, or None.
     """
 
-    trial: Trial
-    steps: int
+    task: Task
+    period: float
+    start: float
+    position: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    truth: Mapping[str, NDArray[np.float64]]
+    act_seconds: NDArray[np.float64]
     step_seconds: float
     ended_by: str | None
+
+    @property
+    def steps(self) -> int:
+        """Control steps that it took."""
+        return len(self.commands)
+
+    @cached_property
+    def trial(self) -> Trial:
+        """It as a trial on the 384 Hz grid: the true position, commands in force, last readings."""
+        times = np.arange(self.position.size) / SAMPLE_RATE_HZ
+        step = np.floor(times / self.period + _ROUNDING).astype(int)
+        # The last grid point may fall on the end of the last step, where no further command came.
+        volts = self.commands[np.minimum(step, self.steps - 1)]
+        held = self.readings[step]
+        return Trial(
+            time=times,
+            commands={"motor_voltage": volts[:, 0], "regulator_voltage": volts[:, 1]},
+            measurements={
+                "contraction": self.start - held[:, 0],
+                "rotation": held[:, 1],
+                "load": held[:, 2],
+                "pressure": held[:, 3],
+            },
+            truth={self.task.protocol.quantity: self.position + self._zero},
+        )
+
+    @property
+    def _zero(self) -> float:
+        """What the position is counted from, as trials count it (m or rad)."""
+        return self.start if self.task.protocol.quantity == "contraction" else 0.0
 
 
 def make_environment(
@@ -53,36 +100,102 @@ def make_environment(
     return environment
 
 
-def rollout(environment: PMAEnv, controller: Controller, seed: int) -> Rollout:
-    """Let a controller drive one episode.
+def rollout(
+    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None = None
+) -> Rollout:
+    """Let a controller drive one episode, or the last of its repetitions.
+
+    A controller with `repetitions` has driven so many episodes when this ends, all but the last to
+    practise: on the same station and reference, each with a noise of its own. One with a method
+    `see` is shown the environment before each.
 
     Args:
         environment: of one pressure.
         controller: who drives; reset first.
         seed: seed of the episode.
+        nominal: model that the controller is told, if the environment has another.
     Returns:
-        The trial, to the last scored sample or to where a physical limit ended it.
+        What happened, to the last scored sample or to where a physical limit ended it.
     Raises:
         ControllerError: the controller returned what is no voltage.
         Exception: whatever the controller or the environment raised.
     """
+    for practice in range(1, getattr(controller, "repetitions", 1)):
+        _drive(environment, controller, practice_seed(seed, practice), nominal, _Log())
+    log = _Log()
+    _drive(environment, controller, seed, nominal, log)
+    return log.rollout(environment)
+
+
+def practice_seed(seed: int, practice: int) -> int:
+    """Seed of an episode before the one that is scored."""
+    return int(np.random.SeedSequence([seed, practice]).generate_state(1)[0])
+
+
+class _Log:
+    """What is written down while an episode runs."""
+
+    def __init__(self) -> None:
+        self.commands: list[tuple[float, float]] = []
+        self.readings: list[Reading] = []
+        self.truths: list[tuple[float, float, float]] = []
+        self.act_seconds: list[float] = []
+        self.step_seconds = 0.0
+        self.start = 0.0
+
+    def see(self, environment: PMAEnv) -> None:
+        """Write down where the station stands."""
+        truth = environment.truth
+        if not self.readings:
+            self.start = truth["contraction"] + truth["extension"]
+        self.readings.append(environment.reading)
+        self.truths.append((truth["contraction"], truth["load"], truth["pressure"]))
+
+    def rollout(self, environment: PMAEnv) -> Rollout:
+        """All of it, at the episode's end."""
+        last = environment.task.protocol.phases[-1]
+        truths = np.array(self.truths).T
+        return Rollout(
+            task=environment.task,
+            period=environment.options.period,
+            start=self.start,
+            position=environment.trajectory()[: last.first + last.samples],
+            commands=np.array(self.commands),
+            readings=np.array([reading[1:] for reading in self.readings]),
+            truth=dict(zip(("contraction", "load", "pressure"), truths, strict=True)),
+            act_seconds=np.array(self.act_seconds),
+            step_seconds=self.step_seconds,
+            ended_by=environment.ended_by,
+        )
+
+
+def _drive(
+    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, log: _Log
+) -> None:
+    """Run an episode to its end."""
     environment.reset(seed=seed)
-    controller.reset(environment.reference, environment.station)
-    commands: list[tuple[float, float]] = []
-    readings = [environment.reading]
-    seconds = 0.0
-    ended = False
+    see = getattr(controller, "see", None)
+    if see is not None:
+        see(environment)
+    station = environment.station
+    controller.reset(
+        environment.reference, station if nominal is None else replace(station, model=nominal)
+    )
+    log.see(environment)
+    clock, ended = time.perf_counter, False
     while not ended:
-        volts = _checked(controller.act(environment.reading, environment.time), environment.time)
-        action = environment.action(volts)
-        before = time.perf_counter()
+        now, reading = environment.time, log.readings[-1]
+        asked = clock()
+        answer = controller.act(reading, now)
+        answered = clock()
+        action = environment.action(_checked(answer, now))
+        given = clock()
         _, _, terminated, truncated, _ = environment.step(action)
-        seconds += time.perf_counter() - before
+        log.step_seconds += clock() - given
+        log.act_seconds.append(answered - asked)
+        log.commands.append((environment.motor_voltage, environment.regulator_voltage))
+        log.see(environment)
         ended = terminated or truncated
-        commands.append((environment.motor_voltage, environment.regulator_voltage))
-        readings.append(environment.reading)
-    trial = _trial(environment, commands, np.array([reading[1:] for reading in readings]))
-    return Rollout(trial, len(commands), seconds, environment.ended_by)
 
 
 def _checked(volts: object, now: float) -> float:
@@ -104,29 +217,3 @@ def _checked(volts: object, now: float) -> float:
             "look for a division by zero or a root of a negative number there"
         )
     return float(volts)
-
-
-def _trial(
-    environment: PMAEnv, commands: list[tuple[float, float]], readings: NDArray[np.float64]
-) -> Trial:
-    """What happened, on the 384 Hz grid; readings are extension, rotation, load, pressure."""
-    protocol = environment.task.protocol
-    wanted = round(protocol.phases[-1].start * SAMPLE_RATE_HZ) + PHASE_SAMPLES
-    position = environment.trajectory()[:wanted]
-    samples = position.size
-    times = np.arange(samples) / SAMPLE_RATE_HZ
-    step = np.floor(times * environment.options.control_rate_hz + _ROUNDING).astype(int)
-    # The last grid point may fall on the end of the last step, where no further command came.
-    volts = np.array(commands)[np.minimum(step, len(commands) - 1)]
-    held = readings[step]
-    return Trial(
-        time=times,
-        commands={"motor_voltage": volts[:, 0], "regulator_voltage": volts[:, 1]},
-        measurements={
-            "contraction": environment.condition.zero_contraction - held[:, 0],
-            "rotation": held[:, 1],
-            "load": held[:, 2],
-            "pressure": held[:, 3],
-        },
-        truth={protocol.quantity: position},
-    )

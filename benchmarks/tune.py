@@ -1,23 +1,26 @@
 """Tunes the PIDs of `controllers/pid.py` on a model of the station and writes their gains.
 
-For every task, controller and pressure of a small table:
+For every loop (100 Hz; 50 Hz with commands 20 ms late), task, controller and pressure of a small
+table:
 
 1. Start: lambda tuning (Rivera et al. 1986) on the plant linearised in the middle of the stroke,
    k_p = tau / (g (lambda + delay)), k_i = k_p / tau, with g the static gain, tau the sum of the
-   time constants that the motor voltage moves, lambda 2 control periods and delay half of one.
-   Lead of the PID: 1 / (g k_i), which a ramp asks for; of the one with feed-forward: none.
+   time constants that the voltage moves, delay half a control period more than commands are late,
+   and lambda 2 periods more than that. Lead of the PID: 1 / (g k_i), which a ramp asks for; of the
+   one with feed-forward: none.
 2. Search: Nelder-Mead on the logarithms of k_p, k_i, k_d, the factor on them at the end of the
    range and, for the PID alone, the lead. The cost of gains is the mean over four stations - twice
    the nominal one, one with 20 % more force and 20 % less damping, one the other way round (on the
-   cascade also with 10 % less and more displacement) - of what a whole trial with sensor noise at
-   100 Hz costs, the noise another in each:
+   cascade also with 10 % less and more displacement) - of what a whole trial with sensor noise
+   costs, the noise another in each:
 
        mean over the phases of RMSE / target + 0.01 s/V * total variation of the voltage / duration
 
-   with the RMSE of the true position at 384 Hz, targets 0.10 mm and 0.4 deg.
+   with the RMSE of the true position at 384 Hz, targets 0.10 mm and 0.4 deg, of contractions by the
+   regulator 0.30 mm.
 3. Margin: gains whose loop, linearised at three places of the stroke and in each direction of
-   motion, has a largest sensitivity above 2 pay for it. At 2 the gain may be off by a factor of
-   2 and the phase by 29 deg at least before the loop is unstable.
+   motion, with its delays, has a largest sensitivity above 2 pay for it. At 2 the gain may be off
+   by a factor of 2 and the phase by 29 deg at least before the loop is unstable.
 
 The same seed gives the same bytes on the same machine and versions.
 
@@ -25,6 +28,7 @@ Rows that are done are kept in a file beside that of the gains; after Ctrl-C the
 on from there.
 """
 
+import fnmatch
 import hashlib
 import json
 import platform
@@ -41,7 +45,7 @@ from scipy.optimize import minimize
 from benchmarks.files import write_text
 from benchmarks.processes import run_all
 from benchmarks.tuning.cost import Cost
-from benchmarks.tuning.job import CONTROL_RATE_HZ, Job
+from benchmarks.tuning.job import Job
 from benchmarks.tuning.kept import KeptRows, name_of
 from benchmarks.tuning.loop import lambda_tuning
 from benchmarks.worker import ProcessDied
@@ -49,12 +53,19 @@ from controllers.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.pid import PID, FeedforwardPID
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.tasks import EVERY_TASK
 
 PRESSURES_KPA = {
     "displacement": (150, 200, 250, 300, 400, 575),
     "rotation": (275, 350, 450, 575),
+    "isotonic": (150, 200, 250, 300, 350),
+    "triangle_high": (450,),
 }
-"""Pressures that gains are tuned at, by task; between them they are interpolated."""
+"""Pressures that trials begin at, by task; between them gains are interpolated. Tasks of one kind
+(`controllers.designs.task_kind`) fill one table, whose pressures rise."""
+
+LOOPS = ((100.0, 0.0), (50.0, 0.02))
+"""Control rates (Hz), and how late commands are with each (s)."""
 
 CONTROLLERS = (PID.name, FeedforwardPID.name)
 FILTER_S = 0.005
@@ -67,28 +78,30 @@ class TuneError(RuntimeError):
     """A table of gains that could not be computed; the message says why and how to go on."""
 
 
-def run_tune(out: Path = GAINS_FILE, seed: int = 0, model: str = "station", jobs: int = 2) -> bool:
-    """Tune on a model and write the gains; those of other models in the file stay.
+def run_tune(
+    out: Path = GAINS_FILE,
+    seed: int = 0,
+    model: str = "station",
+    jobs: int = 2,
+    only: str = "*",
+) -> bool:
+    """Tune on a model and write the gains; other tables in the file stay.
 
     Args:
         out: file of gains, replaced whole once all is computed.
         seed: seed of the sensors' noise.
         model: name of a shipped model or path of a TOML file.
         jobs: number of processes.
+        only: which tables, by loop and kind of task: patterns such as `100hz/*` by commas.
     Returns:
         Whether it was written: Ctrl-C leaves the file as it was, and says how to go on.
     Raises:
         TuneError: the process of a row died.
         ModelError: no such model.
-        ValueError: the file of gains is broken.
+        ValueError: the file of gains is broken, or no table is called so.
     """
     known, document = load_model(model), _read(out)
-    rows = [
-        Job(known, task, controller, pressure, seed)
-        for task, pressures in PRESSURES_KPA.items()
-        for controller in CONTROLLERS
-        for pressure in pressures
-    ]
+    rows = table_rows(known, seed, only)
     kept = KeptRows(out, _provenance(known, seed) | {"evaluations": EVALUATIONS})
     left = [row for row in rows if name_of(row) not in kept.rows]
     if len(left) < len(rows):
@@ -100,11 +113,43 @@ def run_tune(out: Path = GAINS_FILE, seed: int = 0, model: str = "station", jobs
         done = sum(name_of(row) in kept.rows for row in rows)
         print(_interrupted(done, len(rows), kept.path, out), file=sys.stderr)
         return False
-    document["models"][known.name] = _tables(rows, [kept.rows[name_of(row)] for row in rows])
-    document["provenance"][known.name] = _provenance(known, seed)
+    tables = _tables(rows, [kept.rows[name_of(row)] for row in rows])
+    provenance = {
+        loop: dict.fromkeys(kinds, _provenance(known, seed)) for loop, kinds in tables.items()
+    }
+    _merge(document["models"].setdefault(known.name, {}), tables)
+    _merge(document["provenance"].setdefault(known.name, {}), provenance)
     _write(out, document)
     kept.forget()
     return True
+
+
+def table_rows(model: Model, seed: int, only: str) -> list[Job]:
+    """The rows of the tables asked for.
+
+    Raises:
+        ValueError: there are none.
+    """
+    rows = [
+        Job(model, task, controller, pressure, seed, rate, delay)
+        for rate, delay in LOOPS
+        for task, pressures in PRESSURES_KPA.items()
+        # A cascade has no muscle that a load could be held against.
+        if model.plant == "station" or EVERY_TASK[task].actuator == "motor"
+        for controller in CONTROLLERS
+        for pressure in pressures
+    ]
+    names = {f"{row.loop}/{row.kind}": None for row in rows}
+    wanted = {name for pattern in only.split(",") for name in fnmatch.filter(names, pattern)}
+    if not wanted:
+        raise ValueError(f"only must match a table, got {only!r}; tables: {', '.join(names)}")
+    return [row for row in rows if f"{row.loop}/{row.kind}" in wanted]
+
+
+def _merge(into: dict[str, Any], tables: dict[str, Any]) -> None:
+    """Put new entries by loop and kind into a document's."""
+    for loop, kinds in tables.items():
+        into.setdefault(loop, {}).update(kinds)
 
 
 def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
@@ -119,8 +164,8 @@ def _interrupted(done: int, total: int, kept: Path, out: Path) -> str:
 
 def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
     """Tune rows and keep each as it is done; false after Ctrl-C."""
-    # Trials of rotation take three times as long: first, so that no process waits at the end.
-    order = sorted(rows, key=lambda row: row.task != "rotation")
+    # The longest trials first, so that no process waits at the end.
+    order = sorted(rows, key=lambda row: -row.protocol.duration * row.rate_hz)
     try:
         if order:
             Plant(order[0].model)  # compiled here, once, so that the processes find it on disk
@@ -175,10 +220,11 @@ def _rounded(value: float) -> float:
 
 
 def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, Any]:
-    """Gains at the door by task and controller."""
+    """Gains at the door by loop, kind of task and controller."""
     tables: dict[str, Any] = {}
     for job, (gains, cost) in zip(jobs, results, strict=True):
-        table = tables.setdefault(job.task, {}).setdefault(job.controller, {})
+        kinds = tables.setdefault(job.loop, {}).setdefault(job.kind, {})
+        table = kinds.setdefault(job.controller, {})
         columns = column_names(job.protocol.unit)
         row = {"pressure_kpa": job.pressure_kpa} | {
             name: float(f"{getattr(gains, field) / factor:.4g}")
@@ -195,7 +241,6 @@ def _provenance(model: Model, seed: int) -> dict[str, Any]:
         "written_by": "benchmarks/tune.py",
         "model_sha256": hashlib.sha256(dump_model(model).encode()).hexdigest(),
         "seed": seed,
-        "control_rate_hz": CONTROL_RATE_HZ,
         "versions": {
             "python": platform.python_version(),
         }

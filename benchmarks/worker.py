@@ -1,13 +1,16 @@
 """A process that does one piece of work after another, so that its death is told from its work."""
 
+import ctypes
 import multiprocessing
 import pickle
 import signal
 import threading
+import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
+from multiprocessing.sharedctypes import RawValue
 
 LAST_WORDS_S = 5.0
 """How long a process may take to end when it is told to (s)."""
@@ -26,6 +29,62 @@ class ProcessDied(RuntimeError):
         super().__init__(f"{died}: {_how(exit_code)}")
 
 
+class TookTooLong(RuntimeError):
+    """A call inside a piece of work passed its limit, and its process was ended."""
+
+    def __init__(self, what: str, limit_s: float) -> None:
+        # Both arguments, so that it survives being sent to another process.
+        super().__init__(what, limit_s)
+        self.what, self.limit_s = what, limit_s
+
+    def __str__(self) -> str:
+        return (
+            f"{self.what} took over {self.limit_s:g} s and was ended; look for an endless loop "
+            "or for what waits there"
+        )
+
+
+class _Limit(ctypes.Structure):
+    """What a worker is at, in memory that its maker reads too.
+
+    Attributes:
+        due: when it must be done, by the clock of the machine (s); 0 if it has all the time.
+        limit_s: how long that was (s).
+        what: its words.
+    """
+
+    _fields_ = (
+        ("due", ctypes.c_double),
+        ("limit_s", ctypes.c_double),
+        ("what", ctypes.c_char * 64),
+    )
+
+
+_mine: "_Limit | None" = None
+"""This process's limit, if it is a worker."""
+
+
+def begin_limited(what: str, limit_s: float) -> None:
+    """From now on the process that made this worker ends it, unless `end_limited` comes in time.
+
+    Works for what no signal or thread of this process could end, such as a loop in compiled code.
+    Nothing happens in a process that is no worker.
+
+    Args:
+        what: how errors call what is limited.
+        limit_s: how long it may take (s).
+    """
+    if _mine is not None:
+        _mine.what, _mine.limit_s = what.encode()[:63], limit_s
+        _mine.due = time.monotonic() + limit_s
+
+
+def end_limited() -> None:
+    """What was limited is done."""
+    if _mine is not None:
+        _mine.due = 0.0
+
+
 class Worker:
     """A process of its own, deaf to Ctrl-C: the process that made it ends it."""
 
@@ -33,7 +92,8 @@ class Worker:
         # Spawned, not forked: the progress display has a thread, and kernels may have some.
         context = multiprocessing.get_context("spawn")
         self._connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs,))
+        self._limit: _Limit = RawValue(_Limit)
+        self._process = context.Process(target=_serve, args=(theirs, self._limit))
         self._process.start()
         # Else its death would not end the connection.
         theirs.close()
@@ -62,6 +122,13 @@ class Worker:
         except Exception as error:
             return RuntimeError(f"its result cannot be read back: {type(error).__name__}: {error}")
 
+    def overdue(self) -> TookTooLong | None:
+        """What it is at too long, or None."""
+        due = self._limit.due
+        if due == 0.0 or time.monotonic() < due:
+            return None
+        return TookTooLong(self._limit.what.decode(errors="replace"), self._limit.limit_s)
+
     def dismiss(self) -> None:
         """Let the process end by itself: there is no more work."""
         self._connection.close()
@@ -77,13 +144,18 @@ class Worker:
                 self._process.join(LAST_WORDS_S)
 
     @staticmethod
-    def wait(workers: Iterable["Worker"]) -> list["Worker"]:
-        """Those of some workers that are done or have died; waits for one at least."""
+    def wait(workers: Iterable["Worker"], most_s: float) -> list["Worker"]:
+        """Those of some workers that are done or have died; waits for one, but not for ever.
+
+        Args:
+            workers: some workers.
+            most_s: how long to wait (s).
+        """
         places: dict[object, Worker] = {}
         for worker in workers:
             # A process that the dead one left behind may still hold the connection.
             places[worker._connection] = places[worker._process.sentinel] = worker
-        ready = wait(list(places))  # type: ignore[arg-type]
+        ready = wait(list(places), most_s)  # type: ignore[arg-type]
         return list(dict.fromkeys(places[place] for place in ready))
 
 
@@ -100,8 +172,10 @@ def deaf_to_interrupt() -> Iterator[None]:
         signal.signal(signal.SIGINT, usual)
 
 
-def _serve(connection: Connection) -> None:
+def _serve(connection: Connection, limit: _Limit) -> None:
     """Do what comes until nobody is there to ask for more."""
+    global _mine
+    _mine = limit
     with suppress(EOFError, OSError):
         while True:
             connection.send_bytes(_done(connection.recv_bytes()))

@@ -2,9 +2,14 @@
 
 from collections.abc import Callable
 
+from controllers.adrc import ADRC
 from controllers.controller import Controller, Reference
 from controllers.feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
+from controllers.ilc import ILC
+from controllers.lqg import LQG
+from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
+from controllers.sliding_mode import SlidingMode
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "serres_replay": SerresReplay,
@@ -12,16 +17,26 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "improved_feedforward": ImprovedFeedforward,
     "pid": PID,
     "feedforward_pid": FeedforwardPID,
+    "lqg": LQG,
+    "adrc": ADRC,
+    "sliding_mode": SlidingMode,
+    "ilc": ILC,
+    "oracle": Oracle,
 }
 """Controllers by name: what makes a new one. A controller listed here is scored."""
 
 __all__ = [
+    "ADRC",
     "CONTROLLERS",
+    "ILC",
+    "LQG",
     "PID",
     "Controller",
     "FeedforwardPID",
     "ImprovedFeedforward",
+    "Oracle",
     "Reference",
     "SerresFeedforward",
     "SerresReplay",
+    "SlidingMode",
 ]

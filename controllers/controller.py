@@ -1,9 +1,12 @@
 """What a controller is: told the reference and the station, then asked for volts."""
 
 from collections.abc import Callable
-from typing import Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from pma_gym.envs import Reading, Station
+
+if TYPE_CHECKING:
+    import control
 
 Reference = Callable[[float], float]
 """Reference by time: extension (m) or rotation (rad) at a time since the trial began (s)."""
@@ -33,5 +36,29 @@ class Controller(Protocol):
         Args:
             observation: what the sensors say (SI).
             time: time since the trial began (s).
+        """
+        ...
+
+
+@runtime_checkable
+class LinearController(Controller, Protocol):
+    """A controller whose feedback is linear between the voltage's limits.
+
+    `linear` says what it does near a place of the stroke, so that the margins of its loop can be
+    computed. Terms that do not depend on the measurement (feed-forward, filters on the reference)
+    are left out: they move no margin.
+    """
+
+    def linear(self, station: Station, position: float) -> "control.StateSpace":
+        """The feedback near a position: voltage (V) by error (m or rad).
+
+        In discrete time, one input, one output, sampled at `station.period`, such that the loop of
+        plant and controller is closed by negative feedback: for a controller that reads the
+        measured position y, the voltage's response to -y. Delays of the station belong to the
+        plant, unless the controller itself waits. Needs no `reset`.
+
+        Args:
+            station: what the controller is told.
+            position: where on the stroke (m or rad).
         """
         ...

@@ -1,14 +1,10 @@
 """Open-loop controllers: the dissertation's, and one without its faults."""
 
-import math
-
-import numpy as np
-
 from controllers.controller import Reference
-from controllers.inverse import VOLTAGE_LIMIT, Inverse, inverse_of
+from controllers.inverse import VOLTAGE_LIMIT
+from controllers.motion import NominalMotion, nominal_motion
 from controllers.serres import SerresFeedforward, SerresReplay
 from pma_gym.envs import Reading, Station
-from pma_gym.plant.model import Model
 
 __all__ = ["ImprovedFeedforward", "SerresFeedforward", "SerresReplay"]
 
@@ -31,27 +27,21 @@ class ImprovedFeedforward:
     name = "improved_feedforward"
 
     def __init__(self) -> None:
-        self._model: Model | None = None
-        self._inverse: Inverse | None = None
-        self._volts = np.zeros(1)
-        self._period = 1.0
+        self._motion: NominalMotion | None = None
 
     def reset(self, reference: Reference, station: Station) -> None:
-        """Compute the voltages of the whole trial."""
-        if self._inverse is None or self._model is not station.model:
-            self._model, self._inverse = station.model, inverse_of(station.model)
-        self._period = station.period
-        steps = math.ceil(station.task.duration / station.period - 1e-9)
-        self._volts = self._inverse(reference, station, steps)
+        """Compute the voltages of the whole trial, or take them as computed before."""
+        self._motion = nominal_motion(reference, station)
 
     def act(self, observation: Reading, time: float) -> float:
-        """Motor voltage (V) for the period that begins at this time (s)."""
-        return min(max(self.voltage(time), 0.0), VOLTAGE_LIMIT)
+        """Voltage (V) to send now, for it is in force the action delay later."""
+        assert self._motion is not None, "reset comes first"
+        return min(max(self._motion.command(time), 0.0), VOLTAGE_LIMIT)
 
     def voltage(self, time: float) -> float:
-        """Voltage (V) that the motion needs at a time (s), also where the drive cannot give it.
+        """Voltage (V) that the motion needs in force at a time (s), also beyond the limits.
 
         After the trial's end that of the last period.
         """
-        at = math.floor(time / self._period + 1e-6)
-        return float(self._volts[min(max(at, 0), len(self._volts) - 1)])
+        assert self._motion is not None, "reset comes first"
+        return self._motion.voltage(time)

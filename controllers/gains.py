@@ -1,4 +1,4 @@
-"""Gains by model, task, controller and pressure, as `benchmarks/tune.py` wrote them."""
+"""Gains by model, loop, task, controller and pressure, as `benchmarks/tune.py` wrote them."""
 
 import json
 import math
@@ -8,13 +8,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from controllers.designs import loop_name, nearest_loop, task_kind
 from pma_gym.envs import Station
 from pma_gym.units import SI_FACTORS
 
 GAINS_FILE = Path(__file__).with_name("gains.json")
 """The gains of the controllers here, with where they come from."""
 
-SCHEMA = 1
+SCHEMA = 2
 
 START_SHARE = 0.2
 """Share of the range over which `Gains.start_factor` fades out."""
@@ -86,9 +87,13 @@ def column_names(unit: str) -> dict[str, tuple[str, float]]:
 def scheduled_gains(controller: str, station: Station, path: Path = GAINS_FILE) -> Gains:
     """Gains of a controller for a station, linear between the tuned pressures.
 
+    Gains are of a loop (control rate and delay) and of a kind of task: any reference in extension
+    is followed with those of the displacement task. A loop that was not tuned takes those of the
+    one that is nearest in dead time.
+
     Args:
         controller: `pid` or `feedforward_pid`.
-        station: its model, task and pressure.
+        station: its model, task, pressure, period and delays.
         path: file of gains.
     Returns:
         The gains in SI: those tuned on the model of this name, else those of the shipped model
@@ -97,15 +102,16 @@ def scheduled_gains(controller: str, station: Station, path: Path = GAINS_FILE) 
         ValueError: there are none.
     """
     models = _read(path)["models"]
-    model, task = station.model, station.task
+    model, task, kind = station.model, station.task, task_kind(station)
     name = model.name if model.name in models else model.plant
-    try:
-        table = models[name][task.name][controller]
-    except KeyError:
+    loops = models.get(name, {})
+    known = [loop for loop, kinds in loops.items() if controller in kinds.get(kind, {})]
+    if not known:
         raise ValueError(
             f"{path.name} has no gains of {controller} for the {task.name} task on a "
             f"{model.plant}; tune them: python -m benchmarks tune --model {name}"
-        ) from None
+        )
+    table = loops[nearest_loop(loop_name(station), known)][kind][controller]
     columns = column_names(_unit(task.protocol.quantity))
     pressures = np.array(table["pressure_kpa"]) * 1e3
     return Gains(

@@ -17,16 +17,17 @@ Cascade. u = y + tau y' (u = r theta in rotation), then the voltage of the stati
 """
 
 import math
-from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
-from controllers.controller import Reference
+from controllers.contraction_inverse import ContractionInverse
+from controllers.muscle import Muscle
 from pma_gym.effects.position_map import mapped_displacement
 from pma_gym.envs import Station
 from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 
 VOLTAGE_LIMIT = 10.0
 """Largest motor voltage (V)."""
@@ -37,14 +38,32 @@ STEP_S = 2e-3
 TAKE_UP_S = 20e-3
 """For how long the rotor is pushed through the slack (s); it then coasts as long again."""
 
-Inverse = Callable[[Reference, Station, int], np.ndarray]
-"""Motor voltage (V) of every control period, shape (steps,), by reference, station and steps. Not
-held to 0-10 V: beyond it says by how much the motion asks for what the drive cannot give."""
+
+class Inverse(Protocol):
+    """A nominal model turned around."""
+
+    def parts(self, period: float) -> int:
+        """Into how many steps a control period (s) is divided."""
+        ...
+
+    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+        """Voltage (V) of every control period of a motion.
+
+        Args:
+            wanted: positions (m or rad) at the ends of all parts, shape (steps * parts + 1,).
+            station: task, pressure, control period, action delay.
+        Returns:
+            Shape (steps,). Not held to 0-10 V: beyond says by how much the motion asks for what
+            the actuator cannot give.
+        """
+        ...
 
 
-def inverse_of(model: Model) -> Inverse:
-    """The inverse of a nominal model."""
+def inverse_of(model: Model, actuator: str = "motor") -> Inverse:
+    """The inverse of a nominal model from the voltage of an actuator, `motor` or `regulator`."""
     plant = Plant(model)
+    if actuator == "regulator":
+        return ContractionInverse(plant)
     return StationInverse(plant) if model.plant == "station" else CascadeInverse(plant)
 
 
@@ -62,16 +81,19 @@ class StationInverse:
         self.mass = parameters["slide"].mass
         self.rotor_mass = self.rotor.inertia / self.rotor.radius**2
 
-    def __call__(self, reference: Reference, station: Station, steps: int) -> np.ndarray:
-        """Motor voltage (V) of every control period, shape (steps,)."""
-        parts = max(1, math.ceil(station.period / STEP_S - 1e-9))
-        wanted = np.array([reference(i * station.period / parts) for i in range(steps * parts + 1)])
+    def parts(self, period: float) -> int:
+        """Into how many steps a control period (s) is divided."""
+        return max(1, math.ceil(period / STEP_S - 1e-9))
+
+    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+        """Motor voltage (V) of every control period of a motion, shape (steps,)."""
+        parts = self.parts(station.period)
         rotation = station.task.protocol.quantity == "rotation"
         tension, extension = self.follow(wanted, station.period / parts, station.pressure, rotation)
         wound = self.rotor.radius * wanted if rotation else extension
         load = self._mean_load(tension, extension, wound, station.period, parts)
         if not rotation:
-            self._take_up_slack(load, station.period)
+            self._take_up_slack(load, station)
         return (load - self.drive.offset) / self.drive.gain
 
     def follow(
@@ -96,13 +118,14 @@ class StationInverse:
                 target = self._pulled_to(self.rotor.radius * target, muscle, start, step)
             pull = muscle.tension(0.5 * (target + start), (target - start) / step)
             if pull < 0.0:
-                # The cable cannot push: it hangs loose, and the muscle stays where it is.
-                target = start
+                # The cable cannot push: it hangs loose, and the muscle goes back as it does alone.
+                held = muscle.tension(start, 0.0)
+                target = start + (target - start) * max(held, 0.0) / (max(held, 0.0) - pull)
             muscle.remember(0.5 * (target + start), (target - start) / step, step)
             tension[i], extension[i + 1] = pull, target
         return tension, extension
 
-    def _pulled_to(self, wound: float, muscle: "Muscle", start: float, step: float) -> float:
+    def _pulled_to(self, wound: float, muscle: Muscle, start: float, step: float) -> float:
         """Extension (m) to which a cable, wound in so far (m), pulls the muscle in a step.
 
         y = wound - slack - T / k_c, in which T grows with y and y'. The cable is 20 times as
@@ -135,75 +158,19 @@ class StationInverse:
         before = np.concatenate([[0.0], momentum[parts - 1 :: parts] / step])
         return (tension + friction).reshape(-1, parts).mean(axis=1) + np.diff(before) / period
 
-    def _take_up_slack(self, load: np.ndarray, period: float) -> None:
-        """Replace the first loads by a push that carries the rotor through the slack.
+    def _take_up_slack(self, load: np.ndarray, station: Station) -> None:
+        """Replace the first loads in force by a push that carries the rotor through the slack.
 
         Under a load F for a time t_1, then coasting as long, the cable winds in
         F t_1^2 (1/2 + 1) / (J / r^2). The muscle's damping takes what speed is left.
         """
         if self.cable.slack == 0.0:
             return
+        period, first = station.period, round(station.action_delay / station.period)
         push = max(1, round(TAKE_UP_S / period))
-        load[:push] = self.cable.slack * self.rotor_mass / (1.5 * (push * period) ** 2)
-        load[push : 2 * push] = 0.0
-
-
-class Muscle:
-    """The muscle of a plant on its own, moved at will.
-
-    Args:
-        plant: the plant.
-        rest: where it begins, at rest.
-    """
-
-    def __init__(self, plant: Plant, rest: Condition) -> None:
-        self.plant = plant
-        self.state = rest.state.copy()
-        self.zero = rest.zero_contraction
-        self.mass = plant.model.parameters["slide"].mass
-        states = plant.states
-        self._x, self._v = states.index("contraction"), states.index("velocity")
-        effects = plant.model.effects
-        # Memories of the way travelled are known exactly after it; the others have rates.
-        self._paths = {
-            states.index(f"memory_{name}"): (effect.path, plant.model.parameters[name])
-            for name, effect in effects.items()
-            if effect.path
-        }
-        memories = (i for i, name in enumerate(states) if name.startswith("memory_"))
-        self._memories = [i for i in memories if i not in self._paths]
-
-    def _rates(self) -> np.ndarray:
-        # With the zero at the contraction itself the cable is exactly untensioned.
-        return self.plant.derivative(self.state, 0.0, 0.0, float(self.state[self._x]))
-
-    def tension(self, extension: float, speed: float) -> float:
-        """Tension (N) that holds an extension (m) moving at a constant speed y' (m/s)."""
-        self.state[self._x], self.state[self._v] = self.zero - extension, -speed
-        return float(self.mass * self._rates()[self._v])
-
-    def remember(self, extension: float, speed: float, duration: float) -> None:
-        """Let the memories go on for a while (s) at an extension (m) and speed y' (m/s).
-
-        Exponential Rosenbrock-Euler for those that have rates.
-        """
-        self.state[self._x], self.state[self._v] = self.zero - extension, -speed
-        rates = self._rates()
-        after = {}
-        for at in self._memories:
-            value, change = self.state[at], 1e-6 * (1.0 + abs(self.state[at]))
-            self.state[at] = value - math.copysign(change, value)
-            slope = (self._rates()[at] - rates[at]) / (self.state[at] - value)
-            self.state[at] = value
-            turn = slope * duration
-            share = math.expm1(turn) / turn if abs(turn) > 1e-9 else 1.0
-            after[at] = value + duration * share * rates[at]
-        travel = -speed * duration
-        for at, (path, parameters) in self._paths.items():
-            direction = 1.0 if travel > 0.0 else -1.0
-            after[at] = path(float(self.state[at]), travel, direction, parameters)
-        for at, value in after.items():
-            self.state[at] = value
+        pushed, coasting = first + push, first + 2 * push
+        load[first:pushed] = self.cable.slack * self.rotor_mass / (1.5 * (push * period) ** 2)
+        load[pushed:coasting] = 0.0
 
 
 class CascadeInverse:
@@ -217,10 +184,13 @@ class CascadeInverse:
         self.plant = plant
         self.parameters = plant.model.parameters
 
-    def __call__(self, reference: Reference, station: Station, steps: int) -> np.ndarray:
-        """Motor voltage (V) of every control period, shape (steps,), from its middle."""
-        ends = np.array([reference(k * station.period) for k in range(steps + 1)])
-        middle = np.array([reference((k + 0.5) * station.period) for k in range(steps)])
+    def parts(self, period: float) -> int:
+        """Into how many steps a control period is divided: its middle is asked for."""
+        return 2
+
+    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+        """Motor voltage (V) of every control period of a motion, from its middle."""
+        ends, middle = wanted[::2], wanted[1::2]
         if station.task.protocol.quantity == "rotation":
             return self._mapped(self.parameters["servo"].radius * middle, station.pressure)
         rate = np.diff(ends) / station.period

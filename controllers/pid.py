@@ -1,14 +1,19 @@
 """PID with gains scheduled on pressure, alone and on top of the improved feed-forward."""
 
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
 
 from controllers.controller import Reference
 from controllers.feedforward import ImprovedFeedforward
 from controllers.gains import Gains, scheduled_gains
 from pma_gym.envs import Reading, Station
 
+if TYPE_CHECKING:
+    import control
+
 VOLTAGE_LIMIT = 10.0
-"""Largest motor voltage (V)."""
+"""Largest voltage of motor and regulator (V)."""
 
 
 class OpenLoop(Protocol):
@@ -30,8 +35,9 @@ class PID:
         D:  tau_f D' + D = k_d e'                         backward Euler
         I:  I' = k_i e, or 0 where that would lead further beyond a limit   forward Euler
 
-    e is the reference `lead` seconds ahead less the measured position; `offset` the voltage at
-    which the nominal drive just begins to pull, so that the first step has no bump.
+    e is the reference `lead` seconds ahead less the measured position, both of the time that the
+    reading was taken at; `offset` the voltage at which the nominal drive just begins to pull, or at
+    which the regulator holds the pressure, so that the first step has no bump.
 
     Anti-windup is conditional integration: at a limit the integral waits until the error turns.
     Back-calculation would lift it at 0 V whenever the drive cuts off a proportional action.
@@ -43,10 +49,11 @@ class PID:
     The derivative is of the error: on a ramp that of the measurement alone would push against
     the motion all the time, which the integral would have to make good.
 
-    Gains come from `controllers/gains.json`, where `benchmarks/tune.py` wrote them: linear in
-    pressure between the pressures that it tuned at and constant beyond, and varying with the
-    reference (`Gains.scaled`). They are those under the model's name, else, for a model of one's
-    own, those of the shipped model of its plant (`station`, `cascade`).
+    Gains come from `controllers/gains.json`, where `benchmarks/tune.py` wrote them: of the nearest
+    loop (control rate and delay) and the kind of task, linear in pressure between the pressures
+    that it tuned at and constant beyond, and varying with the reference (`Gains.scaled`). They are
+    those under the model's name, else, for a model of one's own, those of the shipped model of its
+    plant (`station`, `cascade`).
 
     Args:
         gains: gains to use instead of the scheduled ones, in SI of the task.
@@ -69,19 +76,19 @@ class PID:
             ValueError: nothing was tuned for this task, with how to do so.
         """
         self._reference = reference
-        self._position = 2 if station.task.protocol.quantity == "rotation" else 1
-        self._period = station.period
+        self._position, self._period = station.position, station.period
         self._span = station.task.protocol.span
         self.gains = self._given or scheduled_gains(self.name, station)
+        self._ahead = self.gains.lead - station.observation_delay
         self._offset = nominal_offset(station)
         self._integral = self._derivative = 0.0
         self._last_error: float | None = None
 
     def act(self, observation: Reading, time: float) -> float:
-        """Motor voltage (V) to hold for the next control period."""
-        period, reference = self._period, self._reference(time + self.gains.lead)
+        """Voltage (V) of the task's actuator to hold for the next control period."""
+        period, reference = self._period, self._reference(time + self._ahead)
         gains = self.gains.scaled(reference / self._span)
-        error = reference - observation[self._position]
+        error = reference - self._position(observation)
         change = 0.0 if self._last_error is None else error - self._last_error
         self._derivative = (gains.filter * self._derivative + gains.derivative * change) / (
             gains.filter + period
@@ -97,6 +104,14 @@ class PID:
     def feedforward(self, time: float) -> float:
         """Voltage added to that of the feedback (V); none here."""
         return 0.0
+
+    def linear(self, station: Station, position: float) -> "control.StateSpace":
+        """The feedback near a position (m or rad), without limits: volts by error."""
+        import control
+
+        gains = self._given or scheduled_gains(self.name, station)
+        law = linear_law(gains.scaled(position / station.task.protocol.span), station.period)
+        return control.StateSpace(*law, station.period)
 
 
 class FeedforwardPID(PID):
@@ -120,14 +135,40 @@ class FeedforwardPID(PID):
         """As `PID.reset`, and compute the feed-forward, which holds the drive's offset itself."""
         super().reset(reference, station)
         self._open_loop.reset(reference, station)
-        self._offset = 0.0
+        self._offset, self._delay = 0.0, station.action_delay
 
     def feedforward(self, time: float) -> float:
-        """Voltage of the feed-forward (V)."""
-        return self._open_loop.voltage(time)
+        """Voltage of the feed-forward (V) that is due when a command of now is in force."""
+        return self._open_loop.voltage(time + self._delay)
+
+
+def linear_law(
+    gains: Gains, period: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """A, B, C, D of the PID between the limits: voltage (V) by error (m or rad).
+
+        C(z) = k_p + k_i T / (z - 1) + k_d (z - 1) / ((tau_f + T) z - tau_f)
+
+    Args:
+        gains: in force at the place, see `Gains.scaled`.
+        period: control period T (s).
+    """
+    total = gains.filter + period
+    share, slope = gains.filter / total, gains.derivative / total
+    a, c = np.diag([1.0, share]), np.ones((1, 2))
+    b = np.array([[gains.integral * period], [(share - 1.0) * slope]])
+    return a, b, c, np.array([[gains.proportional + slope]])
 
 
 def nominal_offset(station: Station) -> float:
-    """Motor voltage (V) at which the nominal drive just begins to pull; 0 without a drive."""
-    drive = station.model.parameters.get("drive")
+    """Voltage (V) that changes nothing of how a trial begins.
+
+    Of the motor the one at which the nominal drive just begins to pull, 0 without a drive; of the
+    regulator the one that holds the pressure.
+    """
+    parameters = station.model.parameters
+    if station.task.actuator == "regulator":
+        line = parameters["regulator_line"]
+        return (station.pressure - line.offset) / line.gain
+    drive = parameters.get("drive")
     return max(0.0, -drive.offset / drive.gain) if drive else 0.0

@@ -1,10 +1,10 @@
 """How all plots look: one colour and one marker for each controller, in every picture."""
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -12,16 +12,30 @@ from matplotlib.figure import Figure
 
 from benchmarks.suite import Suite
 
-# Okabe and Ito's palette: told apart by the colour-blind, and in grey by the order of lightness.
-_FIXED = {
-    "serres_replay": ("#D55E00", "s"),
-    "serres_feedforward": ("#CC79A7", "D"),
-    "improved_feedforward": ("#E69F00", "^"),
-    "pid": ("#0072B2", "v"),
-    "feedforward_pid": ("#009E73", "o"),
-    "policy": ("#56B4E9", "P"),
+Dashes = Literal["-", "--", "-.", ":"]
+
+# Okabe and Ito's palette, told apart by the colour-blind and in grey by the order of lightness;
+# then three of Tol's darker ones. Marker and line tell apart what a weak printer does not.
+_FIXED: dict[str, tuple[str, str, Dashes]] = {
+    "serres_replay": ("#D55E00", "s", "-"),
+    "serres_feedforward": ("#CC79A7", "D", "-"),
+    "improved_feedforward": ("#E69F00", "^", "-"),
+    "pid": ("#0072B2", "v", "-"),
+    "feedforward_pid": ("#009E73", "o", "-"),
+    "lqg": ("#882255", "<", "--"),
+    "adrc": ("#999933", "X", "--"),
+    "sliding_mode": ("#CC79A7", "h", "--"),
+    "mpc": ("#332288", "p", "--"),
+    "ilc": ("#D55E00", "d", "--"),
+    "oracle": ("#000000", "*", ":"),
+    "policy": ("#56B4E9", "P", "-"),
 }
-_OTHERS = (("#CC79A7", "D"), ("#56B4E9", "P"), ("#8C564B", "X"), ("#7F7F7F", "*"))
+_OTHERS: tuple[tuple[str, str, Dashes], ...] = (
+    ("#CC79A7", "D", "-."),
+    ("#56B4E9", "P", "-."),
+    ("#8C564B", "X", "-."),
+    ("#7F7F7F", "*", "-."),
+)
 
 REFERENCE = {"color": "#000000", "linestyle": (0, (5, 3)), "linewidth": 1.1}
 MEASURED = {"color": "#666666", "linewidth": 2.6, "alpha": 0.75}
@@ -53,22 +67,34 @@ class Style:
         label: in legends.
         color: of its lines, bars and markers.
         marker: of its points.
+        line: dashes of its lines, where many are drawn in one panel.
     """
 
     label: str
     color: str
     marker: str
+    line: Dashes = "-"
 
 
 def controller_styles(suite: Suite) -> dict[str, Style]:
     """A style for each controller of a suite, by name."""
-    taken = {_FIXED[c.name][0] for c in suite.controllers if c.name in _FIXED}
+    return styles_of({controller.name: controller.label for controller in suite.controllers})
+
+
+def styles_of(labels: Mapping[str, str]) -> dict[str, Style]:
+    """A style for each controller of a report.
+
+    Args:
+        labels: what people call the controllers, by name.
+    Returns:
+        Its own for one that the package has, one of the free ones for another, by name.
+    """
+    taken = {_FIXED[name][0] for name in labels if name in _FIXED}
     free = [other for other in _OTHERS if other[0] not in taken]
     styles = {}
-    for controller in suite.controllers:
-        strange = controller.name not in _FIXED
-        color, marker = free[len(styles) % len(free)] if strange else _FIXED[controller.name]
-        styles[controller.name] = Style(controller.label, color, marker)
+    for name, label in labels.items():
+        own = _FIXED[name] if name in _FIXED else free[len(styles) % len(free)]
+        styles[name] = Style(label, *own)
     return styles
 
 

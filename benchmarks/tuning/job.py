@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
+from controllers.designs import loop_name, task_kind
 from controllers.pid import PID
 from pma_gym.data.protocol import Protocol
+from pma_gym.envs import Station
 from pma_gym.plant.model import Model
-from pma_gym.tasks import TASKS
-
-CONTROL_RATE_HZ = 100.0
+from pma_gym.tasks import EVERY_TASK
 
 START_FACTOR = 0.3
 """Factor on the gains of the PID where the cable may go slack; see `Gains.scaled`. Set by hand: of
@@ -20,10 +20,12 @@ class Job:
 
     Attributes:
         model: model to tune on.
-        task: `displacement` or `rotation`.
+        task: name of the task that is tried.
         controller: one of `CONTROLLERS`.
-        pressure_kpa: gauge pressure (kPa).
+        pressure_kpa: gauge pressure that trials begin at (kPa).
         seed: seed of the sensors' noise on the nominal station; the others get the next ones.
+        rate_hz: control rate (Hz).
+        delay_s: how late a command reaches the station (s), whole periods.
     """
 
     model: Model
@@ -31,11 +33,29 @@ class Job:
     controller: str
     pressure_kpa: float
     seed: int
+    rate_hz: float = 100.0
+    delay_s: float = 0.0
+
+    @property
+    def station(self) -> Station:
+        """What a controller of the row is told."""
+        task, pressure = EVERY_TASK[self.task], self.pressure_kpa * 1e3
+        return Station(self.model, task, pressure, 1.0 / self.rate_hz, self.delay_s)
+
+    @property
+    def loop(self) -> str:
+        """Name of its loop, such as `50hz_delay20ms`."""
+        return loop_name(self.station)
+
+    @property
+    def kind(self) -> str:
+        """Kind of its task: the tables are of one kind each."""
+        return task_kind(self.station)
 
     @property
     def protocol(self) -> Protocol:
         """The task's protocol."""
-        return TASKS[self.task].protocol
+        return EVERY_TASK[self.task].protocol
 
     @property
     def start_factor(self) -> float:

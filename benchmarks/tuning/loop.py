@@ -1,64 +1,39 @@
 """The linearised loop of a row: where its gains start from, and how large its sensitivity is."""
 
 import math
-from collections.abc import Iterable
-from typing import Any
 
-import control
 import numpy as np
 
-from benchmarks.tuning.job import CONTROL_RATE_HZ, Job
+from benchmarks.tuning.job import Job
+from benchmarks.tuning.plant import linearised, sampled
 from controllers.gains import Gains
-from controllers.pid import PID
-from pma_gym.plant.linear import linearize
-from pma_gym.plant.plant import Plant
-
-SENSORS = {"extension": "lvdt", "rotation": "potentiometer"}
-
-STROKES = (0.05, 0.5, 0.95)
-"""Places of the stroke at which the margin is judged, as shares of it."""
+from controllers.pid import PID, linear_law
 
 
 class Loop:
     """The linearised loop of a job in discrete time, at several places of the stroke."""
 
     def __init__(self, job: Job) -> None:
-        self.period = 1.0 / CONTROL_RATE_HZ
-        places = _linearised(job)
-        self.shares = [share for share, _ in places]
-        self.plants = [self._sampled(job, system) for _, system in places]
+        station = job.station
+        self.period = station.period
+        places = linearised(station)
+        systems = [sampled(place, station) for place in places]
+        self.shares = [place.share for place in places]
+        self.plants = [tuple(map(np.asarray, (s.A, s.B, s.C))) for s in systems]
         corners = np.linspace(0.0, math.pi, 301)[1:]
         self.z = np.exp(1j * corners)
         self.responses = [self._response(*plant) for plant in self.plants]
 
-    def _sampled(self, job: Job, system: control.StateSpace) -> tuple[np.ndarray, ...]:
-        """A, B, C of plant and sensor, the voltage held over each period."""
-        quantity = job.protocol.quantity
-        one = system[quantity, "motor_voltage"]
-        sensor = job.model.parameters.get(SENSORS[quantity])
-        if sensor is not None:
-            one = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0]) * one
-        held: Any = control.ss(control.sample_system(one, self.period, method="zoh"))
-        return np.asarray(held.A), np.asarray(held.B), np.asarray(held.C)
-
     def _response(self, a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
         inverse = np.linalg.inv(self.z[:, None, None] * np.eye(len(a)) - a)
         return (c @ inverse @ b)[:, 0, 0]
-
-    def _controller(self, gains: Gains) -> tuple[np.ndarray, ...]:
-        """A, B, C, D of the PID as `controllers.pid` computes it."""
-        total = gains.filter + self.period
-        share, slope = gains.filter / total, gains.derivative / total
-        a, c = np.diag([1.0, share]), np.ones((1, 2))
-        b = np.array([[gains.integral * self.period], [(share - 1.0) * slope]])
-        return a, b, c, np.array([[gains.proportional + slope]])
 
     def sensitivity(self, gains: Gains) -> float:
         """Largest sensitivity |1 / (1 + C G)| over all places; infinite if one is unstable."""
         largest = 0.0
         for share, plant, response in zip(self.shares, self.plants, self.responses, strict=True):
             pa, pb, pc = plant
-            a, b, c, d = self._controller(gains.scaled(share))
+            a, b, c, d = linear_law(gains.scaled(share), self.period)
             closed = np.block([[pa - pb @ d @ pc, pb @ c], [-b @ pc, a]])
             if np.abs(np.linalg.eigvals(closed)).max() >= 1.0:
                 return math.inf
@@ -67,38 +42,20 @@ class Loop:
         return largest
 
 
-def _linearised(
-    job: Job, shares: Iterable[float] = STROKES
-) -> list[tuple[float, control.StateSpace]]:
-    """The plant at places of the stroke (shares of it), in the task's directions of motion."""
-    plant, pressure = Plant(job.model), job.pressure_kpa * 1e3
-    zero = plant.settle(0.0, pressure=pressure).zero_contraction
-    stroke = job.protocol.span
-    directions = ["relaxing"]
-    if job.protocol.quantity == "rotation":
-        parameters = job.model.parameters
-        stroke *= parameters["rotor" if "rotor" in parameters else "servo"].radius
-        directions.append("contracting")
-    systems = []
-    for share in shares:
-        for direction in directions:
-            try:
-                system = linearize(plant, pressure, zero - share * stroke, direction)
-            except ValueError:
-                continue  # no voltage reaches that far at this pressure
-            systems.append((share, system))
-    return systems
-
-
 def lambda_tuning(job: Job) -> np.ndarray:
     """k_p, k_i, k_d (SI), end factor and, for the PID alone, lead (s) to start from."""
-    ((_, system), *_) = _linearised(job, [0.5])
-    one = system[job.protocol.quantity, "motor_voltage"]
-    period = 1.0 / CONTROL_RATE_HZ
+    station = job.station
+    (place, *_) = linearised(station, [0.5])
+    one = place.system[job.protocol.quantity, f"{station.task.actuator}_voltage"]
+    period, delay = station.period, station.action_delay
     gain = float(np.real(one.dcgain()))
     # Area between the step response and its end over the gain: the sum of all time constants.
     high, low = (float(np.real(one(s))) for s in (1e-4, -1e-4))
     lag = max((low - high) / 2e-4 / gain, period)
-    integral = 1.0 / (gain * (2.0 * period + 0.5 * period))
+    integral = 1.0 / (gain * (2.0 * period + delay + 0.5 * period + delay))
+    ahead = 0.5 * period
+    if station.task.actuator == "regulator":
+        # Its lag is about the muscle's. The derivative makes up for one of the two, half filtered.
+        integral, ahead = 0.5 * integral, 0.25 * lag
     lead = [1.0 / (gain * integral)] if job.controller == PID.name else []
-    return np.array([lag * integral, integral, 0.5 * lag * integral * period, 1.0, *lead])
+    return np.array([lag * integral, integral, ahead * lag * integral, 1.0, *lead])

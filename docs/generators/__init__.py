@@ -23,6 +23,7 @@ from generators.files import calibrations, columns, raw_columns, tables
 from generators.models import differences, identification, misfit, parameters, shipped
 from generators.source import misprints, rates, verdicts, wrong_in_print
 from generators.suite import controllers, example, targets, trials, tuning
+from generators.suites import deals, occasional, suites
 
 GENERATORS: dict[str, Callable[..., str]] = {
     function.__name__: function
@@ -33,6 +34,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(differences, identification, misfit, parameters, shipped),
         *(misprints, rates, verdicts, wrong_in_print),
         *(controllers, example, targets, trials, tuning),
+        *(suites, deals, occasional),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

@@ -194,6 +194,9 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._places = record.places
         self._row = self._engine.records[0, :, 0]
         self._tail = self._row[self._places["ended"] :]
+        # The record holds a reading's parts side by side.
+        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._heard = slice(heard, heard + len(PARTS))
         self._info = info_maker(record.info)
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
@@ -311,9 +314,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def reading(self) -> Reading:
         """What the sensors say now, as late as `observation_delay_s` makes them."""
-        delay = self.options.observation_delay
-        taken = max(self._count - delay, 0) * self.options.period
-        return Reading(taken, *(self._number(f"{part}_{delay}") for part in PARTS))
+        taken = max(self._count - self.options.observation_delay, 0) * self.options.period
+        return Reading(taken, *self._row[self._heard].tolist())
 
     @property
     def truth(self) -> dict[str, float]:

@@ -16,6 +16,7 @@ from benchmarks.processes import run_all
 from benchmarks.results import Results, csv_text
 from benchmarks.rollout import make_environment, rollout
 from benchmarks.suite import load_suite
+from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
 ROOT = Path(__file__).parents[2]
@@ -188,3 +189,51 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     # The cases in progress are dropped: two are done when the fourth begins.
     assert 2 <= len(rows) < 9
     assert (out / "scores.csv").read_text() == "earlier\n"
+
+
+class Learns(Returns):
+    """Counts its episodes and what it is shown."""
+
+    repetitions = 3
+
+    def __init__(self):
+        super().__init__(2.0)
+        self.told, self.heard = [], []
+
+    def see(self, environment):
+        self.told.append((environment.time, environment.condition.zero_contraction))
+
+    def reset(self, reference, station):
+        self.told.append(station.model.name)
+        self.heard.append([])
+
+    def act(self, observation, time):
+        self.heard[-1].append(observation)
+        return 2.0
+
+
+def test_a_controller_that_learns_practises_and_its_last_episode_counts():
+    environment, learns = make_environment("displacement", MODEL, 300), Learns()
+    nominal = load_model("station")
+    done = rollout(environment, learns, seed=5, nominal=nominal)
+    shown, models = learns.told[::2], learns.told[1::2]
+    assert len(set(shown)) == 1 and shown[0][0] == 0.0
+    assert models == ["station"] * 3
+    # Each episode has a noise of its own.
+    assert len({tuple(heard) for heard in learns.heard}) == 3
+    plain = rollout(environment, Returns(2.0), seed=5)
+    assert np.array_equal(done.readings, plain.readings)
+    assert np.array_equal(done.position, plain.position)
+
+
+def test_a_rollout_holds_what_figures_need():
+    environment = make_environment("displacement", MODEL, 300)
+    done = rollout(environment, Returns(2.0), seed=1)
+    assert done.steps == len(done.act_seconds) == len(done.commands) == 501
+    assert {name: len(values) for name, values in done.truth.items()} == dict.fromkeys(
+        ("contraction", "load", "pressure"), 502
+    )
+    assert np.all(done.act_seconds > 0.0) and np.all(done.commands[:, 0] == 2.0)
+    # The rig's zero is where the trial began.
+    assert done.truth["contraction"][0] == done.start
+    assert done.position[-1] == pytest.approx(done.start - done.truth["contraction"][-1], abs=1e-4)

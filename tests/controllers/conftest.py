@@ -3,7 +3,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from controllers import Controller
+from controllers import Controller, Oracle
 from pma_gym.envs import PMAEnv, Reading, Station
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS
@@ -23,8 +23,8 @@ def station() -> Callable[..., Station]:
 def reading() -> Callable[..., Reading]:
     """What the sensors say, zero where nothing is given (SI)."""
 
-    def make(extension=0.0, rotation=0.0, time=0.0):
-        return Reading(time, extension, rotation, 0.0, 300e3)
+    def make(extension=0.0, rotation=0.0, time=0.0, load=0.0):
+        return Reading(time, extension, rotation, load, 300e3)
 
     return make
 
@@ -36,6 +36,8 @@ def drive() -> Callable[..., tuple[dict[str, float], np.ndarray]]:
     def run(controller: Controller, task, pressure_kpa, model="station", seed=1, **options):
         env = PMAEnv(task, model=model, pressure_kpa=float(pressure_kpa), **options)
         env.reset(seed=seed)
+        if isinstance(controller, Oracle):
+            controller.see(env)
         controller.reset(env.reference, env.station)
         ended, info = False, {}
         while not ended:
@@ -45,6 +47,6 @@ def drive() -> Callable[..., tuple[dict[str, float], np.ndarray]]:
             ended = terminated or truncated
         assert info["ended_by"] is None
         by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
-        return by_phase, env.motor_voltages
+        return by_phase, env.voltages
 
     return run

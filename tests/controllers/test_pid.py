@@ -157,12 +157,12 @@ def test_a_model_of_one_s_own_gets_the_gains_of_its_plant(station):
 
 def test_missing_gains_say_how_to_tune_them(station, tmp_path):
     path = tmp_path / "gains.json"
-    path.write_text('{"schema": 1, "models": {}}')
+    path.write_text('{"schema": 2, "models": {}}')
     with pytest.raises(ValueError, match=r"no gains of pid for the rotation task.*tune --model"):
         scheduled_gains("pid", station("rotation"), path)
     path = tmp_path / "old.json"
     path.write_text('{"schema": 0}')
-    with pytest.raises(ValueError, match=r"must have schema 1, got 0; write it anew"):
+    with pytest.raises(ValueError, match=r"must have schema 2, got 0; write it anew"):
         scheduled_gains("pid", station("rotation"), path)
 
 

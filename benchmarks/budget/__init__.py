@@ -1,0 +1,1 @@
+"""Why open-loop control misses: `python -m benchmarks budget`."""

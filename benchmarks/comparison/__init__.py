@@ -1,0 +1,1 @@
+"""Suites that tell controllers apart: cases, runs, figures, statistics, leaderboards."""

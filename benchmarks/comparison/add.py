@@ -1,0 +1,163 @@
+"""`python -m benchmarks add`: somebody's own controller on every suite, beside the others."""
+
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from benchmarks.comparison.case import BY_LIMIT, Row
+from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
+from benchmarks.comparison.guard import probe
+from benchmarks.comparison.leaderboard import read_leaderboard
+from benchmarks.comparison.provenance import check_folder, run_info, write_run
+from benchmarks.comparison.scores import print_failures
+from benchmarks.comparison.standings import Standings
+from benchmarks.comparison.suite import FrozenSuite
+from benchmarks.contender import Contender, ControllerError
+from benchmarks.processes import run_all
+from controllers import CONTROLLERS
+
+ENOUGH = 3
+"""Cases of a suite that may fail before the rest of it is left: they would fail alike. An end by a
+physical limit is a result, and does not count."""
+
+FAILED, INTERRUPTED = 1, 130
+"""Exit codes."""
+
+
+class _EnoughError(Exception):
+    """The rest of a suite is not worth running."""
+
+
+def own_contender(text: str) -> Contender:
+    """The controller of `path/to/file.py:ClassName`, tried in a process of its own.
+
+    Raises:
+        ControllerError: it cannot be made, or takes too long to; says why and the mend.
+    """
+    path, colon, name = text.rpartition(":")
+    if not colon or not path or not name:
+        raise ControllerError(
+            f"name a file and its class as path/to/file.py:ClassName, got {text!r}"
+        )
+    if name in CONTROLLERS:
+        raise ControllerError(f"{name} is a controller of the suites; rename the class in {path}")
+    contender = Contender(name, path=str(Path(path).resolve()))
+    if not Path(path).is_file():
+        raise ControllerError(f"there is no file {path}; check the name and the folder")
+    found: list[object] = []
+    works = [partial(probe, contender)]
+    if not run_all(works, 1, lambda index, result: found.append(result), wary=True):
+        raise KeyboardInterrupt
+    (result,) = found
+    if isinstance(result, ControllerError):
+        raise result
+    if isinstance(result, BaseException):
+        raise ControllerError(f"cannot make {text}: {result}")
+    return Contender(name, str(result), contender.path)
+
+
+def run_add(
+    contender: Contender, suites: Sequence[FrozenSuite], results: Path, jobs: int, console: Console
+) -> int:
+    """Score somebody's own controller and say where it stands.
+
+    Args:
+        contender: from `own_contender`.
+        suites: what to run.
+        results: folder with a folder of results for each suite.
+        jobs: processes.
+        console: where to print.
+    Returns:
+        Exit code: 0, 1 if a case failed, 130 if it was interrupted.
+    """
+    failed = False
+    for suite in suites:
+        out = results / suite.name
+        check_folder(suite, out)
+        todo = plan(suite, [suite.entry(contender)], out)
+        rows = list(todo.known.values())
+        console.print(
+            f"[bold]{suite.name}[/] version {suite.version}: {len(todo.cases)} cases of "
+            f"{contender.label}, {len(rows)} of them done before",
+            highlight=False,
+        )
+        info = run_info(todo, [suite.entry(contender)], out, jobs)
+        write_run(out, info, complete=False)
+        complete = _run(todo, out, jobs, rows, console)
+        write_run(out, info, complete=bool(complete))
+        failed |= any(row["failure"] for row in rows)
+        print_failures(rows, console)
+        if complete is None:
+            console.print(
+                f"[yellow]Interrupted:[/] {len(rows)} of {len(todo.cases)} cases are done and "
+                "stay; the same command goes on from there.",
+                highlight=False,
+            )
+            return INTERRUPTED
+        if complete:
+            _say_ranks(contender, suite, out, console)
+    return FAILED if failed else 0
+
+
+def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) -> bool | None:
+    """Run what is missing, adding to the rows; whether it was worth it to the end.
+
+    Returns:
+        True if all is done, False if it failed too often, None if Ctrl-C ended it.
+    """
+    if not todo.missing:
+        return True
+    troubles = 0
+    with console.status("drawing the stations, compiling their equations"):
+        compile_kernels(todo.suite)
+    with Progress(console=console, transient=True) as progress:
+        bar = progress.add_task(todo.suite.name, total=len(todo.cases), completed=len(rows))
+
+        def on_done(row: Row) -> None:
+            nonlocal troubles
+            rows.append(row)
+            progress.update(bar, advance=1)
+            troubles += bool(row["failure"]) and BY_LIMIT not in row["failure"]
+            if troubles >= ENOUGH:
+                raise _EnoughError
+
+        try:
+            done = execute(todo, jobs, out, on_done, wary=True)
+        except _EnoughError:
+            console.print(
+                f"  [red]{ENOUGH} cases failed[/]: the other {len(todo.cases) - len(rows)} are "
+                "not run; mend it and run the same command again",
+                highlight=False,
+            )
+            return False
+    return True if done else None
+
+
+def _say_ranks(contender: Contender, suite: FrozenSuite, out: Path, console: Console) -> None:
+    """Its line in every measure of a suite, beside the other controllers in the folder."""
+    leaderboard = read_leaderboard(suite, out)
+    for name, standings in leaderboard.standings.items():
+        if contender.name in standings.errors.names:
+            console.print(f"  {name}: {_line(contender, standings)}", highlight=False)
+    others = {name for name, _ in leaderboard.record.rows} - {contender.name}
+    if not others:
+        console.print(
+            f"  no other controller has results in {out} made with this code; for a rank: "
+            f"python -m benchmarks run --suite {suite.source}",
+            highlight=False,
+        )
+
+
+def _line(contender: Contender, standings: Standings) -> str:
+    mine = next(row for row in standings.rows if row.name == contender.name)
+    unit = standings.errors.measure.unit
+    words = f"{mine.mean.estimate:.3g} {unit} ({mine.mean.low:.3g} to {mine.mean.high:.3g})"
+    rivals = len(standings.rivals)
+    if mine.rank is not None and rivals > 1:
+        words += f", rank {mine.rank} of {rivals}"
+    if mine.failures:
+        words += f", {mine.failures} cases failed"
+    return words

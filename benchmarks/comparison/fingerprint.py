@@ -1,0 +1,71 @@
+"""What a row was computed with: a row is used again only where all of it is the same."""
+
+import hashlib
+from functools import cache
+from importlib import metadata
+from pathlib import Path
+
+from benchmarks.comparison.suite import FrozenSuite
+from benchmarks.contender import Contender
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SOURCES = (
+    "pma_gym/**/*.py",
+    "pma_gym/**/*.toml",
+    "pma_gym/**/*.csv",
+    "controllers/**/*.py",
+    "controllers/**/*.json",
+    "benchmarks/rollout.py",
+    "benchmarks/contender.py",
+    "benchmarks/suite.py",
+    "benchmarks/worker.py",
+    "benchmarks/comparison/ability.py",
+    "benchmarks/comparison/case.py",
+    "benchmarks/comparison/figures.py",
+    "benchmarks/comparison/guard.py",
+    "benchmarks/comparison/recipe.py",
+    "benchmarks/comparison/stations.py",
+    "benchmarks/comparison/suite.py",
+)
+"""Files that a figure may depend on. Pages and statistics are made from rows, and are not here."""
+
+PACKAGES = ("numpy", "scipy", "control", "osqp", "llvmlite", "gymnasium")
+"""Packages whose versions a figure may depend on."""
+
+
+def key(suite: FrozenSuite, contender: Contender) -> str:
+    """Fingerprint of everything that a controller's rows of a suite depend on.
+
+    The suite's numbers, this repository's code, the packages' versions, and for a controller of
+    somebody's own its file. What that file imports or reads besides is not looked at.
+    """
+    parts = [suite.name, str(suite.version), suite.digest, code_digest(), contender.name]
+    if contender.path:
+        parts.append(_digest([Path(contender.path)]))
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
+
+
+@cache
+def code_digest() -> str:
+    """Digest of the repository's code and of the packages' versions."""
+    files = sorted(path for pattern in SOURCES for path in ROOT.glob(pattern))
+    versions = [f"{name} {_version(name)}" for name in PACKAGES]
+    return hashlib.sha256("\n".join([_digest(files), *versions]).encode()).hexdigest()[:16]
+
+
+def _version(package: str) -> str:
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return "missing"
+
+
+def _digest(files: list[Path]) -> str:
+    digest = hashlib.sha256()
+    for path in files:
+        content = path.read_bytes()
+        name = path.relative_to(ROOT) if path.is_relative_to(ROOT) else path.name
+        digest.update(f"{name} {len(content)}\n".encode())
+        digest.update(content)
+    return digest.hexdigest()

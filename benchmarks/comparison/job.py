@@ -1,0 +1,166 @@
+"""`python -m benchmarks run`: compare controllers on a frozen suite, and go on where it stopped."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from benchmarks.comparison.case import Row
+from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
+from benchmarks.comparison.journal import JOURNAL
+from benchmarks.comparison.provenance import check_folder, run_info, write_run, write_stations
+from benchmarks.comparison.scores import print_scores, write_scores
+from benchmarks.comparison.suite import Entry, FrozenSuite
+from benchmarks.contender import ControllerError, parse_contenders
+
+FAILED, INTERRUPTED = 1, 130
+"""Exit codes."""
+
+
+def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
+    """Entries of a list as the command line has it: names, files with a class, or `all`.
+
+    Raises:
+        ControllerError: one that cannot be made, or two of one name.
+    """
+    if controllers.strip() in ("", "all"):
+        return list(suite.entries)
+    known = [entry.contender for entry in suite.entries]
+    entries = [suite.entry(contender) for contender in parse_contenders(controllers, known)]
+    by_name: dict[str, Entry] = {}
+    for entry in entries:
+        rival = by_name.setdefault(entry.contender.name, entry).contender
+        if rival.source != entry.contender.source:
+            raise ControllerError(
+                f"two controllers are called {rival.name}: {rival.source} and "
+                f"{entry.contender.source}; rename one class"
+            )
+    return list(by_name.values())
+
+
+def run_comparison(
+    suite: FrozenSuite, entries: Sequence[Entry], out: Path, jobs: int, console: Console
+) -> int:
+    """Run what is missing of a suite and write its scores.
+
+    Args:
+        suite: the suite.
+        entries: controllers to run.
+        out: folder of the results; made if need be.
+        jobs: processes.
+        console: where to print.
+    Returns:
+        Exit code: 0, 1 if a case failed, 130 if it was interrupted.
+    Raises:
+        SuiteError: the folder has another suite's results.
+    """
+    began = time.perf_counter()
+    check_folder(suite, out)
+    todo = plan(suite, entries, out)
+    console.print(_greeting(todo, entries, out, jobs), highlight=False)
+    info = run_info(todo, entries, out, jobs)
+    write_run(out, info, complete=False)
+    rows = list(todo.known.values())
+    try:
+        complete = _run(todo, entries, out, jobs, rows, console)
+    except KeyboardInterrupt:
+        complete = False
+    finally:
+        info["wall_time_s"] = time.perf_counter() - began
+    if not complete:
+        return _leave(todo, rows, out, console)
+    write_scores(out, todo, rows)
+    write_run(out, info, complete=True)
+    print_scores(todo, entries, rows, console)
+    console.print(f"Leaderboard: python -m benchmarks report {suite.source}", highlight=False)
+    return FAILED if any(row["failure"] for row in rows) else 0
+
+
+def _run(
+    todo: Plan,
+    entries: Sequence[Entry],
+    out: Path,
+    jobs: int,
+    rows: list[Row],
+    console: Console,
+) -> bool:
+    """Run what is missing; adds to the rows."""
+    if not todo.missing:
+        return True
+    with console.status("drawing the stations, compiling their equations"):
+        write_stations(out, todo.suite)
+        compile_kernels(todo.suite)
+    with _progress(console) as progress:
+        advance = _bars(progress, todo, entries)
+
+        def on_done(row: Row) -> None:
+            rows.append(row)
+            advance(row)
+
+        return execute(todo, jobs, out, on_done)
+
+
+def _greeting(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> str:
+    suite, done = todo.suite, len(todo.known)
+    words = (
+        f"Suite {suite.name} version {suite.version}: {len(suite.stations)} stations, "
+        f"{len(suite.episodes)} episodes, {len(entries)} controllers: {len(todo.cases)} cases, "
+        f"{jobs} at a time"
+    )
+    if done:
+        words += f"\n{done} cases are done in {out / JOURNAL} and used again"
+    if todo.outdated:
+        words += (
+            f"\n{todo.outdated} rows there were made with other code, another version or another "
+            "file of these controllers; they stay there, are not used, and their cases run anew"
+        )
+    return words
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]}"),
+        console=console,
+    )
+
+
+def _bars(progress: Progress, todo: Plan, entries: Sequence[Entry]) -> Callable[[Row], None]:
+    """A bar for each controller and one for all, which rows move on."""
+    wanted = Counter(case.contender.name for case in todo.cases)
+    done = Counter(name for name, _ in todo.known)
+    failures = Counter[str]()
+    bars = {
+        entry.contender.name: progress.add_task(
+            entry.contender.label,
+            total=wanted[entry.contender.name],
+            completed=done[entry.contender.name],
+            failed="",
+        )
+        for entry in entries
+    }
+    whole = progress.add_task("all", total=len(todo.cases), completed=len(todo.known), failed="")
+
+    def advance(row: Row) -> None:
+        name = row["controller"]
+        failures[name] += bool(row["failure"])
+        words = f"{failures[name]} failed" if failures[name] else ""
+        progress.update(bars[name], advance=1, failed=words)
+        progress.update(whole, advance=1)
+
+    return advance
+
+
+def _leave(todo: Plan, rows: Sequence[Row], out: Path, console: Console) -> int:
+    console.print(
+        f"[yellow]Interrupted:[/] {len(rows)} of {len(todo.cases)} cases are done and stay in "
+        f"{out / JOURNAL}. The same command goes on from there.",
+        highlight=False,
+    )
+    return INTERRUPTED

@@ -1,0 +1,165 @@
+"""A suite's leaderboard: all that its page is made from, read from what a run left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+from benchmarks.bound import achievable_bound
+from benchmarks.comparison.errors import (
+    Errors,
+    Measure,
+    Record,
+    measures,
+    pooled_measure,
+    task_of,
+)
+from benchmarks.comparison.provenance import finished_rows, read_run
+from benchmarks.comparison.standings import Standings
+from benchmarks.comparison.suite import Entry, FrozenSuite
+from benchmarks.comparison.verdicts import Verdict, verdicts
+from benchmarks.margins import Condition, conditions, is_linear
+from benchmarks.suite import SuiteError
+from controllers import CONTROLLERS
+from pma_gym.envs import Station
+from pma_gym.tasks import TASKS, obstacle
+
+
+@dataclass(frozen=True)
+class Leaderboard:
+    """All that a suite's page is made from.
+
+    Attributes:
+        record: the suite and its rows.
+        info: what the run was made with; empty if that is not known.
+    """
+
+    record: Record
+    info: Mapping[str, Any]
+
+    @property
+    def suite(self) -> FrozenSuite:
+        """The suite."""
+        return self.record.suite
+
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """What people call the controllers, by name, in the suite's order."""
+        titles = {name: entry["title"] for name, entry in self.info.get("contenders", {}).items()}
+        entries = (entry.contender for entry in self.record.entries)
+        return {each.name: each.title or titles.get(each.name, each.name) for each in entries}
+
+    @cached_property
+    def standings(self) -> dict[str, Standings]:
+        """Standings by measure: each kind of task, each way, and all tasks if there are several."""
+        tasks = self.suite.tasks
+        wanted = measures(tasks)
+        if len(wanted) > 1:
+            wanted.append(pooled_measure(tasks))
+        return {measure.name: self.standings_of(measure) for measure in wanted}
+
+    @cached_property
+    def by_task(self) -> dict[str, Standings]:
+        """Standings in every single task, phase III left out, where measures hold several."""
+        if all(len(each.tasks) == 1 for each in measures(self.suite.tasks)):
+            return {}
+        single = [Measure(t, (t,), task_of(t).protocol.unit) for t in self.suite.tasks]
+        found = {measure.name: self.standings_of(measure) for measure in single}
+        return {name: each for name, each in found.items() if each.errors.values.size}
+
+    def standings_of(self, measure: Measure) -> Standings:
+        """Standings in a measure."""
+        errors = self.record.errors(measure)
+        return Standings(errors, self._failed(errors))
+
+    def _failed(self, errors: Errors) -> tuple[int, ...]:
+        rows = self.record.rows
+        return tuple(
+            sum(bool(rows[name, episode]["failure"]) for episode in errors.episodes)
+            for name in errors.names
+        )
+
+    def whole(self, standings: Standings) -> bool:
+        """Whether a measure's standings rest on all of its cases."""
+        tasks = standings.errors.measure.tasks
+        wanted = sum(episode.task in tasks for episode in self.suite.episodes)
+        return len(standings.errors.episodes) == wanted and bool(standings.errors.names)
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """The suite's targets; only what all cases have been run for has a figure."""
+        known = {name: each for name, each in self.standings.items() if self.whole(each)}
+        units = {name: each.errors.measure.unit for name, each in self.standings.items()}
+        return verdicts(self.suite.targets, known, self.labels, units, self._bound)
+
+    def _bound(self, task: str, pressure_kpa: float) -> float:
+        return least_return_error(self.suite.model, task, pressure_kpa)
+
+    @property
+    def missing(self) -> list[Entry]:
+        """Controllers of the suite without a single row."""
+        return [entry for entry in self.record.entries if not self.record.done(entry)[0]]
+
+    @property
+    def incomplete(self) -> list[tuple[Entry, int, int]]:
+        """Controllers with some of their rows, how many, and of how many."""
+        counts = [(entry, *self.record.done(entry)) for entry in self.record.entries]
+        return [(entry, done, wanted) for entry, done, wanted in counts if 0 < done < wanted]
+
+    @cached_property
+    def obstacles(self) -> dict[tuple[str, float], str]:
+        """Why the nominal actuator cannot follow, by task and pressure (kPa), where it cannot."""
+        trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
+        model = self.suite.nominal
+        known = {(t, kpa): obstacle(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
+        return {trial: why for trial, why in known.items() if why is not None}
+
+    @cached_property
+    def loops(self) -> dict[str, list[Condition]]:
+        """Loops of the linear controllers, by task, at its lowest, middle and highest pressure."""
+        found = {}
+        for task in self.suite.tasks:
+            names = [e.contender.name for e in self.record.entries if e.does(task)]
+            own = [CONTROLLERS[name]() for name in names if name in CONTROLLERS]
+            if task in TASKS and any(map(is_linear, own)):
+                found[task] = conditions(own, self._told(task))
+        return found
+
+    def _told(self, task: str) -> list[Station]:
+        """What controllers are told at three pressures of a task."""
+        suite, environment = self.suite, self.suite.environment
+        kpa = sorted({e.pressure_kpa for e in suite.episodes if e.task == task})
+        delays = [environment.get(f"{name}_delay_s", 0.0) for name in ("action", "observation")]
+        return [
+            Station(suite.nominal, TASKS[task], 1e3 * each, 1.0 / suite.control_rate_hz, *delays)
+            for each in dict.fromkeys((kpa[0], kpa[len(kpa) // 2], kpa[-1]))
+        ]
+
+
+@cache
+def least_return_error(model: str, task: str, pressure_kpa: float) -> float:
+    """The achievable bound of phase III (mm or deg), computed once."""
+    return achievable_bound(model, task, pressure_kpa)["III"]
+
+
+def read_leaderboard(suite: FrozenSuite, folder: Path) -> Leaderboard:
+    """The leaderboard of the results in a folder.
+
+    Raises:
+        SuiteError: there are none, or they are of another suite or version.
+    """
+    info, rows = read_run(folder), finished_rows(folder)
+    if not rows:
+        raise SuiteError(
+            f"{folder} has no results of suite {suite.name}; make some: python -m benchmarks run "
+            f"--suite {suite.source}"
+        )
+    ran = info.get("suite", {})
+    if (ran.get("name"), ran.get("digest")) != (suite.name, suite.digest):
+        raise SuiteError(
+            f"{folder} has results of suite {ran.get('name')} version {ran.get('version')} with "
+            f"other numbers than {suite.source} version {suite.version} has now; run it again: "
+            f"python -m benchmarks run --suite {suite.source}"
+        )
+    return Leaderboard(Record.of(suite, rows), info)

@@ -1,0 +1,42 @@
+"""`python -m benchmarks suites`: what can be run."""
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.comparison.case import cases
+from benchmarks.comparison.suite import FrozenSuite, frozen_suite, suite_names
+from benchmarks.suite import load_suite
+
+
+def print_suites(console: Console) -> None:
+    """A table of the suites and of who is compared on them."""
+    table = Table("suite", "version", "stations", "episodes", "cases", "tasks")
+    frozen = [frozen_suite(name) for name in suite_names()]
+    main = load_suite()
+    count = len(list(main.cases()))
+    models = ", ".join(main.models)
+    table.add_row(main.name, str(main.version), models, "17 a model", str(count), "2")
+    for suite in frozen:
+        table.add_row(
+            suite.name,
+            str(suite.version),
+            str(len(suite.stations)),
+            str(len(suite.episodes)),
+            str(len(cases(suite, suite.entries))),
+            str(len(suite.tasks)),
+        )
+    console.print(table)
+    for suite in frozen:
+        names = ", ".join(entry.contender.name for entry in suite.entries)
+        console.print(f"[bold]{suite.name}[/]: {suite.title} ({_control(suite)})", highlight=False)
+        console.print(f"  tasks: {', '.join(suite.tasks)}", highlight=False)
+        console.print(f"  controllers: {names}", highlight=False)
+
+
+def _control(suite: FrozenSuite) -> str:
+    """Rate and delays, for people."""
+    words = [f"{suite.control_rate_hz:g} Hz"]
+    for name, what in (("action_delay_s", "commands"), ("observation_delay_s", "readings")):
+        delay = suite.environment.get(name, 0.0)
+        words += [f"{what} {1e3 * delay:g} ms late"] if delay else []
+    return ", ".join(words)

@@ -1,0 +1,135 @@
+"""What a run was made with: written beside its scores, and read by those who show them."""
+
+import json
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks.comparison.case import Row
+from benchmarks.comparison.execution import Plan, row_identity
+from benchmarks.comparison.fingerprint import code_digest
+from benchmarks.comparison.journal import JOURNAL, read_rows
+from benchmarks.comparison.suite import Entry, FrozenSuite
+from benchmarks.environment_info import environment_info
+from benchmarks.files import write_text
+from benchmarks.suite import SuiteError
+
+RUN, STATIONS = "run.json", "stations.json"
+SCHEMA = 1
+
+
+def check_folder(suite: FrozenSuite, out: Path) -> None:
+    """Refuse a folder that cannot take a suite's results.
+
+    Raises:
+        SuiteError: it is a file, or has another suite's results.
+    """
+    if out.exists() and not out.is_dir():
+        raise SuiteError(f"--out {out} is a file; name a folder for the results")
+    name = read_run(out).get("suite", {}).get("name")
+    if name not in (None, suite.name):
+        raise SuiteError(f"--out {out} has results of suite {name}; name another folder")
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def read_run(out: Path) -> dict[str, Any]:
+    """What is known of the last run into a folder; empty if there is none."""
+    try:
+        document = json.loads((out / RUN).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return document if isinstance(document, dict) else {}
+
+
+def finished_rows(out: Path) -> list[Row]:
+    """The rows of a folder that belong together: made with one code, one version of the suite.
+
+    They are those of the last run's controllers, and of earlier ones whose run had the same code;
+    of a case that ran twice the later row.
+    """
+    keys = {name: entry["key"] for name, entry in read_run(out).get("contenders", {}).items()}
+    found = {
+        row_identity(row): row
+        for row in read_rows(out / JOURNAL)
+        if row.get("key") is not None and keys.get(row.get("controller")) == row["key"]
+    }
+    return list(found.values())
+
+
+def run_info(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> dict[str, Any]:
+    """What a run was made with: its resolved configuration, versions, commit and command."""
+    suite = todo.suite
+    return {
+        "schema": SCHEMA,
+        "suite": {
+            "name": suite.name,
+            "title": suite.title,
+            "version": suite.version,
+            "source": suite.source,
+            "digest": suite.digest,
+            "seed": suite.seed,
+            "model": suite.model,
+            "environment": dict(suite.environment),
+            "stations": list(suite.stations),
+            "recipe": asdict(suite.recipe) if suite.recipe else None,
+            "episodes": [deal._asdict() for deal in suite.deals],
+        },
+        "contenders": _contenders(todo, entries, out),
+        "code": code_digest(),
+        "jobs": jobs,
+        **environment_info(),
+    }
+
+
+def _contenders(todo: Plan, entries: Sequence[Entry], out: Path) -> dict[str, dict[str, str]]:
+    """Title, source, key and command of those that are run, and of earlier ones of this code."""
+    before, now = read_run(out), (code_digest(), todo.suite.digest)
+    same = (before.get("code"), before.get("suite", {}).get("digest")) == now
+    kept = before.get("contenders", {}) if same else {}
+    command = {
+        "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    return kept | {
+        entry.contender.name: {
+            "title": entry.contender.label,
+            "source": entry.contender.source,
+            "key": todo.keys[entry.contender.name],
+            **command,
+        }
+        for entry in entries
+    }
+
+
+def _stations(suite: FrozenSuite) -> list[dict[str, Any]]:
+    """Every station of a suite, with every number."""
+    found = []
+    for number in suite.stations:
+        drawn = suite.station(number)
+        found.append(
+            {
+                "station": number,
+                "effects": drawn.present,
+                "refused_draws": drawn.refused,
+                "parameters": {name: drawn.model.at_the_door(name) for name in drawn.model.effects},
+            }
+        )
+    return found
+
+
+def write_run(out: Path, info: Mapping[str, Any], **more: object) -> None:
+    """Write what a run was made with."""
+    write_text(out / RUN, _text({**info, **more}))
+
+
+def write_stations(out: Path, suite: FrozenSuite) -> None:
+    """Write every station of a suite with all its numbers."""
+    write_text(out / STATIONS, _text(_stations(suite)))
+
+
+def _text(document: object) -> str:
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"

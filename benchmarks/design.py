@@ -1,0 +1,299 @@
+"""Designs the controllers that have settings: searches them on training stations.
+
+For every controller with settings, loop and kind of task:
+
+1. Start: the defaults of the controller's file.
+2. Search: Nelder-Mead on the logarithms of the settings that the file bounds (`BOUNDS`). The cost
+   of settings is the mean, over `STATIONS` training stations of the suite that has this loop, of
+   what a trial with its noise, delays and disturbances costs:
+
+       mean over the phases of RMSE / target + 0.01 s/V * total variation of the voltage / duration
+
+   as in `benchmarks.tune`, with a target of 0.3 mm in contraction tasks. A trial that fails costs
+   `FAILED`.
+
+Training stations are drawn with a seed of their own: no suite scores them. The same seed gives the
+same settings on the same machine and versions. Every search that ends is written at once; the same
+command goes on with those that are missing.
+"""
+
+import inspect
+import json
+import math
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.progress import Progress
+from scipy.optimize import minimize
+
+from benchmarks.comparison.stations import draw_station
+from benchmarks.comparison.suite import FrozenSuite, frozen_suite
+from benchmarks.files import write_text
+from benchmarks.processes import run_all
+from benchmarks.rollout import Rollout, rollout
+from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
+from controllers import CONTROLLERS
+from controllers.designs import KINDS, SCHEMA, loop_name
+from pma_gym.envs import PMAEnv
+from pma_gym.metrics import rmse
+from pma_gym.plant.model import Model
+from pma_gym.tasks import phase_errors
+
+SUITES = ("robust", "hard", "pressure")
+"""Suites whose loops and tasks controllers are designed for; on other stations than theirs."""
+
+STATIONS = 8
+EVALUATIONS = 40
+FAILED = 100.0
+CONTRACTION_TARGET = 0.3e-3
+"""What an RMSE (m) is counted against in contraction tasks: three times that of displacement, the
+regulator being slower than the motor by about that much. An assumption."""
+
+DIGITS = 3
+
+
+class DesignError(ValueError):
+    """A controller that cannot be designed; the message says why."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """One search: settings of a controller for the tasks of a kind in a suite's loop.
+
+    Attributes:
+        controller: its name.
+        suite: name of the suite.
+        kind: `displacement`, `rotation` or `contraction`.
+        seed: of the noise.
+    """
+
+    controller: str
+    suite: str
+    kind: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others."""
+        return f"{self.controller}/{self.suite}/{self.kind}"
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a search found.
+
+    Attributes:
+        values: settings by name.
+        cost: their cost.
+        first_cost: that of the defaults.
+        loop: name of the loop.
+    """
+
+    values: Mapping[str, float]
+    cost: float
+    first_cost: float
+    loop: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Drill:
+    """A trial on a training station."""
+
+    task: str
+    pressure_kpa: float
+    model: Model
+    seed: int
+
+
+def run_design(controllers: list[str], out: Path, seed: int, jobs: int, again: bool) -> bool:
+    """Search the settings of controllers and write them; those of others stay.
+
+    Args:
+        controllers: names; all that have settings if empty.
+        out: file of settings.
+        seed: of the noise.
+        jobs: processes.
+        again: also what the file has already.
+    Returns:
+        Whether all of it was done; Ctrl-C leaves what is done in the file.
+    Raises:
+        DesignError: a controller without settings.
+    """
+    document = _read(out)
+    searches = list(_searches(controllers or designable(), seed))
+    if not again:
+        searches = [s for s in searches if s.name not in document["provenance"]]
+    with Progress() as progress:
+        bar = progress.add_task("Designing", total=len(searches))
+
+        def keep(index: int, result: object) -> None:
+            search = searches[index]
+            if isinstance(result, BaseException):
+                raise DesignError(f"{search.name}: {type(result).__name__}: {result}") from result
+            assert isinstance(result, Found)
+            _write(out, document, search, result)
+            progress.update(bar, advance=1)
+            progress.console.print(
+                f"{search.name}: cost {result.first_cost:.3f} -> {result.cost:.3f}, {result.values}"
+            )
+
+        complete = run_all([partial(design, search) for search in searches], jobs, keep)
+    if not complete:
+        print(f"Interrupted; {out} has what is done, run again to go on.", file=sys.stderr)
+    return complete
+
+
+def designable() -> list[str]:
+    """Names of the controllers that have settings to search."""
+    return [name for name in CONTROLLERS if _bounds(name)]
+
+
+def _bounds(controller: str) -> Mapping[str, tuple[float, float]]:
+    return getattr(inspect.getmodule(CONTROLLERS[controller]), "BOUNDS", {})
+
+
+def _searches(controllers: list[str], seed: int) -> Iterator[Search]:
+    for controller in controllers:
+        if controller not in CONTROLLERS or not _bounds(controller):
+            raise DesignError(
+                f"{controller!r} has no settings to search; those that have: "
+                f"{', '.join(designable())}"
+            )
+        for suite in SUITES:
+            quantities = {_task_quantity(name) for name in frozen_suite(suite).tasks}
+            for kind in sorted(KINDS[quantity] for quantity in quantities):
+                yield Search(controller, suite, kind, seed)
+
+
+def _task_quantity(task: str) -> str:
+    return PMAEnv(task=task, pressure_kpa=300.0).task.protocol.quantity
+
+
+def design(search: Search) -> Found:
+    """The settings of least cost that a search finds."""
+    factory: Any = CONTROLLERS[search.controller]
+    bounds = _bounds(search.controller)
+    drills = _drills(search)
+    start = inspect.getmodule(factory).DEFAULTS[search.kind]  # type: ignore[union-attr]
+    names = list(bounds)
+
+    def settings(logs: np.ndarray) -> Any:  # noqa: ANN401
+        values = {n: float(f"{math.exp(x):.{DIGITS}g}") for n, x in zip(names, logs, strict=True)}
+        return start._replace(**values)
+
+    def cost(logs: np.ndarray) -> float:
+        return mean_cost(factory, settings(logs), drills, search.suite)
+
+    first = np.log([getattr(start, name) for name in names])
+    limits = np.log([bounds[name] for name in names])
+    simplex = np.vstack([first, first + 0.7 * np.diag(np.where(first < limits.mean(1), 1, -1))])
+    found = minimize(
+        cost,
+        first,
+        method="Nelder-Mead",
+        bounds=limits,
+        options={
+            "maxfev": EVALUATIONS,
+            "initial_simplex": np.clip(simplex, limits[:, 0], limits[:, 1]),
+        },
+    )
+    first_cost, best = cost(first), settings(found.x)
+    if found.fun >= first_cost:
+        best, found.fun = start, first_cost
+    station = _environment(search.suite, drills[0]).station
+    values = {name: getattr(best, name) for name in names}
+    return Found(values, float(found.fun), first_cost, loop_name(station))
+
+
+def mean_cost(factory: Any, settings: Any, drills: list[_Drill], suite: str) -> float:  # noqa: ANN401
+    """Mean cost of settings over trials."""
+    nominal = frozen_suite(suite).nominal
+    costs = []
+    for drill in drills:
+        environment = _environment(suite, drill)
+        try:
+            done = rollout(environment, factory(settings), drill.seed, nominal)
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+            costs.append(FAILED)
+            continue
+        costs.append(min(trial_cost(done), FAILED))
+    return float(np.mean(costs))
+
+
+def trial_cost(done: Rollout) -> float:
+    """What a trial costs; `FAILED` if a physical limit ended it."""
+    if done.ended_by:
+        return FAILED
+    protocol = done.task.protocol
+    target = (TARGETS | {"contraction": CONTRACTION_TARGET})[protocol.quantity]
+    errors = phase_errors(protocol, done.position).values()
+    actuator = 1 if done.task.actuator == "regulator" else 0
+    variation = float(np.abs(np.diff(done.commands[:, actuator])).sum())
+    return float(np.mean([rmse(error) for error in errors])) / target + (
+        VARIATION_WEIGHT_S_PER_V * variation / (done.steps * done.period)
+    )
+
+
+@lru_cache(maxsize=64)
+def _environment(suite: str, drill: _Drill) -> PMAEnv:
+    return PMAEnv(
+        task=drill.task,
+        model=drill.model,
+        pressure_kpa=drill.pressure_kpa,
+        **frozen_suite(suite).environment,
+    )
+
+
+def _drills(search: Search) -> list[_Drill]:
+    """Trials of a kind on training stations: pressures and tasks of the suite in turn."""
+    suite = frozen_suite(search.suite)
+    deck = [
+        (task, pressure)
+        for deal in suite.deals
+        for task in deal.tasks
+        for pressure in deal.pressures_kpa
+        if KINDS[_task_quantity(task)] == search.kind
+    ]
+    step = max(1, len(deck) // STATIONS)
+    return [
+        _Drill(*deck[(number * step) % len(deck)], _training(suite, number), search.seed + number)
+        for number in range(STATIONS)
+    ]
+
+
+@lru_cache(maxsize=64)
+def _training(suite: FrozenSuite, number: int) -> Model:
+    assert suite.recipe is not None
+    return draw_station(replace(suite.recipe, seed=suite.recipe.training_seed), number).model
+
+
+def _read(path: Path) -> dict[str, Any]:
+    document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
+    if path.exists():
+        document |= json.loads(path.read_text(encoding="utf-8"))
+    if document["schema"] != SCHEMA:
+        raise DesignError(f"{path} must have schema {SCHEMA}; delete it or name another")
+    return document
+
+
+def _write(out: Path, document: dict[str, Any], search: Search, found: Found) -> None:
+    loops = document["controllers"].setdefault(search.controller, {})
+    loops.setdefault(found.loop, {})[search.kind] = dict(found.values)
+    document["provenance"][search.name] = {
+        "written_by": "benchmarks/design.py",
+        "suite_version": frozen_suite(search.suite).version,
+        "training_seed": getattr(frozen_suite(search.suite).recipe, "training_seed", None),
+        "seed": search.seed,
+        "stations": STATIONS,
+        "evaluations": EVALUATIONS,
+        "cost_of_defaults": round(found.first_cost, 4),
+        "cost": round(found.cost, 4),
+    }
+    for part in ("controllers", "provenance"):
+        document[part] = dict(sorted(document[part].items()))
+    write_text(out, json.dumps(document, indent=2) + "\n")

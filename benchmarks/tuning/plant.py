@@ -1,0 +1,112 @@
+"""The plant as a loop meets it: linearised along the stroke, behind its sensor, sampled, late."""
+
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import control
+import numpy as np
+from scipy.optimize import root_scalar
+
+from controllers.pid import nominal_offset
+from pma_gym.envs import Station
+from pma_gym.envs.options import motor_at_rest
+from pma_gym.plant.linear import linearize_at, operating_point
+from pma_gym.plant.plant import Condition, Plant
+
+SENSORS = {"extension": "lvdt", "rotation": "potentiometer", "contraction": "lvdt"}
+"""Sensor by what is followed."""
+
+STROKES = (0.05, 0.5, 0.95)
+"""Places of the stroke at which a loop is judged, as shares of it."""
+
+
+class Place(NamedTuple):
+    """The plant near rest at a place of the stroke.
+
+    Attributes:
+        share: the place, as a share of the task's range.
+        direction: of motion, `relaxing` (the motor pulls) or `contracting`: damping differs.
+        system: in continuous time, all voltages in and outputs out.
+    """
+
+    share: float
+    direction: str
+    system: control.StateSpace
+
+
+def linearised(station: Station, shares: Iterable[float] = STROKES) -> list[Place]:
+    """The nominal plant at places of the stroke, in the task's directions of motion.
+
+    Places that no voltage holds are left out.
+    """
+    plant, task = Plant(station.model), station.task
+    moved_by_motor = task.actuator == "motor"
+    # Of the dissertation's displacement only the way out is asked for.
+    both = ("relaxing", "contracting") if task.protocol.quantity != "extension" else ("relaxing",)
+    places = []
+    for share in shares:
+        try:
+            rest, commands = (_pulled if moved_by_motor else _contracted)(plant, station, share)
+        except ValueError:
+            continue
+        for direction in both:
+            places.append(Place(share, direction, linearize_at(plant, rest, commands, direction)))
+    return places
+
+
+def _pulled(plant: Plant, station: Station, share: float) -> tuple[Condition, tuple[float, float]]:
+    """The plant held by the motor at a share of the stroke, at the trial's pressure."""
+    protocol, parameters = station.task.protocol, station.model.parameters
+    stroke = share * protocol.span
+    if protocol.quantity == "rotation":
+        stroke *= parameters["rotor" if "rotor" in parameters else "servo"].radius
+    zero = plant.settle(0.0, pressure=station.pressure).zero_contraction
+    return operating_point(plant, station.pressure, zero - stroke)
+
+
+def _contracted(
+    plant: Plant, station: Station, share: float
+) -> tuple[Condition, tuple[float, float]]:
+    """The plant contracted by the regulator by a share of the stroke, under the task's load.
+
+    Raises:
+        ValueError: no voltage of 0-10 V does.
+    """
+    motor, first = motor_at_rest(station.model, station.task), nominal_offset(station)
+    at = plant.states.index("contraction")
+
+    def contraction(voltage: float) -> float:
+        return float(plant.settle(motor, regulator_voltage=voltage).state[at])
+
+    wanted = contraction(first) + share * station.task.protocol.span
+
+    def off(voltage: float) -> float:
+        return contraction(voltage) - wanted
+
+    voltage = float(root_scalar(off, method="brentq", bracket=(first, 10.0), xtol=1e-9).root)
+    return plant.settle(motor, regulator_voltage=voltage), (motor, voltage)
+
+
+def sampled(place: Place, station: Station) -> control.StateSpace:
+    """Measured position (m or rad) by the actuator's voltage (V) in discrete time, delays in it.
+
+    The voltage is held over each period; the sensor's lag and the station's delays of actions and
+    readings are part of the plant.
+    """
+    quantity = station.task.protocol.quantity
+    one: Any = place.system[quantity, f"{station.task.actuator}_voltage"]
+    sensor = station.model.parameters.get(SENSORS[quantity])
+    if sensor is not None:
+        one = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0]) * one
+    held: Any = control.ss(control.sample_system(one, station.period, method="zoh"))
+    steps = round((station.action_delay + station.observation_delay) / station.period)
+    if steps:
+        # In a chain of states: a fraction with 1 / z^n is ill-conditioned.
+        return held * _late(steps, station.period)
+    return held
+
+
+def _late(steps: int, period: float) -> Any:  # noqa: ANN401
+    """A delay of whole periods."""
+    return control.ss(np.eye(steps, k=-1), np.eye(steps)[:, :1], np.eye(steps)[-1:], 0.0, period)

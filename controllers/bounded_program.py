@@ -1,0 +1,110 @@
+"""A small quadratic program within limits, solved by OSQP where the limits matter."""
+
+from typing import Any
+
+import numpy as np
+from scipy.linalg import lapack
+
+ACCURACY = 1e-5
+"""Accuracy that OSQP is asked for, absolute (V) and relative."""
+
+MOST_ITERATIONS = 2000
+
+
+class BoundedProgram:
+    """Least v' H v / 2 + q' v with low <= v <= high, again and again with other numbers.
+
+    If what minimises without limits keeps them, it is the answer, and found as the solution of
+    H v = -q. Else OSQP searches, from the last answer on. It is set up when it is first needed and
+    counts iterations, never time, so that the same problems in the same order have the same
+    answers to the last bit, on a busy machine too.
+
+    Args:
+        count: how many variables.
+
+    Attributes:
+        limited: how many problems needed OSQP.
+        failures: how many of them it did not solve.
+
+    Source:
+        B. Stellato et al. 2020, "OSQP: an operator splitting solver for quadratic programs".
+    """
+
+    def __init__(self, count: int) -> None:
+        self.osqp = imported_osqp()
+        self.limited = self.failures = 0
+        self._solver: Any = None
+        # OSQP wants the upper triangle, column by column.
+        self._columns, self._rows = np.tril_indices(count)
+
+    def solve(
+        self, square: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> np.ndarray | None:
+        """The v of least v' H v / 2 + q' v, shape (n,); None if OSQP does not find it.
+
+        Args:
+            square: H, symmetric and positive definite, shape (n, n).
+            linear: q, shape (n,).
+            low: shape (n,).
+            high: shape (n,).
+        """
+        _, free, failed = lapack.dposv(square, -linear)
+        if not failed and np.all((low <= free) & (free <= high)):
+            return free
+        self.limited += 1
+        found = self._searched(square, linear, low, high)
+        if found is None:
+            self.failures += 1
+        return found
+
+    def _searched(
+        self, square: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> np.ndarray | None:
+        entries = square[self._rows, self._columns]
+        if self._solver is None:
+            self._solver = self._set_up(entries, linear, low, high)
+        else:
+            self._solver.update(Px=entries, q=linear, l=low, u=high)
+        result = self._solver.solve(raise_error=False)
+        if result.info.status_val != self.osqp.SolverStatus.OSQP_SOLVED:
+            return None
+        # OSQP keeps limits to its accuracy only.
+        return np.clip(result.x, low, high)
+
+    def _set_up(
+        self, entries: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> Any:  # noqa: ANN401
+        from scipy import sparse
+
+        count = len(linear)
+        square = sparse.csc_matrix((entries, (self._rows, self._columns)), (count, count))
+        solver = self.osqp.OSQP(algebra="builtin")
+        solver.setup(
+            *(square, linear, sparse.identity(count, format="csc"), low, high),
+            verbose=False,
+            eps_abs=ACCURACY,
+            eps_rel=ACCURACY,
+            max_iter=MOST_ITERATIONS,
+            check_termination=5,
+            # By iterations: the default of other versions measures time.
+            adaptive_rho=1,
+            adaptive_rho_interval=25,
+            warm_starting=True,
+        )
+        return solver
+
+
+def imported_osqp() -> Any:  # noqa: ANN401
+    """The module osqp.
+
+    Raises:
+        ImportError: it is not installed; says how to install it.
+    """
+    try:
+        import osqp
+    except ImportError as error:
+        raise ImportError(
+            "the controller mpc needs osqp, which is not installed: pip install pma-gym[mpc] "
+            "(in a clone: pip install -e .[mpc])"
+        ) from error
+    return osqp

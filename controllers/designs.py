@@ -1,0 +1,105 @@
+"""Settings of the controllers by loop and task, as `python -m benchmarks design` wrote them."""
+
+import json
+import math
+import re
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, TypeVar
+
+from pma_gym.envs import Station
+
+DESIGNS_FILE = Path(__file__).with_name("designs.json")
+"""The settings of the controllers here, with where they come from."""
+
+SCHEMA = 1
+
+KINDS = {"extension": "displacement", "rotation": "rotation", "contraction": "contraction"}
+"""Kind of a task by the quantity that it asks for."""
+
+Settings = TypeVar("Settings", bound=NamedTuple)
+
+
+def designed(
+    controller: str,
+    station: Station,
+    defaults: Mapping[str, Settings],
+    path: Path = DESIGNS_FILE,
+) -> Settings:
+    """Settings of a controller for a station's loop and task.
+
+    The file is keyed controller -> loop -> kind of task -> values. A loop that was not designed
+    for takes the settings of the one that is nearest in dead time.
+
+    Args:
+        controller: the controller's name.
+        station: its period, delays and task.
+        defaults: by kind of task (`task_kind`), for what the file does not give.
+        path: file of settings.
+    Returns:
+        The defaults of the task's kind with the file's values in their place.
+    Raises:
+        ValueError: the file gives a value that the settings do not have, or has another schema.
+    """
+    kind = task_kind(station)
+    loops = _read(path)["controllers"].get(controller, {})
+    known = [name for name, kinds in loops.items() if kind in kinds]
+    if not known:
+        return defaults[kind]
+    values = loops[nearest_loop(loop_name(station), known)][kind]
+    strange = [name for name in values if name not in defaults[kind]._fields]
+    if strange:
+        raise ValueError(
+            f"{path.name} gives {controller} the settings {', '.join(strange)}, it has "
+            f"{', '.join(defaults[kind]._fields)}; write it anew: python -m benchmarks design"
+        )
+    return defaults[kind]._replace(**values)
+
+
+def task_kind(station: Station) -> str:
+    """`displacement`, `rotation` or `contraction`: what the task asks for, whatever its name."""
+    return KINDS[station.task.protocol.quantity]
+
+
+def loop_name(station: Station) -> str:
+    """Name of a loop: its control rate, and all delay in it if there is any.
+
+    >>> from pma_gym.plant.model import load_model
+    >>> from pma_gym.tasks import TASKS
+    >>> where = Station(load_model("cascade"), TASKS["displacement"], 3e5, 0.02)
+    >>> loop_name(where)
+    '50hz'
+    >>> from dataclasses import replace
+    >>> loop_name(replace(where, action_delay=0.02))
+    '50hz_delay20ms'
+    """
+    delay = 1e3 * (station.action_delay + station.observation_delay)
+    return f"{1.0 / station.period:g}hz" + (f"_delay{delay:g}ms" if delay else "")
+
+
+def nearest_loop(wanted: str, known: list[str]) -> str:
+    """The loop whose dead time, a period and the delay, is nearest as a ratio; the first of two."""
+    return min(known, key=lambda name: abs(math.log(_dead_time(name) / _dead_time(wanted))))
+
+
+def _dead_time(loop: str) -> float:
+    """Period and delay of a loop (s), read off its name."""
+    found = re.fullmatch(r"([0-9.e+-]+)hz(?:_delay([0-9.e+-]+)ms)?", loop)
+    if found is None:
+        raise ValueError(
+            f"a loop is called like 100hz or 50hz_delay20ms (control rate in Hz, delay in ms), "
+            f"got {loop!r}; write the settings anew: python -m benchmarks design"
+        )
+    return 1.0 / float(found[1]) + 1e-3 * float(found[2] or 0.0)
+
+
+@cache
+def _read(path: Path) -> dict[str, Any]:
+    document = json.loads(path.read_text(encoding="utf-8"))
+    if document.get("schema") != SCHEMA:
+        raise ValueError(
+            f"{path} must have schema {SCHEMA}, got {document.get('schema')!r}; write it anew: "
+            "python -m benchmarks design"
+        )
+    return document

@@ -1,0 +1,220 @@
+"""Iterative learning: the voltage of the next trial from the error that the last one left."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.ndimage import binary_opening
+
+from controllers.controller import Reference
+from controllers.designs import designed
+from controllers.gains import scheduled_gains
+from controllers.lags import LOOSE_N
+from controllers.lifted import LiftedPlant
+from controllers.motion import NominalMotion, nominal_motion
+from controllers.pid import FeedforwardPID
+from pma_gym.envs import Reading, Station
+
+
+class Settings(NamedTuple):
+    """Settings of `ILC`.
+
+    Attributes:
+        cutoff: frequency above which nothing is learned (Hz).
+        feedback: share of the gains of `feedforward_pid` that correct within a trial. What repeats
+            needs none, and each passes on noise; what comes only once needs it.
+        mismatch: relative error of the nominal model that is reckoned with.
+    """
+
+    cutoff: float
+    feedback: float
+    mismatch: float
+
+
+BOUNDS = {"cutoff": (0.5, 20.0), "feedback": (0.05, 1.0), "mismatch": (0.1, 1.0)}
+"""Between what a search looks for settings."""
+
+DEFAULTS = {
+    "displacement": Settings(3.0, 0.3, 0.3),
+    "rotation": Settings(3.0, 0.3, 0.3),
+    "contraction": Settings(3.0, 0.3, 0.3),
+}
+"""Settings by kind of task for what `controllers/designs.json` does not give."""
+
+LEAST_STEPS = 10
+"""Fewest steps of a trial that are learned from: others say nothing of a motion."""
+
+
+TIGHT_STEPS = 5
+"""For how many steps a cable must pull on end to be taken for tight."""
+
+
+class ILC:
+    """Learns the feed-forward of a repeated trial, on top of a soft PID.
+
+    In trial j the voltage is v_j + f_j: v_j, by control step, is learned; f_j is what a PID with
+    low gains adds. The error that v_j alone would leave is, G the nominal plant near the reference,
+
+        o_j = e_j + G f_j
+
+    in which the sensor's noise n stands as it is, G (v - v_j) + n with the ideal voltage v: neither
+    shaped nor multiplied by the feedback. The change of v_j is norm-optimal, in lifted form (all
+    steps of a trial as one vector) with the second difference D2 as its price:
+
+        d_j = argmin |o_j - G d|^2 + rho |D2 d|^2
+
+    That is the inverse of G behind a low-pass without phase, G'G / (G'G + rho D2'D2): a Q-filter
+    whose corner rho sets (`controllers.lifted`).
+
+    v_(j+1) = v_j + k_j d_j. A gain of 1 would pass every trial's noise on to the next. With b_j the
+    power of what is still to be learned, r of what differs from trial to trial, and a model that is
+    wrong by the share delta, the power of error p_j = b_j + n_j r that v_j leaves is least after
+
+        k_j = p_j / ((1 + delta^2) p_j + r)
+        b_(j+1) = (1 - k_j)^2 b_j + k_j^2 delta^2 p_j,   n_(j+1) = (1 - k_j)^2 n_j + k_j^2
+
+    Near 1 as long as there is something to learn, this turns into 1 / (j + 1), the mean of all
+    trials, as in Kalman's filter. b_0 is what the first trial shows above the sensor's noise; r is
+    that noise, or more, where later trials leave more than they should (disturbances).
+
+    The pulley's angle says nothing about the muscle while the cable is slack: those steps are not
+    learned from, and little changed.
+
+    Before a trial `reset` is to be called with the reference and station of the one before; with
+    others, and after `repetitions` trials, learning begins anew.
+
+    Args:
+        settings: settings to use instead of the designed ones.
+
+    Example:
+        >>> from controllers import ILC
+        >>> from pma_gym.envs import PMAEnv
+        >>> env = PMAEnv("displacement", pressure_kpa=150.0, randomisation="varied")
+        >>> controller, left = ILC(), []
+        >>> for trial in range(3):
+        ...     _, ended = env.reset(seed=300), False
+        ...     controller.reset(env.reference, env.station)
+        ...     while not ended:
+        ...         volts = controller.act(env.reading, env.time)
+        ...         *_, ended, info = env.step(env.action(volts))
+        ...     left.append(info["rmse_mm"])
+        >>> left[2] < 0.5 * left[0]
+        True
+
+    Source:
+        D. A. Bristow, M. Tharayil and A. G. Alleyne 2006, "A survey of iterative learning control",
+        IEEE Control Systems Magazine 26(3): lifted form, quadratic design, Q-filter, feedback in
+        parallel, gains that vary with the iteration.
+    """
+
+    name = "ilc"
+    repetitions = 10
+
+    def __init__(self, settings: Settings | None = None) -> None:
+        self._given = settings
+        self._station: Station | None = None
+        self._trials = 0
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Learn from the trial before, or begin anew."""
+        motion = nominal_motion(reference, station)
+        known = station == self._station and np.array_equal(motion.volts, self._motion.volts)
+        if known and self._trials < self.repetitions:
+            self._learn()
+        else:
+            self._station, self._motion, self._trials = station, motion, 0
+            self.settings = self._given or designed(self.name, station, DEFAULTS)
+            self.learned, self._gain = np.zeros(len(motion.volts)), LearningGain(self.settings)
+        self._trials += 1
+        self._position, self._late = station.position, station.observation_delay
+        self._loose = LOOSE_N if station.task.protocol.quantity == "rotation" else -math.inf
+        self._errors, self._added, self._taut = list[float](), list[float](), list[bool]()
+        gains, share = scheduled_gains(FeedforwardPID.name, station), self.settings.feedback
+        soft = [share * gain for gain in (gains.proportional, gains.integral, gains.derivative)]
+        self._pid = FeedforwardPID(
+            gains._replace(proportional=soft[0], integral=soft[1], derivative=soft[2]),
+            _Learned(motion, self.learned),
+        )
+        self._pid.reset(reference, station)
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Voltage (V) of the task's actuator to hold for the next control period."""
+        voltage = self._pid.act(observation, time)
+        expected = self._motion.expected(time - self._late)
+        self._errors.append(expected - self._position(observation))
+        self._added.append(voltage - self._pid.feedforward(time))
+        self._taut.append(observation.load >= self._loose)
+        return voltage
+
+    def _learn(self) -> None:
+        """Change the voltages by what the last trial says."""
+        station, motion = self._motion.station, self._motion
+        sent_late = round(station.action_delay / station.period)
+        late = sent_late + round(station.observation_delay / station.period)
+        count = len(self._errors) - late
+        if count < LEAST_STEPS:
+            return
+        # A voltage sent in step k shows in the errors from step k + late + 1 on.
+        plant = LiftedPlant(motion, late, count)
+        errors = np.array(self._errors[late:])
+        without = errors + plant.response(np.array(self._added[:count]))
+        # A cable that is tight for a moment only, or by the load cell's noise, is still slack, and
+        # the first reading after it has come tight still that of the flight.
+        taut = binary_opening(np.array(self._taut[late:]), np.ones(TIGHT_STEPS))
+        taut[1:] &= taut[:-1].copy()
+        change = plant.change(without, taut, self.settings.cutoff)
+        smooth = 2.0 * self.settings.cutoff * station.period
+        power = float(np.mean(plant.response(change) ** 2)) / (smooth * motion.noise**2)
+        # The voltages are kept by the period that they are in force in.
+        learned = self.learned.copy()
+        learned[sent_late : sent_late + count] += (self._gain.next(power) * change)[
+            : len(learned) - sent_late
+        ]
+        volts = motion.volts
+        reachable = np.clip(volts + learned, np.minimum(volts, 0.0), np.maximum(volts, 10.0))
+        self.learned = reachable - volts
+
+
+class LearningGain:
+    """k_j by trial, see `ILC`; powers in units of that of the sensor's noise.
+
+    Args:
+        settings: the relative error that is reckoned with.
+    """
+
+    def __init__(self, settings: Settings) -> None:
+        self._doubt = settings.mismatch**2
+        self._left, self._noise, self._varying = -1.0, 0.0, list[float]()
+
+    def next(self, power: float) -> float:
+        """The gain on the change that a trial asks for.
+
+        Args:
+            power: of what that change would move the position by.
+        """
+        if self._left < 0.0:
+            self._left = max(power - 1.0, 0.0)
+        else:
+            self._varying.append(max(1.0, (power - self._left) / (1.0 + self._noise)))
+        varying = float(np.mean(self._varying)) if self._varying else 1.0
+        total = self._left + self._noise * varying
+        gain = total / ((1.0 + self._doubt) * total + varying)
+        self._left = (1.0 - gain) ** 2 * self._left + gain**2 * self._doubt * total
+        self._noise = (1.0 - gain) ** 2 * self._noise + gain**2
+        return gain
+
+
+class _Learned:
+    """The nominal motion's voltage and what has been learned, as an open loop."""
+
+    def __init__(self, motion: NominalMotion, learned: np.ndarray) -> None:
+        self._motion, self._learned = motion, learned.tolist()
+        self._period = motion.station.period
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Nothing to compute."""
+
+    def voltage(self, time: float) -> float:
+        """Voltage (V) of the period at a time (s)."""
+        at = min(max(int(time / self._period + 1e-6), 0), len(self._learned) - 1)
+        return self._motion.voltage(time) + self._learned[at]

@@ -1,0 +1,262 @@
+"""Preview MPC: the voltages of the coming periods that the nominal model, kept up to date, needs."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from controllers.bank_design import BankDesign, bank_design
+from controllers.bounded_program import BoundedProgram
+from controllers.controller import Reference
+from controllers.damping_bank import DampingBank
+from controllers.designs import designed
+from controllers.linear_motion import LOOSE_N, VOLTAGE_LIMIT, linear_motion
+from controllers.loose_rotor import LooseRotor
+from controllers.motion import nominal_motion
+from controllers.nominal import Nominal
+from pma_gym.envs import Reading, Station
+from pma_gym.plant.plant import regulator_voltage
+
+
+class Settings(NamedTuple):
+    """Settings of the preview MPC.
+
+    Attributes:
+        effort: rho, weight of a change of voltage beside the error that a voltage makes (1).
+        wander: by how much the force that the model does not know changes in a second (N).
+        jolt: how large a force that it does not know may be for one period (N).
+        horizon: how far it looks ahead (s).
+    """
+
+    effort: float
+    wander: float
+    jolt: float
+    horizon: float = 0.15
+
+
+DEFAULTS = {
+    "displacement": Settings(0.3, 10.0, 1.0),
+    "rotation": Settings(0.3, 10.0, 1.0),
+    "contraction": Settings(0.3, 10.0, 1.0, 0.3),
+}
+"""Settings by kind of task where `controllers/designs.json` has none."""
+
+BOUNDS = {"effort": (1e-2, 1e2), "wander": (0.5, 100.0), "jolt": (0.1, 10.0)}
+"""Within which a design searches."""
+
+LEAST_PUSH_V = 2e-3
+"""A motor voltage so little above that at which the drive begins to pull is sent as 0 V, at which
+no drive pulls (V)."""
+
+DESIGNS_KEPT = 24
+"""Designs that a process keeps, some 10 MB each."""
+
+
+class PreviewMPC:
+    """Model predictive control along the nominal motion, with preview and a disturbance observer.
+
+    Before a trial the nominal plant is simulated under the feed-forward's voltages u_ff and
+    linearised on the way (`controllers.linear_motion`). In every period, from what a bank of Kalman
+    filters knows of the deviations from that motion and of the forces and offsets that the model
+    does not know (`controllers.bank_design`, `controllers.damping_bank`), it foresees the error at
+    the ends of the coming N periods, e = f + G v, linear in the deviations v of their voltages,
+    and chooses
+
+        min  |f + G v|^2 / h^2 + rho * sum over i of (v_i - v_(i-1))^2
+        0 <= u_ff + v <= 10 V
+
+    commanding the first of them. G varies along the motion (linear time-varying); h^2, the mean of
+    G' G's diagonal, makes rho the same number on every station. f holds what is foreseen without
+    v: the error of the nominal motion, the estimated deviation, the unknown forces. With delays,
+    the commands on their way are part of f, and the first voltage is that of the period in which
+    it will be in force. The motor cannot push: the lower limit is where the drive, with the offset
+    that it is estimated to have, begins to pull.
+
+    If the voltages that minimise without limits keep them, they are the answer; else OSQP searches
+    from the last answer on (`controllers.bounded_program`). If it fails, the last plan goes on.
+
+    Args:
+        settings: instead of the designed ones.
+
+    Attributes:
+        settings: in use since `reset`.
+        program: the quadratic program, which counts how often limits mattered (`limited`) and how
+            often OSQP failed (`failures`) since `reset`.
+
+    Source:
+        J. B. Rawlings, D. Q. Mayne and M. M. Diehl 2017, "Model predictive control", chapter 1 (offset
+        free by disturbance models).
+
+    Example:
+        >>> from pma_gym.envs import PMAEnv
+        >>> env = PMAEnv("displacement", pressure_kpa=300)
+        >>> controller = PreviewMPC()
+        >>> _ = env.reset(seed=1)
+        >>> controller.reset(env.reference, env.station)
+        >>> ended = False
+        >>> while not ended:
+        ...     *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        >>> info["rmse_mm"] < 0.05
+        True
+    """
+
+    name = "mpc"
+
+    def __init__(self, settings: Settings | None = None) -> None:
+        self._given = settings
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Foresee the trial: the nominal motion, the filters' gains, how voltages act.
+
+        Raises:
+            ImportError: osqp is not installed; says how to install it.
+        """
+        self.settings = self._given or designed(self.name, station, DEFAULTS)
+        trial = _Trial(reference, station, self.settings)
+        self._design = _designed(trial)
+        self._period, self._count = station.period, trial.horizon
+        self._pulls = station.task.actuator == "motor"
+        self._bank = DampingBank(self._design, station.period, self._pulls)
+        self.program = BoundedProgram(trial.horizon)
+        self._delay = trial.delay
+        # What is in force until the first command arrives.
+        rest = 0.0 if self._pulls else regulator_voltage(station.model, station.pressure)
+        self._sent = [rest] * trial.delay
+        self._plan = np.zeros(trial.horizon)
+        changes = np.eye(trial.horizon) - np.eye(trial.horizon, k=-1)
+        self._effort = self.settings.effort * changes.T @ changes
+        self._entries = np.tril_indices(trial.horizon)
+        hangs = self._pulls and "cable" in station.model.parameters
+        self._rotor = LooseRotor(self._design.motion, station) if hangs else None
+        self._loose, self._taken, self._unloaded, self._tightened = False, -1, None, False
+        self._radius = station.model.parameters["rotor"].radius if hangs else 1.0
+        self._rotates = station.task.protocol.quantity == "rotation"
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Voltage of the task's actuator (V) to hold for the next control period."""
+        self._see(observation)
+        first = round(time / self._period) + self._delay
+        if first >= self._design.motion.last:
+            volts = float(self._design.motion.volts[-1])
+        elif self._loose:
+            volts = self._loose_volts(first)
+        else:
+            volts = self._taut_volts(first)
+        self._sent.append(volts)
+        return volts
+
+    def _see(self, reading: Reading) -> None:
+        """Take in what the sensors say; a reading that was heard before says nothing new."""
+        k, bank, rotor = round(reading.time / self._period), self._bank, self._rotor
+        if k <= self._taken:
+            return
+        if self._unloaded is None:
+            self._unloaded = reading.load if rotor else 0.0
+        loose = rotor is not None and reading.load - self._unloaded < LOOSE_N
+        self._tightened |= not loose
+        loose = loose and self._tightened and (self._loose or self._slackens(k))
+        if loose:
+            if not self._loose:
+                rotor.state[2] = (bank.weights @ bank.estimates)[self._design.drive]
+                x = bank.weights @ bank.at(k, self._sent)
+                nominal = self._design.motion.states[k]
+                a, b = (self._design.motion.names.index(n) for n in ("angle", "spin"))
+                rotor.release(x[a] + nominal[a], x[b] + nominal[b])
+            else:
+                for at in range(max(self._taken, 0), k):
+                    rotor.pass_period(self._sent[at])
+            rotor.see(reading.rotation)
+        elif self._loose and rotor is not None:
+            for at in range(max(self._taken, 0), k):
+                rotor.pass_period(self._sent[at])
+            bank.resume(reading, rotor.state, self._radius)
+        else:
+            bank.see(reading, self._sent)
+        self._loose, self._taken = loose, k
+
+    def _slackens(self, k: int) -> bool:
+        return bool(np.any(self._design.motion.readings[k : k + self._count + 1, 2] < LOOSE_N))
+
+    def _loose_volts(self, first: int) -> float:
+        rotor, motion, count = self._rotor, self._design.motion, self._count
+        state = rotor.state
+        for k in range(self._taken, first):
+            state = rotor.moved(state, self._sent[k])
+        angles, effect = rotor.outlook(state, count)
+        target = motion.states[first + 1 : first + 1 + count, motion.names.index("angle")]
+        if self._rotates:
+            target = target - motion.error[first + 1 : first + 1 + count]
+        idle = motion.idle - state[2]
+        counted = np.arange(first + 1, first + 1 + count) <= motion.last
+        error, effect = (angles - target) * counted, effect * counted[:, None]
+        before = max(self._sent[-1] - idle, 0.0) if self._sent else 0.0
+        square, linear = self._program_of(effect, error, before)
+        low = np.full(count, max(-idle, 0.0))
+        plan = self.program.solve(square, linear, low, np.full(count, VOLTAGE_LIMIT - idle))
+        pull = 0.0 if plan is None else float(plan[0])
+        self._plan = np.zeros(count)
+        return min(max(idle + pull, 0.0), VOLTAGE_LIMIT) if pull > LEAST_PUSH_V else 0.0
+
+    def _taut_volts(self, first: int) -> float:
+        """Voltage (V) for the period `first`, at whose start the estimates will hold."""
+        design, motion, bank = self._design, self._design.motion, self._bank
+        estimates = bank.at(first, self._sent)
+        weights, low = bank.weights, 0.0
+        if self._pulls:
+            low = max(motion.idle - float(weights @ estimates[:, design.drive]), 0.0)
+        nominal = motion.volts[first : first + self._count]
+        square, linear = self._problem(first, estimates, weights)
+        plan = self.program.solve(square, linear, low - nominal, VOLTAGE_LIMIT - nominal)
+        self._plan = np.append(self._plan[1:], self._plan[-1]) if plan is None else plan
+        volts = min(max(float(nominal[0] + self._plan[0]), low), VOLTAGE_LIMIT)
+        return 0.0 if self._pulls and volts < low + LEAST_PUSH_V else volts
+
+    def _problem(
+        self, first: int, estimates: np.ndarray, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """H and q of the program for the periods from `first` on, what they add up to halved."""
+        design, count = self._design, self._count
+        foreseen = (design.ahead[:, first, 1:] @ estimates[:, :, None])[:, :, 0]
+        free = weights @ (foreseen + design.carried[:, first, 1:])
+        free += design.motion.error[first + 1 : first + 1 + count]
+        response = np.tensordot(weights, design.response[:, first : first + count], 1)
+        ends, begins = self._entries
+        effect = np.zeros((count, count))
+        effect[ends, begins] = response[begins, ends - begins + 1]
+        return self._program_of(effect, free, self._plan[0])
+
+    def _program_of(self, effect: np.ndarray, free: np.ndarray, before: float):
+        square = effect.T @ effect
+        scale = max(float(np.trace(square)) / self._count, 1e-30)
+        linear = effect.T @ free / scale
+        linear[0] -= self.settings.effort * before
+        return square / scale + self._effort, linear
+
+
+class _Trial:
+    """What a design depends on, equal to every other of which it is the same."""
+
+    def __init__(self, reference: Reference, station: Station, settings: Settings) -> None:
+        self.station, self.settings, task = station, settings, station.task
+        self.needed = nominal_motion(reference, station).volts
+        times = station.period * np.arange(len(self.needed) + 1)
+        self.wanted = np.array([reference(time) for time in times.tolist()])
+        self.horizon = max(2, round(settings.horizon / station.period))
+        self.delay = round(station.action_delay / station.period)
+        said = Nominal(station.model), task.protocol.quantity, task.load, station.pressure
+        follows = self.needed.tobytes(), self.wanted.tobytes()
+        self._key = *said, station.period, self.delay, settings, *follows
+
+    def __hash__(self) -> int:
+        return hash(self._key)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Trial) and self._key == other._key
+
+
+@lru_cache(maxsize=DESIGNS_KEPT)
+def _designed(trial: _Trial) -> BankDesign:
+    station, settings = trial.station, trial.settings
+    beyond = trial.horizon + trial.delay
+    motion = linear_motion(trial.needed, trial.wanted, station, beyond)
+    return bank_design(motion, station, trial.horizon, settings.wander, settings.jolt)

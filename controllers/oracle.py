@@ -1,0 +1,195 @@
+"""The bound to aim at: a predictive controller that knows the true station and where it stands.
+
+What it knows that no controller of a real station does: the station's own equations and numbers,
+its state, the memories of hysteresis and friction, the commands on their way to it, and the
+disturbances that act now. It does not know disturbances to come; it takes those of now to stay.
+
+In every period it plans the voltages of the coming 0.32 s, each in 0-10 V, changed by blocks of 1,
+1, 2, 4, 8, ... periods until they make
+
+    sum over times t of (position(t) - reference(t))^2
+
+least, and commands the first of them. At first the times are as dense as those of the scores, then
+10 ms apart and weighted for it (`controllers.horizon`); none lies after the trial's end. Changes of
+the plan of the period before are searched for by least squares (`controllers.plan_search`) with the
+true plant's own simulation (`controllers.foresight`). A plan's last period is new each time; there
+it goes on as the voltages do that the true station's inverse needs for the reference
+(`controllers.motion`). Those voltages themselves are tried too, and pushes of a period where the
+cable hangs loose: it gives no slope to follow.
+
+It is close to the optimum, not proven to be it.
+"""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.controller import Reference
+from controllers.foresight import PLANS, Commands, Foresight
+from controllers.horizon import horizon
+from controllers.motion import nominal_motion
+from controllers.plan_search import Errors, Space, best_plan
+from pma_gym.envs import Reading, Station
+from pma_gym.units import SI_FACTORS
+
+if TYPE_CHECKING:
+    from pma_gym.envs import PMAEnv
+
+VOLTAGE_LIMIT = 10.0
+"""Largest voltage of motor and regulator (V)."""
+
+PUSHES_V = np.append(0.0, np.geomspace(0.01, 10.0, 13))
+"""Pushes of a loose cable that are tried, beyond where the drive begins to pull (V)."""
+
+
+class Oracle:
+    """The predictive controller that knows everything but the future; see this module.
+
+    It drives no real station: it is shown the environment (`see`) before each `reset`.
+
+    Example:
+        >>> from pma_gym.envs import PMAEnv
+        >>> env, ended = PMAEnv("displacement", pressure_kpa=300), False
+        >>> observation, info = env.reset(seed=1)
+        >>> oracle = Oracle()
+        >>> oracle.see(env)
+        >>> oracle.reset(env.reference, env.station)
+        >>> while not ended:
+        ...     volts = oracle.act(env.reading, env.time)
+        ...     _, _, terminated, ended, info = env.step(env.action(volts))
+        >>> info["rmse_mm"] < 0.01
+        True
+    """
+
+    name = "oracle"
+
+    def __init__(self) -> None:
+        self._environment: PMAEnv | None = None
+
+    def see(self, environment: "PMAEnv") -> None:
+        """Be shown the environment that it drives; after the environment's own reset."""
+        self._environment = environment
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Look at the true station, and compute what its inverse needs.
+
+        Raises:
+            ValueError: it was not shown the environment.
+        """
+        environment = self._seen()
+        plant, protocol = environment.plant, station.task.protocol
+        self._regulates = station.task.actuator == "regulator"
+        self._period, self._unit = station.period, SI_FACTORS[protocol.unit]
+        self._quantity = protocol.quantity
+        delay = round(station.action_delay / station.period)
+        # Commands on their way are the first of every plan, and fixed.
+        self._sent = np.full(delay, self._heard(environment))
+        self._horizon = ahead = horizon(station.period, delay)
+        times = station.period * (delay + np.append(-delay, ahead.ends / ahead.parts))
+        self._foresight = Foresight(plant, times)
+        needed = nominal_motion(reference, replace(station, model=plant.model)).volts
+        self._zero = self._position_at_zero(environment)
+        self._low = 0.0 if self._regulates else self._idle_voltage(environment)
+        self._space = Space(ahead.blocks, self._low, VOLTAGE_LIMIT)
+        self._tabulate(needed.clip(self._low, VOLTAGE_LIMIT), reference, station)
+        self._plan = self._needed[delay : delay + len(ahead.blocks)]
+
+    def _tabulate(
+        self, needed: NDArray[np.float64], reference: Reference, station: Station
+    ) -> None:
+        """Keep inverse and reference of the whole trial, and of a horizon beyond its end."""
+        ahead, delay = self._horizon, len(self._sent)
+        self._needed = np.append(needed, np.full(delay + len(ahead.blocks) + 1, needed[-1]))
+        count = ahead.parts * len(self._needed)
+        times = station.period / ahead.parts * np.arange(count + 1)
+        self._wanted = np.array([reference(time) for time in times.tolist()])
+        self._counts = np.where(times <= station.task.duration + 1e-9, 1.0 / self._unit, 0.0)
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Voltage (V) of the task's actuator, in force after the action delay."""
+        begin = round(time / self._period) + len(self._sent)
+        end = begin + len(self._plan)
+        errors = self._errors(self._seen(), begin)
+        others = self._other_plans(self._needed[begin:end], self._seen().truth["load"] <= 0.0)
+        plan = best_plan(errors, self._plan, others, self._space)
+        voltage = float(plan[0])
+        # The same for the periods from the next one on; what the inverse needs goes on at the end.
+        following = plan[-1] + self._needed[end] - self._needed[end - 1]
+        self._plan = np.append(plan[1:], min(max(following, self._low), VOLTAGE_LIMIT))
+        self._sent = np.append(self._sent, voltage)[1 : len(self._sent) + 1]
+        return voltage
+
+    def _other_plans(self, needed: NDArray[np.float64], loose: bool) -> NDArray[np.float64]:
+        """Other plans to begin with, besides the one of the period before.
+
+        The inverse's, as it is and from the voltage planned now; where the cable is loose also some
+        with a push of a period, from one that only just moves the rotor on.
+        """
+        plans = [needed, needed + (self._plan[0] - needed[0])]
+        if loose:
+            pushed = np.tile(self._plan, (2 * len(PUSHES_V), 1))
+            pushed[:, 0] = self._low + np.tile(PUSHES_V, 2)
+            pushed[len(PUSHES_V) :, 1] = self._low
+            plans.extend(pushed)
+        return np.clip(plans, self._low, VOLTAGE_LIMIT)
+
+    def _errors(self, environment: "PMAEnv", begin: int) -> Errors:
+        """Errors (mm or deg) of plans from where the plant stands, at the scored times ahead."""
+        condition, jump = environment.condition, environment.disturbance[0]
+        motor, regulator = environment.motor_voltage, environment.regulator_voltage
+        ahead, delay = self._horizon, len(self._sent)
+        at = ahead.parts * begin + ahead.ends
+        wanted, weights = self._zero + self._wanted[at], ahead.weights * self._counts[at]
+        volts = np.empty((PLANS, delay + len(self._plan)))
+        volts[:, :delay] = self._sent
+
+        def errors(plans: NDArray[np.float64]) -> NDArray[np.float64]:
+            parts = [predicted(plans[k : k + PLANS]) for k in range(0, len(plans), PLANS)]
+            return (np.concatenate(parts) - wanted) * weights
+
+        def predicted(plans: NDArray[np.float64]) -> NDArray[np.float64]:
+            volts[: len(plans), delay:] = plans
+            held = volts[: len(plans), ahead.periods]
+            if self._regulates:
+                commands = Commands(motor, (held + jump).clip(0.0, VOLTAGE_LIMIT))
+            else:
+                commands = Commands(held, regulator)
+            # A copy: the next prediction is written over it.
+            return self._foresight(condition, commands, len(plans))[self._quantity].copy()
+
+        return errors
+
+    def _heard(self, environment: "PMAEnv") -> float:
+        """What the actuator hears now (V)."""
+        return environment.regulator_voltage if self._regulates else environment.motor_voltage
+
+    def _position_at_zero(self, environment: "PMAEnv") -> float:
+        """The plant's output (m or rad) where the task counts the position as 0."""
+        condition = environment.condition
+        seen = environment.plant.observe(condition.state[None, :], condition.zero_contraction)
+        return float(seen[self._quantity][0]) - environment.position
+
+    def _idle_voltage(self, environment: "PMAEnv") -> float:
+        """Highest motor voltage (V) that does no more than none: where the drive begins to pull.
+
+        Below it the position has no slope, and the search would never push a loose cable.
+        """
+        low, high = 0.0, VOLTAGE_LIMIT
+        for _ in range(4):
+            volts = np.linspace(low, high, PLANS)
+            commands = Commands(volts[:, None], environment.regulator_voltage)
+            reached = self._foresight(environment.condition, commands, PLANS)[self._quantity]
+            moved = np.abs(reached[:, -1] - reached[0, -1]) > 1e-6 * self._unit
+            first = max(1, int(np.argmax(moved)))
+            low, high = float(volts[first - 1]), float(volts[first])
+        return low
+
+    def _seen(self) -> "PMAEnv":
+        if self._environment is None:
+            raise ValueError(
+                "oracle must be shown the environment, whose true station it knows; call "
+                "see(environment) before reset, or take a controller that needs the sensors alone"
+            )
+        return self._environment

@@ -1,0 +1,176 @@
+"""Somebody's own controller: scored beside the others, or told in plain words what to mend."""
+
+import time
+from functools import partial
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from benchmarks.__main__ import app
+from benchmarks.comparison.case import Case, run_case
+from benchmarks.comparison.guard import Guarded, LateError
+from benchmarks.comparison.suite import NOMINAL, Episode
+from benchmarks.contender import Contender, ControllerError
+from benchmarks.processes import run_all
+from benchmarks.rollout import rollout
+from benchmarks.worker import ProcessDied, TookTooLong, begin_limited, end_limited
+from pma_gym.envs import PMAEnv
+
+SUITE = """
+schema = 2
+name = "small"
+title = "A few cases"
+version = 1
+seed = 7
+model = "station"
+[environment]
+control_rate_hz = 100.0
+[[episodes]]
+tasks = ["displacement"]
+pressures_kpa = [200, 300, 400]
+repeats = 2
+[[controllers]]
+name = "pid"
+title = "PID"
+"""
+
+MINE = """
+import time
+import numpy as np
+class Mine:
+    name = "My own"
+    def reset(self, reference, station):
+        self.reference, self.volts = reference, 0.0
+    def act(self, observation, now):
+        {body}
+        self.volts += 20.0 * (self.reference(now) - observation.extension)
+        return min(max(self.volts, 0.0), 10.0)
+"""
+
+
+def own(folder, body):
+    path = folder / "mine.py"
+    path.write_text(MINE.format(body=body))
+    return Contender("Mine", path=str(path))
+
+
+def guarded(contender):
+    return run_case(Case("nominal", contender, Episode(NOMINAL, "displacement", 300, 0)))
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        (
+            "now > 1.0 and [][3]",
+            r"act raised IndexError: list index out of range \(line 9 of mine.py, at 1.01 s\)",
+        ),
+        (
+            "np.linalg.inv(np.zeros((2, 2)))",
+            r"act raised LinAlgError: Singular .*line 9 of mine.py",
+        ),
+        ("raise SystemExit(3)", "act raised SystemExit: 3"),
+        ("return float('nan')", "act must return finite volts, 0-10 V, at 0 s it returned nan"),
+        ("return np.zeros((1, 2))", "act must return volts as a number.*return float"),
+        ("return None", "it returned None"),
+    ],
+)
+def test_what_goes_wrong_is_said_with_where_to_mend_it(body, message, tmp_path):
+    with pytest.raises(ControllerError, match=message):
+        guarded(own(tmp_path, body))
+
+
+def test_an_act_slower_than_the_control_period_is_late(tmp_path):
+    with pytest.raises(LateError, match="act takes 1.* ms on average over 1 s.*period is 10 ms"):
+        guarded(own(tmp_path, "time.sleep(0.0105)"))
+
+
+def test_one_late_answer_is_forgiven(tmp_path):
+    assert not guarded(own(tmp_path, "now == 0.0 and time.sleep(0.5)"))["failure"]
+
+
+def test_a_guard_lets_everything_through(tmp_path):
+    contender = own(tmp_path, "pass")
+    environment = PMAEnv("displacement", pressure_kpa=300)
+    watched = rollout(environment, Guarded(contender, 0.01), seed=3)
+    free = rollout(environment, contender.make(), seed=3)
+    assert np.array_equal(watched.position, free.position)
+    controller = Guarded(contender, 0.01)
+    assert controller.name == "My own"
+    assert not hasattr(controller, "repetitions")
+
+
+def loops(limit_s):
+    begin_limited("thinking", limit_s)
+    while True:
+        pass
+
+
+def is_quick():
+    begin_limited("thinking", 30.0)
+    end_limited()
+    return "quick"
+
+
+def dies():
+    import os
+
+    os._exit(3)
+
+
+def test_what_takes_too_long_is_ended_and_the_others_are_not():
+    results = {}
+    began = time.monotonic()
+    works = [partial(loops, 0.3), is_quick, dies, is_quick]
+    assert run_all(works, 2, results.__setitem__, wary=True)
+    assert results[1] == results[3] == "quick"
+    assert isinstance(results[0], TookTooLong)
+    assert str(results[0]).startswith("thinking took over 0.3 s and was ended; look for an endless")
+    # Of works that are not trusted none is run twice.
+    assert isinstance(results[2], ProcessDied) and "again" not in str(results[2])
+    assert time.monotonic() - began < 30.0
+
+
+def invoke(folder, *arguments):
+    options = ["--suite", str(folder / "small.toml"), "--jobs", "1"]
+    return CliRunner().invoke(app, [*arguments, *options], env={"COLUMNS": "200"})
+
+
+def test_it_stands_beside_the_others(tmp_path):
+    (tmp_path / "small.toml").write_text(SUITE)
+    out = str(tmp_path / "results" / "small")
+    assert invoke(tmp_path, "run", "--out", out).exit_code == 0
+    contender = own(tmp_path, "pass")
+    add = ("add", contender.source, "--results", str(tmp_path / "results"))
+    done = invoke(tmp_path, *add)
+    assert done.exit_code == 0, done.output
+    assert "small version 1: 6 cases of My own, 0 of them done before" in done.stdout
+    assert "displacement: " in done.stdout and "rank 2 of 2" in done.stdout
+    again = invoke(tmp_path, *add)
+    assert "6 of them done before" in again.stdout and "rank 2 of 2" in again.stdout
+
+
+def test_after_three_failures_the_rest_is_left(tmp_path):
+    (tmp_path / "small.toml").write_text(SUITE)
+    contender = own(tmp_path, "return 1 / 0")
+    done = invoke(tmp_path, "add", contender.source, "--results", str(tmp_path / "results"))
+    assert done.exit_code == 1
+    assert "3 cases failed: the other 3 are not run" in done.stdout
+    assert "and 2 more: act raised ZeroDivisionError: division by zero (line 9" in done.stdout
+    assert "Traceback" not in done.output
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("mine.py", "name a file and its class as path/to/file.py:ClassName, got 'mine.py'"),
+        ("{0}/none.py:Mine", "there is no file {0}/none.py; check the name and the folder"),
+        ("{0}/mine.py:Other", "has no class 'Other'; it has Mine"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_code_2(source, message, tmp_path):
+    own(tmp_path, "pass")
+    done = CliRunner().invoke(app, ["add", source.format(tmp_path)])
+    assert done.exit_code == 2 and done.stdout == ""
+    assert message.format(tmp_path) in done.stderr and done.stderr.count("\n") == 1

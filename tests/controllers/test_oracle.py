@@ -1,0 +1,155 @@
+"""The oracle: foresees what comes, knows the true station, and nothing of what is to come."""
+
+import numpy as np
+import pytest
+from scipy.optimize import lsq_linear
+
+from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
+from controllers.foresight import PLANS, Commands, Foresight
+from controllers.horizon import HORIZON_S, LONGEST, block_lengths, horizon
+from controllers.plan_search import Space, best_plan
+from pma_gym.envs import PMAEnv
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.plant import Condition, Plant
+
+LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
+DISTURBED = {"disturbances": "regulator_and_operator"}
+
+
+def commands_of(task, seed: int = 1, **options):
+    """Voltages that the oracle gave in an episode, and the environment."""
+    env = PMAEnv(task, **options)
+    env.reset(seed=seed)
+    oracle, ended, volts = Oracle(), False, []
+    oracle.see(env)
+    oracle.reset(env.reference, env.station)
+    while not ended:
+        volts.append(oracle.act(env.reading, env.time))
+        _, _, terminated, truncated, _ = env.step(env.action(volts[-1]))
+        ended = terminated or truncated
+    return np.array(volts), env
+
+
+# -- foresight -------------------------------------------------------------------------------------
+
+
+def test_foresight_is_what_the_plant_does():
+    plant = Plant("station")
+    condition, regulator = plant.settle(3.0, pressure=300e3), plant.regulator_voltage(300e3)
+    times = np.array([0.0, 0.01, 0.02, 0.05])
+    volts = np.array([[4.0, 2.0, 3.0], [0.0, 10.0, 5.0]])
+    seen = Foresight(plant, times)(condition, Commands(volts, regulator), 2)
+    for plan, row in enumerate(volts):
+        stepped = Condition(condition.state.copy(), condition.zero_contraction)
+        for k, volt in enumerate(row):
+            plant.step(stepped, volt, regulator, times[k + 1] - times[k])
+            truth = plant.observe(stepped.state[None, :], stepped.zero_contraction)
+            for name, scale in (("extension", 25e-3), ("rotation", 1.57), ("load", 500.0)):
+                assert seen[name][plan, k] == pytest.approx(truth[name][0], abs=1e-4 * scale)
+
+
+def test_what_is_foreseen_depends_on_no_other_plan_and_leaves_the_plant_alone():
+    plant = Plant("station")
+    condition = plant.settle(3.0, pressure=300e3)
+    before = condition.state.copy()
+    foresight = Foresight(plant, np.array([0.0, 0.01, 0.02]))
+    volts = np.linspace(0.0, 10.0, PLANS)[:, None] * np.ones(2)
+    together = foresight(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
+    alone = foresight(condition, Commands(volts[7:8], 5.0), 1)["extension"]
+    assert np.array_equal(alone[0], together[7])
+    assert np.array_equal(condition.state, before)
+
+
+# -- search ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("limit", [10.0, 1.0])
+def test_of_errors_linear_in_the_plan_it_finds_the_least_squares_within_limits(limit):
+    # Periods 0, 1, 2-3 and 4-7 of an unstable guess, changed by blocks from a plan in the middle.
+    generator, blocks = np.random.default_rng(1), np.array([0, 1, 2, 2, 3, 3, 3, 3])
+    matrix, wanted = generator.normal(size=(20, 8)), 5.0 * generator.normal(size=20)
+    plan, space = np.full(8, 5.0), Space(blocks, 5.0 - limit, 5.0 + limit)
+    found = best_plan(
+        lambda plans: (plans - 5.0) @ matrix.T - wanted, plan, plan[None, :] + 0.5, space
+    )
+    by_block = matrix @ np.eye(4)[blocks]
+    expected = lsq_linear(by_block, wanted, (-limit, limit)).x
+    assert found - 5.0 == pytest.approx(expected[blocks], abs=1e-5)
+
+
+def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_number():
+    def errors(plans):
+        return np.where(plans > 3.0, np.nan, np.cos(5.0 * plans) + 0.1 * plans**2)
+
+    starts = np.array([[1.0], [4.0], [2.0]])
+    found = best_plan(errors, np.zeros(1), starts, Space(np.zeros(1, int), 0.0, 5.0))
+    best = min(float(errors(s) ** 2) for s in (0.0, *starts[:, 0]) if s <= 3.0)
+    assert float(errors(found)[0] ** 2) <= best
+
+
+def test_a_plan_is_held_to_the_limits_period_by_period():
+    space = Space(np.array([0, 1, 1]), 1.0, 10.0)
+    changed = space.changed(np.array([2.0, 3.0, 9.0]), np.array([[-5.0, 2.0]]))
+    assert changed.tolist() == [[1.0, 5.0, 10.0]]
+    assert space.starts.tolist() == [0, 1]
+
+
+# -- horizon ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [50.0, 100.0, 384.0])
+@pytest.mark.parametrize("delay", [0, 2])
+def test_horizon_counts_every_scored_sample_once(rate, delay):
+    ahead = horizon(1.0 / rate, delay)
+    periods = sum(block_lengths(1.0 / rate))
+    assert periods == LONGEST or periods / rate >= HORIZON_S
+    assert np.sum(ahead.weights**2) == pytest.approx(len(ahead.blocks) * ahead.parts)
+    assert ahead.parts == round(SAMPLE_RATE_HZ / rate)
+    assert ahead.ends[-1] == len(ahead.blocks) * ahead.parts and np.all(np.diff(ahead.ends) > 0)
+    assert ahead.ends[0] - ahead.parts * (1 - delay) <= 0 and ahead.ends[0] > -delay * ahead.parts
+
+
+# -- the oracle ------------------------------------------------------------------------------------
+
+
+def test_it_must_be_shown_the_environment(station):
+    with pytest.raises(ValueError, match=r"must be shown the environment.*see\(environment\)"):
+        Oracle().reset(lambda time: 0.0, station())
+
+
+@pytest.mark.parametrize("options", [{}, LATE, LATE | DISTURBED], ids=["100hz", "late", "hard"])
+@pytest.mark.parametrize(("task", "pressure"), [("displacement", 300), ("rotation", 400)])
+def test_it_beats_feedforward_and_feedback(task, pressure, options, drive):
+    bound, _ = drive(Oracle(), task, pressure, **options)
+    for rival in (ImprovedFeedforward(), FeedforwardPID()):
+        got, _ = drive(rival, task, pressure, **options)
+        assert all(bound[phase] < got[phase] for phase in bound)
+
+
+def test_it_knows_a_station_that_is_not_its_model(drive):
+    got, _ = drive(Oracle(), "displacement", 300, randomisation="varied")
+    told, _ = drive(ImprovedFeedforward(), "displacement", 300, randomisation="varied")
+    assert got["displacement"] < 0.015 < 0.05 * told["displacement"]
+
+
+def test_it_commands_the_regulator_where_that_is_the_actuator(drive):
+    for options in ({}, LATE):
+        got, _ = drive(Oracle(), "triangle_low", 150, **options)
+        told, _ = drive(ImprovedFeedforward(), "triangle_low", 150, **options)
+        assert all(got[phase] < 0.8 * told[phase] for phase in got)
+
+
+def test_no_noise_enters_it():
+    noisy, _ = commands_of("displacement", pressure_kpa=300.0)
+    other, _ = commands_of("displacement", seed=2, pressure_kpa=300.0)
+    silent, _ = commands_of("displacement", noise=False, pressure_kpa=300.0)
+    assert np.array_equal(noisy, silent) and np.array_equal(noisy, other)
+
+
+def test_it_does_not_know_disturbances_to_come():
+    calm, _ = commands_of("displacement", pressure_kpa=300.0)
+    disturbed, env = commands_of("displacement", pressure_kpa=300.0, disturbances="regulator")
+    # It comes with this step, whose command is given before it.
+    step = int(np.ceil(env.events.step_times[0] / env.options.period))
+    assert np.array_equal(calm[: step + 1], disturbed[: step + 1])
+    assert calm[step + 1] != disturbed[step + 1]
