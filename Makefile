@@ -78,7 +78,7 @@ $(BIN)/pip:
 
 $(CORE): $(REQUIREMENTS) | $(BIN)/pip
 	@echo "Installing the core into $(VENV) (about a minute)"
-	@$(INSTALL) -e . || $(EXPLAIN)
+	@$(INSTALL) -e '.[mpc]' || $(EXPLAIN)
 	@touch $@
 
 $(FULL): $(REQUIREMENTS) | $(CORE)

@@ -2,8 +2,9 @@
 
 For every controller with settings, loop and kind of task:
 
-1. Start: the defaults of the controller's file.
-2. Search: Nelder-Mead on the logarithms of the settings that the file bounds (`BOUNDS`). The cost
+1. Start: the best of the defaults of the controller's file and of `SCATTERED` points of a Latin
+   hypercube in the logarithms of the settings that the file bounds (`BOUNDS`).
+2. Search: Nelder-Mead from there, in the same logarithms. The cost
    of settings is the mean, over `STATIONS` training stations of the suite that has this loop, of
    what a trial with its noise, delays and disturbances costs:
 
@@ -30,6 +31,7 @@ from typing import Any
 import numpy as np
 from rich.progress import Progress
 from scipy.optimize import minimize
+from scipy.stats.qmc import LatinHypercube, scale
 
 from benchmarks.comparison.stations import draw_station
 from benchmarks.comparison.suite import FrozenSuite, frozen_suite
@@ -48,7 +50,8 @@ SUITES = ("robust", "hard", "pressure")
 """Suites whose loops and tasks controllers are designed for; on other stations than theirs."""
 
 STATIONS = 8
-EVALUATIONS = 40
+SCATTERED = 12
+EVALUATIONS = 28
 FAILED = 100.0
 CONTRACTION_TARGET = 0.3e-3
 """What an RMSE (m) is counted against in contraction tasks: three times that of displacement, the
@@ -189,25 +192,28 @@ def design(search: Search) -> Found:
     def cost(logs: np.ndarray) -> float:
         return mean_cost(factory, settings(logs), drills, search.suite)
 
-    first = np.log([getattr(start, name) for name in names])
     limits = np.log([bounds[name] for name in names])
-    simplex = np.vstack([first, first + 0.7 * np.diag(np.where(first < limits.mean(1), 1, -1))])
+    first = np.log([getattr(start, name) for name in names])
+    scattered = LatinHypercube(len(names), rng=np.random.default_rng(search.seed))
+    points = [first, *scale(scattered.random(SCATTERED), limits[:, 0], limits[:, 1])]
+    costs = [cost(point) for point in points]
+    nearest = points[int(np.argmin(costs))]
+    simplex = np.vstack(
+        [nearest, nearest + 0.5 * np.diag(np.where(nearest < limits.mean(1), 1, -1))]
+    )
     found = minimize(
         cost,
-        first,
+        nearest,
         method="Nelder-Mead",
         bounds=limits,
-        options={
-            "maxfev": EVALUATIONS,
-            "initial_simplex": np.clip(simplex, limits[:, 0], limits[:, 1]),
-        },
+        options={"maxfev": EVALUATIONS, "initial_simplex": simplex},
     )
-    first_cost, best = cost(first), settings(found.x)
-    if found.fun >= first_cost:
-        best, found.fun = start, first_cost
+    best, least = (settings(found.x), float(found.fun))
+    if costs[0] <= least:
+        best, least = start, costs[0]
     station = _environment(search.suite, drills[0]).station
     values = {name: getattr(best, name) for name in names}
-    return Found(values, float(found.fun), first_cost, loop_name(station))
+    return Found(values, least, costs[0], loop_name(station))
 
 
 def mean_cost(factory: Any, settings: Any, drills: list[_Drill], suite: str) -> float:  # noqa: ANN401
@@ -290,7 +296,7 @@ def _write(out: Path, document: dict[str, Any], search: Search, found: Found) ->
         "training_seed": getattr(frozen_suite(search.suite).recipe, "training_seed", None),
         "seed": search.seed,
         "stations": STATIONS,
-        "evaluations": EVALUATIONS,
+        "evaluations": 1 + SCATTERED + EVALUATIONS,
         "cost_of_defaults": round(found.first_cost, 4),
         "cost": round(found.cost, 4),
     }

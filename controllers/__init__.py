@@ -7,6 +7,7 @@ from controllers.controller import Controller, Reference
 from controllers.feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
 from controllers.ilc import ILC
 from controllers.lqg import LQG
+from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
 from controllers.sliding_mode import SlidingMode
@@ -20,6 +21,7 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "lqg": LQG,
     "adrc": ADRC,
     "sliding_mode": SlidingMode,
+    "mpc": PreviewMPC,
     "ilc": ILC,
     "oracle": Oracle,
 }
@@ -35,6 +37,7 @@ __all__ = [
     "FeedforwardPID",
     "ImprovedFeedforward",
     "Oracle",
+    "PreviewMPC",
     "Reference",
     "SerresFeedforward",
     "SerresReplay",

@@ -35,8 +35,8 @@ BOUNDS = {"controller_bandwidth": (0.2, 3.0), "observer_bandwidth": (0.1, 3.0)}
 
 DEFAULTS = {
     "displacement": Settings(0.8, 0.5),
-    "rotation": Settings(0.7, 0.4),
-    "contraction": Settings(0.8, 0.6),
+    "rotation": Settings(0.6, 0.35),
+    "contraction": Settings(0.5, 0.45),
 }
 """Settings by kind of task for what `controllers/designs.json` does not give."""
 

@@ -87,32 +87,6 @@ class DampingBank:
             estimates = self.moved(estimates, period, sent[period])
         return estimates
 
-    def resume(self, reading: Reading, rotor: np.ndarray, radius: float) -> None:
-        """Begin again where the cable has tightened; what is not said here stays.
-
-        The cable has its nominal stretch and the slide is at rest. The task's own position sensor
-        is believed, the other one is off by the gap.
-
-        Args:
-            reading: what the sensors say.
-            rotor: its angle (rad), rate (rad/s) and the drive's offset (V).
-            radius: of the rotor (m).
-        """
-        k, motion = round(reading.time / self._period), self.design.motion
-        places = {name: at for at, name in enumerate(motion.names)}
-        nominal, x = motion.states[k], self.estimates
-        wound = radius * (rotor[0] - nominal[places["angle"]])
-        pulled = reading.extension - motion.readings[k, 0]
-        own, x[:, -1] = (wound, pulled - wound) if self.design.own else (pulled, wound - pulled)
-        for name in ("contraction", "lag_lvdt"):
-            x[:, places[name]] = -own
-        for name in ("angle", "lag_potentiometer"):
-            x[:, places[name]] = own / radius
-        x[:, places["velocity"]] = -nominal[places["velocity"]]
-        x[:, places["spin"]] = rotor[1] - nominal[places["spin"]]
-        x[:, self.design.drive] = rotor[2]
-        self.taken = k
-
     def see(self, reading: Reading, sent: list[float]) -> None:
         """Take in what the sensors say; a reading that was heard before says nothing new.
 
@@ -121,6 +95,8 @@ class DampingBank:
             sent: voltages in force in the periods so far (V), at least up to that time.
         """
         k, design = round(reading.time / self._period), self.design
+        if k <= self.taken:
+            return
         self.estimates, self.taken = self.at(k, sent), k
         nominal = design.motion.readings[k]
         off = np.array([reading[1], reading[2], reading[4]]) - nominal[[0, 1, 3]]

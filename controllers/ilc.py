@@ -160,7 +160,7 @@ class ILC:
         without = errors + plant.response(np.array(self._added[:count]))
         # A cable that is tight for a moment only, or by the load cell's noise, is still slack, and
         # the first reading after it has come tight still that of the flight.
-        taut = binary_opening(np.array(self._taut[late:]), np.ones(TIGHT_STEPS))
+        taut = np.array(binary_opening(self._taut[late:], np.ones(TIGHT_STEPS)), bool)
         taut[1:] &= taut[:-1].copy()
         change = plant.change(without, taut, self.settings.cutoff)
         smooth = 2.0 * self.settings.cutoff * station.period

@@ -8,19 +8,18 @@ In deviations from the nominal motion the plant is, near a place of the stroke,
 y the position's deviation, v the voltage in force beside the nominal motion's V. Of what the
 nominal model does not know, d is a voltage and s a share of H, the voltage that holds the position:
 a muscle that pulls 10 % harder needs 10 % more all along the way, which a filter that knows H need
-not learn anew at every place.
-Their estimates are the integral action: a controller that subtracts both leaves no steady error.
-What the measured pressure explains is known and left out of d.
+not learn anew at every place. Their estimates are the integral action: a controller that subtracts
+both leaves no steady error. What the measured pressure explains is known and left out.
 
 The model changes along the way, so the covariance is computed as it goes. Three things are no
 Gaussian noise:
 
 - A jump (somebody pushes): where a reading lies further off than `SURPRISE` standard deviations,
-  d may have changed by `JUMP_V` in the period before.
-- A wrong model: w also has a share `DOUBT` of what moves the plant beside the plan, so that the
-  answer to a large correction is not taken for another disturbance.
+  d may have changed by `JUMP` in the period before.
+- A wrong model: w also has a share `DOUBT` of what moves the plant, so that the answer to a large
+  correction, or to a step of the plan, is not taken for another disturbance.
 - A cable that does not pull, which the load cell and both position sensors show: d and s then
-  explain nothing and stay. Before the first pull a rotation is that of the rotor alone.
+  explain nothing and stay. Before the first pull x is the rotor's alone.
 """
 
 import math
@@ -29,11 +28,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.local_model import VOLTAGE_LIMIT, LocalModel, observer_form
+from controllers.cable import Cable, free_rotor
+from controllers.local_model import VOLTAGE_LIMIT, LocalModel
 from controllers.motion import NominalMotion
 from controllers.pressure import PressureFilter
 from controllers.stroke import sensor_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Reading
 
 ONSET_V = {"motor": 0.2, "regulator": 0.05}
 """Standard deviation of d as the motion begins (V), by actuator: 20 N, for what the muscle pulls is
@@ -51,11 +51,12 @@ SHARE_TIME_S = 10.0
 SURPRISE = 3.5
 """Standard deviations of a reading beyond which d may have jumped."""
 
-JUMP_V = 0.5
-"""By how much d may have jumped (V): 50 N."""
+JUMP = (0.5, 0.25)
+"""By how much d may have jumped (V): 50 N. And how soon again (s): a model that is wrong is
+surprised all the time."""
 
-JUMP_APART_S = 0.25
-"""Time between two jumps (s), at least: a model that is wrong is surprised all the time."""
+FREE_JUMP = (0.02, 0.05)
+"""The same before the cable first tightens, for a drive may have a dead zone."""
 
 DOUBT = 0.2
 """Share to which the model's gain and lag are known."""
@@ -63,18 +64,8 @@ DOUBT = 0.2
 FREE_V = 2e-3
 """Standard deviation of what pushes a rotor on a loose cable (V); its friction is known."""
 
-FREE_ONSET_V = 5e-3
+FREE_ONSET_V = 8e-3
 """Standard deviation of the drive's offset before the cable first tightens (V)."""
-
-LOOSE_LOAD_N, LOOSE_WAY_M = 3.0, 0.25e-3
-"""A cable is slack where its tension is below this, and it is wound in by so much less than its
-slack: four standard deviations of the sensors each."""
-
-SLACK_S = 35e-3
-"""How long a cable must be slack to hang loose (s), and not to bounce."""
-
-IMPACT_S = 25e-3
-"""How long the rotor may swing as the cable tightens (s)."""
 
 
 class Unknowns(NamedTuple):
@@ -87,48 +78,6 @@ class Unknowns(NamedTuple):
 
     agitation: float
     disturbance: float
-
-
-class Cable:
-    """Whether the cable of a station pulls, by its sensors.
-
-    Args:
-        station: the nominal station; one without a cable, as a cascade, always pulls, and so does
-            one whose motor holds a load.
-
-    Attributes:
-        tightened: whether it has pulled at all.
-        loose: whether it hangs loose: before it first pulls, and where it has been slack a while.
-        settling: whether it does, or did just now: the rotor may still swing.
-    """
-
-    def __init__(self, station: Station) -> None:
-        parameters = station.model.parameters
-        self._exists = "cable" in parameters and station.task.actuator == "motor"
-        self.loose = self.settling = self._exists
-        self.tightened = not self._exists
-        self._slack_from, self._slack_until = 0.0, 0.0
-        self._zero: float | None = None
-        if self._exists:
-            self._radius = parameters["rotor"].radius
-            self._least = parameters["cable"].slack - LOOSE_WAY_M
-
-    def see(self, reading: Reading) -> None:
-        """Take a reading."""
-        if not self._exists:
-            return
-        if self._zero is None:
-            # A trial begins without load: what the cell says then is its offset.
-            self._zero = reading.load
-        pulls = reading.load - self._zero >= LOOSE_LOAD_N
-        self.tightened = self.tightened or pulls
-        way = self._radius * reading.rotation - reading.extension
-        if not self.tightened or (not pulls and way < self._least):
-            self._slack_until = reading.time
-            self.loose = self.loose or reading.time >= self._slack_from + SLACK_S
-        else:
-            self._slack_from, self.loose = reading.time, False
-        self.settling = reading.time < self._slack_until + IMPACT_S
 
 
 class DeviationFilter:
@@ -264,19 +213,20 @@ class DeviationFilter:
         agitation = FREE_V**2 if self.alone else self._agitation + self._doubt(voltage)
         self.estimate = whole @ self.estimate + push * voltage
         spread = whole @ self._covariance @ whole.T + agitation * push[:, None] * push
-        self._covariance = spread + self._drift
+        self._covariance = spread if self.alone else spread + self._drift
         self._taken += 1
 
     def _doubt(self, voltage: float) -> float:
-        """Variance of the voltage (V^2) by which the model may misjudge a motion beside the plan.
+        """Variance of the voltage (V^2) by which the model may misjudge the motion.
 
-        Its gain and its lag are known to a share, so what pushes the plant there and what holds it
-        are, each.
+        Its gain and its lag are known to a share, so what pushes the plant beside the plan and what
+        holds it there are, each, and what the plan moves it with.
         """
         n, state, time = self.order, self.estimate, self._taken * self._period
         pushed = voltage + float(state[n] + state[n + 1] * self.held(time))
-        gain = self._stroke.models[self._at(time)].gain
-        return DOUBT**2 * (pushed * pushed + (float(state[0]) / gain) ** 2)
+        at = self._at(time)
+        gain, planned = self._stroke.models[at].gain, self.nominal(time) - self._stroke.volts[at]
+        return DOUBT**2 * (pushed**2 + (float(state[0]) / gain) ** 2 + planned**2)
 
     def _note(self, reading: Reading) -> None:
         """Take in whether the cable pulls."""
@@ -309,11 +259,12 @@ class DeviationFilter:
         noise = self._free_noise if self.alone else self._noise
         spread = covariance[0, 0] + noise
         surprising = error * error > SURPRISE**2 * spread and self._taken > self._next_jump
-        if surprising and not self.cable.settling:
-            self._next_jump = self._taken + JUMP_APART_S / self._period
+        if surprising and (self.alone or not self.cable.settling):
+            size, apart = FREE_JUMP if self.alone else JUMP
+            self._next_jump = self._taken + apart / self._period
             jump = self._system(self._taken - 1).push.copy()
             jump[self.order] = 1.0
-            covariance = covariance + JUMP_V**2 * jump[:, None] * jump
+            covariance = covariance + size**2 * jump[:, None] * jump
             spread = covariance[0, 0] + noise
         gain = covariance[:, 0] / spread
         self.estimate += gain * error
@@ -332,7 +283,7 @@ class _System(NamedTuple):
     """What a period does to x, d and s.
 
     Attributes:
-        whole: by themselves, shape (n + 2, n + 2); the column of s, which depends on V, is left
+        whole: by themselves, shape (n + 2, n + 2); the column of s, which depends on H, is left
             for whoever uses it.
         push: per volt, shape (n + 2,).
     """
@@ -348,28 +299,3 @@ class _System(NamedTuple):
         whole[:n, :n] = np.eye(n, k=1)
         whole[:n, 0], whole[:n, n] = column, b
         return cls(whole, np.append(b, [0.0, 0.0]))
-
-
-def free_rotor(station: Station, order: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """The rotor on a loose cable, sampled, in observer form; None where it never is alone.
-
-    theta'' = (r g V - B_M theta') / J; the sensor's lag is left out.
-
-    Args:
-        station: the nominal station.
-        order: order of the local models; 2 at least, else there is no room for it.
-    Returns:
-        Columns a_1 ... a_n and b_1 ... b_n of the local models, shape (order,) each.
-    """
-    parameters, period = station.model.parameters, station.period
-    if station.task.actuator != "motor" or "cable" not in parameters or order < 2:
-        return None
-    rotor, drive = parameters["rotor"], parameters["drive"]
-    rate, push = rotor.damping / rotor.inertia, rotor.radius * drive.gain / rotor.inertia
-    slowed = -math.expm1(-rate * period) / rate
-    a = np.array([[1.0, slowed], [0.0, 1.0 - rate * slowed]])
-    b = push * np.array([(period - slowed) / rate, slowed])
-    found = observer_form((a, b, np.array([1.0, 0.0])))
-    columns = np.zeros((2, order))
-    columns[:, :2] = found.reshape(2, 2) * [[-1.0], [1.0]]
-    return columns[0], columns[1]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
+from controllers.cable import free_rotor
 from controllers.controller import Reference
 from controllers.designs import designed, task_kind
 from controllers.kalman import (
@@ -13,7 +14,6 @@ from controllers.kalman import (
     SHARE_TIME_S,
     DeviationFilter,
     Unknowns,
-    free_rotor,
     with_disturbance,
 )
 from controllers.local_model import FINE, VOLTAGE_LIMIT, LocalModel, Stroke
@@ -80,7 +80,6 @@ class LQG:
         settings: settings to use instead of those designed for the loop.
 
     Example:
-        >>> import math
         >>> from pma_gym.envs import PMAEnv
         >>> env = PMAEnv("displacement", pressure_kpa=300)
         >>> _ = env.reset(seed=1)

@@ -10,8 +10,7 @@ from controllers.bounded_program import BoundedProgram
 from controllers.controller import Reference
 from controllers.damping_bank import DampingBank
 from controllers.designs import designed
-from controllers.linear_motion import LOOSE_N, VOLTAGE_LIMIT, linear_motion
-from controllers.loose_rotor import LooseRotor
+from controllers.linear_motion import VOLTAGE_LIMIT, linear_motion
 from controllers.motion import nominal_motion
 from controllers.nominal import Nominal
 from pma_gym.envs import Reading, Station
@@ -126,82 +125,20 @@ class PreviewMPC:
         changes = np.eye(trial.horizon) - np.eye(trial.horizon, k=-1)
         self._effort = self.settings.effort * changes.T @ changes
         self._entries = np.tril_indices(trial.horizon)
-        hangs = self._pulls and "cable" in station.model.parameters
-        self._rotor = LooseRotor(self._design.motion, station) if hangs else None
-        self._loose, self._taken, self._unloaded, self._tightened = False, -1, None, False
-        self._radius = station.model.parameters["rotor"].radius if hangs else 1.0
-        self._rotates = station.task.protocol.quantity == "rotation"
 
     def act(self, observation: Reading, time: float) -> float:
         """Voltage of the task's actuator (V) to hold for the next control period."""
-        self._see(observation)
-        first = round(time / self._period) + self._delay
-        if first >= self._design.motion.last:
-            volts = float(self._design.motion.volts[-1])
-        elif self._loose:
-            volts = self._loose_volts(first)
-        else:
-            volts = self._taut_volts(first)
+        self._bank.see(observation, self._sent)
+        volts = self._volts(round(time / self._period) + self._delay)
         self._sent.append(volts)
         return volts
 
-    def _see(self, reading: Reading) -> None:
-        """Take in what the sensors say; a reading that was heard before says nothing new."""
-        k, bank, rotor = round(reading.time / self._period), self._bank, self._rotor
-        if k <= self._taken:
-            return
-        if self._unloaded is None:
-            self._unloaded = reading.load if rotor else 0.0
-        loose = rotor is not None and reading.load - self._unloaded < LOOSE_N
-        self._tightened |= not loose
-        loose = loose and self._tightened and (self._loose or self._slackens(k))
-        if loose:
-            if not self._loose:
-                rotor.state[2] = (bank.weights @ bank.estimates)[self._design.drive]
-                x = bank.weights @ bank.at(k, self._sent)
-                nominal = self._design.motion.states[k]
-                a, b = (self._design.motion.names.index(n) for n in ("angle", "spin"))
-                rotor.release(x[a] + nominal[a], x[b] + nominal[b])
-            else:
-                for at in range(max(self._taken, 0), k):
-                    rotor.pass_period(self._sent[at])
-            rotor.see(reading.rotation)
-        elif self._loose and rotor is not None:
-            for at in range(max(self._taken, 0), k):
-                rotor.pass_period(self._sent[at])
-            bank.resume(reading, rotor.state, self._radius)
-        else:
-            bank.see(reading, self._sent)
-        self._loose, self._taken = loose, k
-
-    def _slackens(self, k: int) -> bool:
-        return bool(np.any(self._design.motion.readings[k : k + self._count + 1, 2] < LOOSE_N))
-
-    def _loose_volts(self, first: int) -> float:
-        rotor, motion, count = self._rotor, self._design.motion, self._count
-        state = rotor.state
-        for k in range(self._taken, first):
-            state = rotor.moved(state, self._sent[k])
-        angles, effect = rotor.outlook(state, count)
-        target = motion.states[first + 1 : first + 1 + count, motion.names.index("angle")]
-        if self._rotates:
-            target = target - motion.error[first + 1 : first + 1 + count]
-        idle = motion.idle - state[2]
-        counted = np.arange(first + 1, first + 1 + count) <= motion.last
-        error, effect = (angles - target) * counted, effect * counted[:, None]
-        before = max(self._sent[-1] - idle, 0.0) if self._sent else 0.0
-        square, linear = self._program_of(effect, error, before)
-        low = np.full(count, max(-idle, 0.0))
-        plan = self.program.solve(square, linear, low, np.full(count, VOLTAGE_LIMIT - idle))
-        pull = 0.0 if plan is None else float(plan[0])
-        self._plan = np.zeros(count)
-        return min(max(idle + pull, 0.0), VOLTAGE_LIMIT) if pull > LEAST_PUSH_V else 0.0
-
-    def _taut_volts(self, first: int) -> float:
-        """Voltage (V) for the period `first`, at whose start the estimates will hold."""
+    def _volts(self, first: int) -> float:
+        """Voltage (V) for the period `first`."""
         design, motion, bank = self._design, self._design.motion, self._bank
-        estimates = bank.at(first, self._sent)
-        weights, low = bank.weights, 0.0
+        if first >= motion.last:
+            return float(motion.volts[-1])
+        estimates, weights, low = bank.at(first, self._sent), bank.weights, 0.0
         if self._pulls:
             low = max(motion.idle - float(weights @ estimates[:, design.drive]), 0.0)
         nominal = motion.volts[first : first + self._count]
@@ -223,13 +160,10 @@ class PreviewMPC:
         ends, begins = self._entries
         effect = np.zeros((count, count))
         effect[ends, begins] = response[begins, ends - begins + 1]
-        return self._program_of(effect, free, self._plan[0])
-
-    def _program_of(self, effect: np.ndarray, free: np.ndarray, before: float):
         square = effect.T @ effect
-        scale = max(float(np.trace(square)) / self._count, 1e-30)
+        scale = max(float(np.trace(square)) / count, 1e-30)
         linear = effect.T @ free / scale
-        linear[0] -= self.settings.effort * before
+        linear[0] -= self.settings.effort * self._plan[0]
         return square / scale + self._effort, linear
 
 

@@ -15,7 +15,7 @@ import math
 from pma_gym.envs import Station
 from pma_gym.plant import sensors
 
-SURPRISE = 3.5
+SURPRISE = 4.5
 """Standard deviations of a reading beyond which J has jumped, or the transducer has an offset."""
 
 JUMP_PA = 25e3

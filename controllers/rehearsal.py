@@ -16,8 +16,8 @@ LEARNED_SHARE = 0.7
 WINDOW_S = 0.2
 """Width of the window (s) over which errors are averaged: some lags of the plant."""
 
-LEFT_OUT_S = 0.1
-"""Time from the first command on (s) in which a cable tightens, and nothing is to be learned."""
+LEAST_LOAD_N = 5.0
+"""Load (N) under which a cable may be slack, and an error tells nothing of the voltage."""
 
 
 def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
@@ -28,7 +28,7 @@ def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
         volts: actuator's voltage to be in force in every period (V), shape (steps,); held to
             0-10 V, and to where the trial begins until the first command is in force.
     Returns:
-        Contraction (m) and rotation (rad) from the start, shape (2, steps + 1).
+        Contraction (m) and rotation (rad) from the start, load (N), shape (3, steps + 1).
     """
     plant, (motor, regulator) = Plant(station.model), rest_voltages(station)
     moves_regulator = station.task.actuator == "regulator"
@@ -40,13 +40,14 @@ def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
     times = station.period * np.arange(len(held))
     states, zero = plant.run(times, *commands, joined=False, condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
-    found = said[:, [plant.outputs.index(name) for name in ("contraction", "rotation")]]
-    return np.transpose(found - found[0])
+    found = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
+    found[:2] -= found[:2, :1]
+    return found
 
 
 def position_of(station: Station, said: np.ndarray) -> np.ndarray:
     """The position that the task asks for (m or rad), shape (n,), of what `rehearsed` returns."""
-    contraction, rotation = said
+    contraction, rotation, _ = said
     quantity = station.task.protocol.quantity
     return {"extension": -contraction, "rotation": rotation, "contraction": contraction}[quantity]
 
@@ -58,8 +59,8 @@ def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: St
 
     e is the plan less what the sensor says, g the static gain there. An inverse makes no error but
     for what its steps leave out, as friction's memory of a voltage that was held to a limit; of a
-    few hundredths of a degree in a hold, a third is left. Where a voltage is beyond its limits it
-    stays, and nothing is learned from there.
+    few hundredths of a degree in a hold, a third is left. Where a voltage is beyond its limits, or
+    the cable does not pull, it stays, and nothing is learned from there.
 
     Args:
         station: as of `rehearsed`.
@@ -71,11 +72,13 @@ def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: St
     places = [stroke.nearest(position) for position in wanted[1:].tolist()]
     gains = np.array([stroke.models[place].gain for place in places])
     window = np.hanning(2 * round(0.5 * WINDOW_S / station.period) + 3)
-    first = round((station.action_delay + LEFT_OUT_S) / station.period)
+    pulls = "cable" in station.model.parameters
     for _ in range(REPETITIONS):
-        error = wanted - position_of(station, rehearsed(station, volts))
+        said = rehearsed(station, volts)
+        error = wanted - position_of(station, said)
         possible = (volts >= 0.0) & (volts <= VOLTAGE_LIMIT)
-        possible[:first] = False
+        if pulls:
+            possible &= said[2, 1:] > LEAST_LOAD_N
         called_for = np.convolve(np.where(possible, error[1:] / gains, 0.0), window, "same")
         weight = np.convolve(possible, window, "same")
         step = np.divide(called_for, weight, out=np.zeros_like(volts), where=possible)

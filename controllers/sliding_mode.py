@@ -38,9 +38,9 @@ BOUNDS = {
 """Between what a search looks for settings."""
 
 DEFAULTS = {
-    "displacement": Settings(0.8, 0.5, 0.2),
-    "rotation": Settings(0.7, 0.4, 0.2),
-    "contraction": Settings(0.8, 0.6, 0.2),
+    "displacement": Settings(1.2, 0.4, 0.05),
+    "rotation": Settings(1.5, 0.35, 0.03),
+    "contraction": Settings(1.2, 0.4, 0.05),
 }
 """Settings by kind of task for what `controllers/designs.json` does not give."""
 

@@ -6,21 +6,30 @@ import numpy as np
 import pytest
 
 from controllers import ImprovedFeedforward, SerresReplay
+from controllers.inverse import inverse_of
 from pma_gym.data.serres2008 import pressures
 from pma_gym.envs import Station
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.tasks import TASKS
+from pma_gym.tasks import EVERY_TASK, TASKS
 
 FRICTIONLESS = {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
 TRIALS = [(task, p) for task in ("displacement", "rotation") for p in pressures(task)]
 
 
-def voltages(station, **changes):
+def voltages(station):
     controller = ImprovedFeedforward()
     controller.reset(lambda time: float(station.task.protocol.reference(time)), station)
     steps = station.task.steps(1.0 / station.period)
     return np.array([controller.voltage(k * station.period) for k in range(steps)])
+
+
+def inverted(station):
+    """As the inverse gives them, before they are rehearsed."""
+    inverse, steps = inverse_of(station.model), station.task.steps(1.0 / station.period)
+    parts = inverse.parts(station.period)
+    times = np.arange(steps * parts + 1) * station.period / parts
+    return inverse.along(station.task.protocol.reference(times), station)
 
 
 def test_while_held_it_asks_for_the_voltage_that_settles_there():
@@ -37,7 +46,7 @@ def test_lag_is_compensated_by_the_damping_of_the_model():
     model = load_model("serres2008").replace(FRICTIONLESS)
     where = Station(model, TASKS["displacement"], 300e3, 0.01)
     plant = Plant(model)
-    volts, middle = voltages(where), 5e-3 * 2.505
+    volts, middle = inverted(where), 5e-3 * 2.505
     static = plant.settle(3.0, pressure=300e3)
     truth = plant.observe(static.state[None, :], static.zero_contraction)
     stiffness = truth["load"][0] / truth["extension"][0]  # serres2008 is linear in x
@@ -48,7 +57,7 @@ def test_lag_is_compensated_by_the_damping_of_the_model():
 
 def test_cascade_gets_the_lower_root_of_its_map():
     model = load_model("cascade")
-    volts = voltages(Station(model, TASKS["displacement"], 300e3, 0.01))
+    volts = inverted(Station(model, TASKS["displacement"], 300e3, 0.01))
     lag = 1.57e3 / (32.7e3 - 0.0321e3 * 300)
     wanted = 5e-3 * (2.505 + lag)
     assert np.polyval([-0.0005, 0.0107, -0.0050], volts[250]) == pytest.approx(wanted, abs=1e-8)
@@ -107,3 +116,35 @@ def test_it_follows_any_reference(station):
     slow = controller.voltage(4.0)
     controller.reset(lambda time: 5e-3 * time, where)
     assert 0.0 < slow < controller.voltage(4.0)
+
+
+@pytest.mark.parametrize("task", ["displacement", "rotation"])
+def test_a_late_command_is_sent_early(task, drive):
+    # 50 Hz, and a command in force 20 ms after it was sent.
+    got, _ = drive(
+        ImprovedFeedforward(), task, 400, noise=False, control_rate_hz=50.0, action_delay_s=0.02
+    )
+    assert max(got.values()) < (0.03 if task == "displacement" else 0.15)
+
+
+@pytest.mark.parametrize(
+    ("task", "pressure"), [("isotonic", 300), ("triangle_low", 150), ("triangle_high", 450)]
+)
+def test_the_regulator_is_led_as_well(task, pressure, drive):
+    got, _ = drive(ImprovedFeedforward(), task, pressure, noise=False)
+    assert max(got.values()) < 0.02
+
+
+def test_the_regulator_gets_the_voltage_that_holds(station):
+    # In the hold of the isotonic task: settle there by the plant's own statics.
+    model = load_model("serres2008").replace(FRICTIONLESS)
+    where = Station(model, EVERY_TASK["isotonic"], 300e3, 0.01)
+    controller, plant = ImprovedFeedforward(), Plant(model)
+    controller.reset(where.task.protocol.at, where)
+    motor = (200.0 + 2.0) / 97.84
+    rests = [
+        plant.settle(motor, regulator_voltage=volts)
+        for volts in (plant.regulator_voltage(300e3), controller.voltage(4.5))
+    ]
+    at = plant.states.index("contraction")
+    assert rests[1].state[at] - rests[0].state[at] == pytest.approx(12.5e-3, abs=2e-6)
