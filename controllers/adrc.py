@@ -30,8 +30,9 @@ class Settings(NamedTuple):
     feedforward: float = 1.0
 
 
-BOUNDS = {"controller_bandwidth": (0.2, 3.0), "observer_bandwidth": (0.1, 3.0)}
-"""Between what a search looks for settings."""
+BOUNDS = {"controller_bandwidth": (0.2, 3.0), "observer_bandwidth": (0.1, 2.0)}
+"""Between what a search looks for settings. With an observer of 3 the loop's largest sensitivity at
+50 Hz with commands 20 ms late would be 5.8 where the muscle is stiffest, of 2 it is 2.6."""
 
 DEFAULTS = {
     "displacement": Settings(0.8, 0.5),
@@ -65,7 +66,8 @@ class ADRC:
     disturbance has a slope, which a muscle of another force causes on the way at constant speed.
 
     The feed-forward is the nominal motion's voltage. With `feedforward=0` it is what the
-    reference's speed asks for, (sum tau) r' / g, and the statics are part of d.
+    reference's speed asks for, (sum tau) r' / g, and the statics are part of d: on eight drawn
+    stations at 100 Hz that left 0.051 mm of displacement instead of 0.026 mm.
 
     Args:
         settings: settings to use instead of the designed ones.

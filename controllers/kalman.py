@@ -119,6 +119,7 @@ class DeviationFilter:
         self._onset = ONSET_V[self._station.task.actuator]
         self._covariance[n, n] = (FREE_ONSET_V if self.cable.loose else self._onset) ** 2
         self._next_jump = -math.inf
+        self.surprise = 1.0
 
     @property
     def alone(self) -> bool:
@@ -258,7 +259,9 @@ class DeviationFilter:
         covariance, error = self._covariance, deviation - float(self.estimate[0])
         noise = self._free_noise if self.alone else self._noise
         spread = covariance[0, 0] + noise
-        surprising = error * error > SURPRISE**2 * spread and self._taken > self._next_jump
+        surprise = error * error / spread
+        self.surprise += self._period / 0.3 * (min(surprise, 16.0) - self.surprise)
+        surprising = surprise > SURPRISE**2 and self._taken > self._next_jump and self.surprise < 4
         if surprising and (self.alone or not self.cable.settling):
             size, apart = FREE_JUMP if self.alone else JUMP
             self._next_jump = self._taken + apart / self._period

@@ -8,8 +8,7 @@ error. Deviations x of the states from that motion follow, in every control peri
 
 v_m and v_r being deviations of the voltages of motor and regulator. A and b are the derivatives of
 the plant's own equations in the middle of the period. Memories (hysteresis, dry friction, creep)
-stay as they are on the way: the muscle goes on sliding. Where the nominal cable hangs loose, A and
-b are those of the nearest period in which it does not.
+stay as they are on the way: the muscle goes on sliding.
 """
 
 from typing import NamedTuple
@@ -109,10 +108,7 @@ def linear_motion(
     inputs = np.stack([pulling, commands[1], np.full(len(volts), zero)], axis=1)
     kept = _kept(plant)
     middle = 0.5 * (states[:-1] + states[1:])
-    hangs = "cable" in station.model.parameters and moved_by_motor
-    taut = np.flatnonzero(readings[:-1, 2] >= (LOOSE_N if hangs else -np.inf))
-    nearest = _nearest(taut, len(volts))
-    a, b = _derivatives(plant, middle[nearest], inputs[nearest], kept)
+    a, b = _derivatives(plant, middle, inputs, kept)
     names = [plant.states[i] for i in kept]
     damped = names.index("velocity") if "velocity" in names else None
     force = np.zeros(len(kept))
@@ -142,17 +138,6 @@ def _idle_voltage(station: Station) -> float:
     """Motor voltage (V) at which the nominal drive begins to pull; 0 without a drive."""
     drive = station.model.parameters.get("drive")
     return max(0.0, -drive.offset / drive.gain) if drive else 0.0
-
-
-def _nearest(taut: np.ndarray, count: int) -> np.ndarray:
-    """For each of so many rows the nearest of some, itself if it is one of them or none is."""
-    if len(taut) == 0:
-        return np.arange(count)
-    after = np.searchsorted(taut, np.arange(count)).clip(0, len(taut) - 1)
-    before = np.maximum(after - 1, 0)
-    far = np.abs(taut[after] - np.arange(count)), np.abs(taut[before] - np.arange(count))
-    found = np.where(far[0] <= far[1], taut[after], taut[before])
-    return np.where(np.arange(count) < taut[0], np.arange(count), found)
 
 
 def _kept(plant: Plant) -> list[int]:

@@ -32,10 +32,11 @@ class Settings(NamedTuple):
 
 BOUNDS = {
     "layer_bandwidth": (0.2, 3.0),
-    "observer_bandwidth": (0.1, 3.0),
+    "observer_bandwidth": (0.1, 2.0),
     "switching": (0.01, 2.0),
 }
-"""Between what a search looks for settings."""
+"""Between what a search looks for settings. With an observer of 3 the loop's largest sensitivity at
+50 Hz with commands 20 ms late would be 5.8 where the muscle is stiffest, of 2 it is 2.6."""
 
 DEFAULTS = {
     "displacement": Settings(1.2, 0.4, 0.05),

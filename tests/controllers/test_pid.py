@@ -1,6 +1,7 @@
 """The PID against analytic responses, at its limits, and on the station."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from controllers import CONTROLLERS, PID, Controller, FeedforwardPID
 from controllers.gains import Gains, scheduled_gains
 from controllers.pid import nominal_offset
 from pma_gym.plant.model import load_model
+from pma_gym.tasks import EVERY_TASK
 
 PERIOD = 0.01
 
@@ -153,6 +155,56 @@ def test_a_model_of_one_s_own_gets_the_gains_of_its_plant(station):
         where = station("rotation", 400, model=own)
         known = station("rotation", 400, model=name)
         assert scheduled_gains("pid", where) == scheduled_gains("pid", known)
+
+
+@pytest.mark.parametrize("controller", ["pid", "feedforward_pid"])
+def test_gains_are_of_the_kind_of_task_and_of_the_loop(controller, station):
+    base = station("displacement", 300.0)
+    sine = replace(base, task=EVERY_TASK["displacement_sine"])
+    assert scheduled_gains(controller, sine) == scheduled_gains(controller, base)
+    late = replace(base, period=0.02, action_delay=0.02)
+    slow = scheduled_gains(controller, late)
+    assert slow.integral < 0.7 * scheduled_gains(controller, base).integral
+    # Heard late is as bad as obeyed late.
+    heard = replace(base, period=0.02, observation_delay=0.02)
+    assert scheduled_gains(controller, heard) == slow
+    # What was not tuned takes the gains of what is nearest in dead time: 5 to 10 ms, 50 to 40 ms.
+    quick = replace(base, period=0.005)
+    assert scheduled_gains(controller, quick) == scheduled_gains(controller, base)
+    assert scheduled_gains(controller, replace(late, action_delay=0.03)) == slow
+    triangle = replace(base, task=EVERY_TASK["triangle_low"], pressure=150e3)
+    isotonic = replace(triangle, task=EVERY_TASK["isotonic"])
+    assert scheduled_gains(controller, triangle) == scheduled_gains(controller, isotonic)
+
+
+def test_a_reading_is_compared_with_the_reference_of_its_time(station, reading):
+    late = replace(station(), observation_delay=0.02)
+    controller = PID(Gains(400.0, 8000.0, 0.0, 0.005))
+    controller.reset(lambda time: 5e-3 * time, late)
+    for k in range(2, 50):
+        heard = reading(extension=5e-3 * (k * PERIOD - 0.02))
+        assert controller.act(heard, k * PERIOD) == pytest.approx(nominal_offset(late), abs=1e-9)
+
+
+def test_regulator_begins_at_the_voltage_that_holds_its_pressure(station, reading):
+    held = replace(station(pressure_kpa=200.0), task=EVERY_TASK["isotonic"])
+    controller = PID()
+    controller.reset(lambda time: 0.0, held)
+    # 59.672 kPa/V, -19.578 kPa.
+    assert controller.act(reading(), 0.0) == pytest.approx((200.0 + 19.578) / 59.672)
+    # A muscle that is shorter by 1 mm than wanted has its pressure lowered.
+    assert controller.act(reading(extension=-1e-3), PERIOD) < controller.act(reading(), 0.0)
+
+
+@pytest.mark.parametrize("kind", [PID, FeedforwardPID])
+def test_contraction_and_late_commands(kind, drive):
+    got, _ = drive(kind(), "isotonic", 200)
+    assert max(got.values()) <= 0.05
+    loop = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
+    got, _ = drive(kind(), "isotonic", 200, **loop)
+    assert max(got.values()) <= 0.10
+    got, _ = drive(kind(), "displacement", 200, **loop)
+    assert got["displacement"] <= 0.10
 
 
 def test_missing_gains_say_how_to_tune_them(station, tmp_path):
