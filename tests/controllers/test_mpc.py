@@ -1,0 +1,97 @@
+"""Preview MPC: its quadratic program, its limits, its bits, and what it reaches on the station."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from controllers import PID, PreviewMPC
+from controllers.bounded_program import ACCURACY, BoundedProgram
+from pma_gym.envs import PMAEnv
+from pma_gym.plant.model import load_model
+from pma_gym.tasks import varied_station
+
+
+def problem(seed, count=6):
+    generator = np.random.default_rng(seed)
+    rows = generator.normal(size=(2 * count, count))
+    return rows.T @ rows, generator.normal(size=count)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_without_limits_the_program_solves_the_normal_equations(seed):
+    square, linear = problem(seed)
+    program = BoundedProgram(6)
+    found = program.solve(square, linear, np.full(6, -1e6), np.full(6, 1e6))
+    assert np.allclose(square @ found, -linear, rtol=0, atol=1e-10)
+    assert program.limited == 0
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_at_limits_the_program_keeps_the_optimality_conditions(seed):
+    square, linear = problem(seed)
+    program = BoundedProgram(6)
+    low, high = np.full(6, -0.05), np.full(6, 0.02)
+    found = program.solve(square, linear, low, high)
+    slope = square @ found + linear
+    assert program.limited == 1 and program.failures == 0
+    assert np.all((low <= found) & (found <= high))
+    near = 100.0 * ACCURACY
+    # At a limit the slope pushes against it, elsewhere there is none (Karush, Kuhn, Tucker).
+    assert np.all(slope[found <= low + near] >= -near * np.abs(square).max())
+    assert np.all(slope[found >= high - near] <= near * np.abs(square).max())
+    inside = (found > low + near) & (found < high - near)
+    assert np.abs(slope[inside]).max(initial=0.0) < near * np.abs(square).max()
+
+
+@pytest.mark.parametrize("pressure_kpa", [150, 550])
+def test_it_tracks_displacement_within_the_target(pressure_kpa, drive):
+    by_phase, _ = drive(PreviewMPC(), "displacement", pressure_kpa)
+    assert by_phase["displacement"] < 0.05
+
+
+def test_it_tracks_rotation_within_the_target(drive):
+    by_phase, _ = drive(PreviewMPC(), "rotation", 400)
+    assert by_phase["I"] < 0.25 and by_phase["II"] < 0.25
+
+
+def test_it_tracks_contraction_by_the_regulator(drive):
+    by_phase, _ = drive(PreviewMPC(), "isotonic", 300)
+    assert max(by_phase.values()) < 0.1
+
+
+def driven(controller, seed=3):
+    """RMSE (mm) and voltages (V) on a drawn station at 50 Hz, commands 20 ms late, disturbed."""
+    nominal = load_model("station")
+    model = varied_station(nominal, np.random.default_rng(seed))
+    env = PMAEnv(
+        "displacement",
+        model=model,
+        pressure_kpa=300.0,
+        control_rate_hz=50.0,
+        action_delay_s=0.02,
+        disturbances="regulator_and_operator",
+    )
+    env.reset(seed=seed)
+    controller.reset(env.reference, replace(env.station, model=nominal))
+    ended, info = False, {}
+    while not ended:
+        *_, terminated, truncated, info = env.step(
+            env.action(controller.act(env.reading, env.time))
+        )
+        ended = terminated or truncated
+    return info["rmse_mm"], env.voltages
+
+
+def test_disturbances_on_a_drawn_station_move_it_less_than_the_pid():
+    ours, _ = driven(PreviewMPC())
+    pid, _ = driven(PID())
+    assert ours < 0.8 * pid
+
+
+def test_the_same_bits_again_and_after_another_trial(drive):
+    controller = PreviewMPC()
+    _, first = driven(controller)
+    drive(controller, "displacement", 150)
+    _, again = driven(controller)
+    assert np.array_equal(first, again)
