@@ -1,9 +1,9 @@
 """What a bank of Kalman filters needs for a trial, computed before it.
 
-The muscle's damping is what stations differ in most (the fit's interval reaches from none to twice
-the nominal value, load adds up to as much again) and what a fast loop depends on most. So the plant near its
-nominal motion is taken with each of `FACTORS` on its damping; the rest of what is not known
-are states that stay as they are but for noise:
+The muscle's damping is what is known least (the identified station's 95 % interval reaches from
+about none to twice the value) and what a fast loop depends on most. So the plant near its nominal
+motion is taken with each of `FACTORS` on its damping. The rest of what is not known are states that
+stay as they are but for noise:
 
     force      at the slide (N): wanders; all that the muscle's law misses, and hands that pull
     drive      of the motor (V): offset of its line; known best while the cable is loose
@@ -41,15 +41,17 @@ FACTORS = (0.15, 0.5, 1.0, 2.0, 4.0)
 UNKNOWNS = ("force", "drive", "regulator", "gauge", "gap")
 
 FIRST = (1.0, 0.1, 0.07, 3e3, 0.5e-3)
-"""Standard deviations of the unknowns when a trial begins (N, V, V, Pa, m): the identified
-station's intervals of the drive's offset (3.6 N) and of the regulator's (4.3 kPa); what the
-"actual" pressures of tables I2 and I3 are off by (3.4 kPa); slack and stretch to some 0.5 mm."""
+"""Standard deviations of the unknowns when a trial begins (N, V, V, Pa, m). Regulator: the
+identified station's interval (4.3 kPa). Gauge: what the "actual" pressures of tables I2 and I3 are
+off by (3.4 kPa). The others are our assumptions; the drive's 10 N covers a dead zone."""
 
 DRIVE_WANDER, GAP_WANDER = 3e-3, 0.5e-3
 """Standard deviation of the drive's offset (V) and of the gap (m) over a second."""
 
 LOOSE_WANDER = 0.3
-"""(V)."""
+"""That of the drive's offset until the nominal cable has tightened (V): a rotor that does not move
+says only that the drive gives nothing yet, not by how much it falls short, so it must be searched
+for. Set by hand on training stations."""
 
 DRIVE_JOLT = 0.01
 """Standard deviation of what the drive gives beside its line for a period (V)."""
@@ -112,9 +114,7 @@ def bank_design(
     seen[0 if rotates else 1, -1] = 1.0 if rotates else 1.0 / radius
     seen[2, -2] = 1.0
     own, count = (1 if rotates else 0), motion.a.shape[1]
-    noise = np.tile(_process_noise(station.period, count, wander), (motion.last, 1))
-    begun = int(np.argmax(motion.readings[:, 2] >= LOOSE_N)) if station.task.actuator == "motor" else 0
-    noise[:begun, count + UNKNOWNS.index("drive")] = LOOSE_WANDER**2 * station.period
+    noise = _process_noise(motion, station, count, wander)
     pulls = DRIVE_JOLT * step[:, :, :, count + UNKNOWNS.index("drive")]
     pulls[:, :, count:] = 0.0
     jolts = np.stack([jolt * force, pulls], axis=-1)[:, : motion.last]
@@ -139,7 +139,9 @@ def _sampled(motion: LinearMotion, station: Station) -> tuple[np.ndarray, ...]:
     rates = np.zeros((len(_factors(motion)), steps, full, full))
     rates[:, :, :n, :n] = motion.a
     rates[:, :, :n, n] = motion.force
-    rates[:, :, :n, n + 1] = motion.motor
+    # A drive that idles gives nothing, whatever its offset: were that felt here, its uncertainty
+    # would make the rotor's speed uncertain where nothing but the potentiometer tells it.
+    rates[:, :, :n, n + 1] = np.where(motion.slackened[:, None], 0.0, motion.motor)
     rates[:, :, :n, n + 2] = motion.regulator
     rates[:, :, :n, whole] = own
     if motion.damped is not None:
@@ -160,10 +162,14 @@ def _factors(motion: LinearMotion) -> tuple[float, ...]:
     return FACTORS if motion.damped is not None else (1.0,)
 
 
-def _process_noise(period: float, count: int, wander: float) -> np.ndarray:
-    """Variances that a period adds to x, shape (n,)."""
+def _process_noise(motion: LinearMotion, station: Station, count: int, wander: float) -> np.ndarray:
+    """Variances that every period of the trial adds to x, shape (trial, n)."""
     wanders = np.array([wander, DRIVE_WANDER, REGULATOR_WANDER, 0.0, GAP_WANDER])
-    return np.concatenate([np.zeros(count), wanders**2 * period])
+    rows = np.tile(np.concatenate([np.zeros(count), wanders]), (motion.last, 1))
+    if station.task.actuator == "motor":
+        tightened = int(np.argmax(motion.readings[:, 2] >= LOOSE_N))
+        rows[:tightened, count + UNKNOWNS.index("drive")] = LOOSE_WANDER
+    return rows**2 * station.period
 
 
 def _sensor_noise(station: Station) -> np.ndarray:

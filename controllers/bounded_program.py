@@ -3,7 +3,7 @@
 from typing import Any
 
 import numpy as np
-from scipy.linalg import lapack
+from scipy.linalg import get_lapack_funcs
 
 ACCURACY = 1e-5
 """Accuracy that OSQP is asked for, absolute (V) and relative."""
@@ -34,6 +34,7 @@ class BoundedProgram:
         self.osqp = imported_osqp()
         self.limited = self.failures = 0
         self._solver: Any = None
+        (self._positive_solve,) = get_lapack_funcs(("posv",))
         # OSQP wants the upper triangle, column by column.
         self._columns, self._rows = np.tril_indices(count)
 
@@ -48,7 +49,7 @@ class BoundedProgram:
             low: shape (n,).
             high: shape (n,).
         """
-        _, free, failed = lapack.dposv(square, -linear)
+        _, free, failed = self._positive_solve(square, -linear)
         if not failed and np.all((low <= free) & (free <= high)):
             return free
         self.limited += 1

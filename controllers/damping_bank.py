@@ -67,8 +67,9 @@ class DampingBank:
         if self._pulls:
             offset = estimates[:, design.drive]
             pulling = np.maximum(volts - motion.idle + offset, 0.0)
-            # x has the offset's effect already.
-            change = (pulling - offset - (motion.volts[k] - motion.idle))[:, None]
+            # x has the offset's effect already, but where the nominal drive idles.
+            known = 0.0 if motion.slackened[k] else offset
+            change = (pulling - known - (motion.volts[k] - motion.idle))[:, None]
         return (
             (design.step[:, k] @ estimates[:, :, None])[:, :, 0]
             + design.command[:, k] * change

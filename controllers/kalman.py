@@ -19,7 +19,7 @@ Gaussian noise:
 - A wrong model: w also has a share `DOUBT` of what moves the plant, so that the answer to a large
   correction, or to a step of the plan, is not taken for another disturbance.
 - A cable that does not pull, which the load cell and both position sensors show: d and s then
-  explain nothing and stay. Before the first pull x is the rotor's alone.
+  explain nothing and stay. Before the first pull x is that of the rotor alone.
 """
 
 import math
@@ -31,6 +31,7 @@ import numpy as np
 from controllers.cable import Cable, free_rotor
 from controllers.local_model import VOLTAGE_LIMIT, LocalModel
 from controllers.motion import NominalMotion
+from controllers.pid import nominal_offset
 from controllers.pressure import PressureFilter
 from controllers.stroke import sensor_of
 from pma_gym.envs import Reading
@@ -60,6 +61,10 @@ FREE_JUMP = (0.02, 0.05)
 
 DOUBT = 0.2
 """Share to which the model's gain and lag are known."""
+
+DOUBT_TIME_S, MOST_SURPRISE, MOST_DOUBT = 0.3, 16.0, 4.0
+"""Time of the mean of squared errors over their variances (s), the most that one counts, and the
+mean beyond which a model is wrong: pushes of an operator bring it to 2."""
 
 FREE_V = 2e-3
 """Standard deviation of what pushes a rotor on a loose cable (V); its friction is known."""
@@ -91,39 +96,41 @@ class DeviationFilter:
         estimate: x, d and s at the beginning of the period of the last reading, shape (n + 2,).
         order: n.
         cable: whether it pulls.
+        doubt: how much further off readings were of late than they should be: mean of the squares
+            of errors over their variances; about 1.
     """
 
     def __init__(self, motion: NominalMotion, unknowns: Unknowns) -> None:
         self._motion, self._station, self._period = motion, motion.station, motion.station.period
         self._stroke, self.cable = motion.stroke, Cable(motion.station)
-        self._first = self._at(0.0)
         self.order = n = len(self._stroke.models[0].b)
         self.estimate, self._taken, self._seen = np.zeros(n + 2), 0, -1
-        self._pressure = PressureFilter(self._station)
+        self._plan = _Plan(motion)
+        self._pressure, self._line = PressureFilter(self._station), None
+        if self._station.task.actuator == "regulator":
+            self._line = self._station.model.parameters["regulator_line"]
         # What is in force before the first command is in what the motion foresees.
         late = round(self._station.action_delay / self._period)
-        self._sent = deque(self.nominal(k * self._period) for k in range(late))
-        moves_pressure = self._station.task.actuator == "regulator"
-        line = self._station.model.parameters["regulator_line"]
-        self._line = line if moves_pressure else None
+        self._sent = deque(self._plan.volts[:late])
         self._systems = [_System.of(model.a[:, 0], model.b) for model in self._stroke.models]
         free = free_rotor(self._station, n)
         self._free = None if free is None else _System.of(*free)
+        self._idle = nominal_offset(self._station)
         self._agitation, self._noise = unknowns.agitation**2, motion.noise**2
         self._free_noise = sensor_of(self._station, "rotation")[1] ** 2
         self._drift = np.diag([0.0] * n + [unknowns.disturbance**2, SHARE**2 / SHARE_TIME_S])
         self._drift *= self._period
         # At rest at the start: x is known exactly.
-        self._covariance = np.zeros((n + 2, n + 2))
-        self._covariance[n + 1, n + 1] = SHARE**2
-        self._onset = ONSET_V[self._station.task.actuator]
-        self._covariance[n, n] = (FREE_ONSET_V if self.cable.loose else self._onset) ** 2
-        self._next_jump = -math.inf
-        self.surprise = 1.0
+        self._covariance, onset = np.zeros((n + 2, n + 2)), ONSET_V[self._station.task.actuator]
+        self._apart = onset * self._stroke.models[0].gain
+        muscle, rotor = np.diag([onset**2, SHARE**2]), np.diag([FREE_ONSET_V**2, 0.0])
+        self._covariance[n:, n:], other = (rotor, muscle) if self.alone else (muscle, rotor)
+        self._other = np.zeros(2), other
+        self._next_jump, self.doubt = -math.inf, 1.0
 
     @property
     def alone(self) -> bool:
-        """Whether x is that of the rotor, which has yet to tighten the cable (rad)."""
+        """Whether the rotor is, which has yet to tighten the cable: x is its angle's (rad)."""
         return self._free is not None and not self.cable.tightened
 
     def see(self, reading: Reading) -> None:
@@ -143,40 +150,39 @@ class DeviationFilter:
             self._note(reading)
             self._correct(self._deviation(reading))
 
-    def ahead(self) -> tuple[np.ndarray, float]:
-        """The estimate for when the next command will be in force, and that time (s)."""
+    def ahead(self) -> tuple[np.ndarray, int]:
+        """The estimate for when the next command will be in force, and that period's number."""
         state, k = self.estimate, self._taken
         for sent in self._sent:
-            whole, push = self._system(k)
-            time = k * self._period
-            state = whole @ state + push * (sent - self.nominal(time) - self.correction(time))
+            state = self._moved(state, k, sent, self.correction(k))
             k += 1
-        return state, k * self._period
-
-    def correction(self, time: float) -> float:
-        """Voltage (V) that the pressure will call for in the period that begins at a time (s)."""
-        if self._line is not None:
-            return -self._pressure.excess / self._line.gain
-        ahead = time + (0.5 - self._taken) * self._period
-        return self._held(time, self._pressure.ahead(ahead, self._station.pressure))
+        return state, k
 
     def send(self, voltage: float) -> None:
         """Note the command (V), as held to its limits, that `ahead` was asked for."""
         self._sent.append(voltage)
 
-    def nominal(self, time: float) -> float:
-        """Voltage (V) of the nominal motion that can be in force at a time (s)."""
-        return min(max(self._motion.voltage(time), 0.0), VOLTAGE_LIMIT)
+    def correction(self, k: int) -> float:
+        """Voltage (V) that the pressure will call for in a period."""
+        if self._line is not None:
+            return -self._pressure.excess / self._line.gain
+        ahead = (k + 0.5 - self._taken) * self._period
+        return self._held(k, self._pressure.ahead(ahead, self._station.pressure))
 
-    def held(self, time: float) -> float:
-        """Voltage H (V) that holds the nominal plant where it is planned to be at a time (s).
+    def nominal(self, k: int) -> float:
+        """Voltage (V) of the nominal motion that can be in force in a period."""
+        return self._plan.volts[min(k, len(self._plan.volts) - 1)]
+
+    def held(self, k: int) -> float:
+        """Voltage H (V) that holds the nominal plant where it is planned to be in a period.
 
         Beside what held it at the start, where the trial began settled.
         """
-        return self._stroke.volts[self._at(time)] - self._stroke.volts[self._first]
+        return self._stroke.volts[self.place(k)] - self._stroke.volts[self._plan.places[0]]
 
-    def _at(self, time: float) -> int:
-        return self._stroke.nearest(self._motion.planned(time))
+    def place(self, k: int) -> int:
+        """Place of the stroke where the plant is planned to be in a period."""
+        return self._plan.places[min(k, len(self._plan.places) - 1)]
 
     def _commanded(self, voltage: float) -> float:
         """Pressure (Pa) that is asked for while a voltage (V) is in force."""
@@ -184,20 +190,51 @@ class DeviationFilter:
             return self._station.pressure
         return self._line.gain * voltage + self._line.offset
 
-    def _held(self, time: float, pressure: float) -> float:
+    def _held(self, k: int, pressure: float) -> float:
         """Voltage (V) by which a motor has to hold against a pressure (Pa)."""
         if self.cable.loose:
             return 0.0
-        return self._motion.pressure_correction(self._motion.planned(time), pressure)
+        return self._stroke.pressure_slopes[self.place(k)] * (pressure - self._station.pressure)
 
     def _system(self, k: int) -> "_System":
         """What a period does to x, d and s."""
         if self._free is not None and not self.cable.tightened:
             return self._free
-        n, time = self.order, k * self._period
-        system = self._systems[self._at(time)]
-        system.whole[:n, n + 1] = self.held(time) * system.push[:n]
+        n, system = self.order, self._systems[self.place(k)]
+        system.whole[:n, n + 1] = self.held(k) * system.push[:n]
         return system
+
+    def _moved(self, state: np.ndarray, k: int, sent: float, known: float) -> np.ndarray:
+        """x, d and s after a period with a command in force, part of which is known to be lost."""
+        whole, push = self._system(k)
+        voltage = sent - self.nominal(k) - known
+        if self.alone:
+            # The drive does not push: less than where it lets go is the same.
+            voltage -= min(sent + float(state[self.order]) - self._idle, 0.0)
+        return whole @ state + push * voltage
+
+    def _advance(self, pressure: float) -> None:
+        """Let a control period pass, in which the pressure (Pa) was this."""
+        k, sent = self._taken, self._sent.popleft()
+        known = self.correction(k) if self._line is not None else self._held(k, pressure)
+        whole, push = self._system(k)
+        alone = self.alone
+        agitation = FREE_V**2 if alone else self._agitation + self._misjudged(k, sent - known)
+        self.estimate = self._moved(self.estimate, k, sent, known)
+        spread = whole @ self._covariance @ whole.T + agitation * push[:, None] * push
+        self._covariance = spread if alone else spread + self._drift
+        self._taken += 1
+
+    def _misjudged(self, k: int, voltage: float) -> float:
+        """Variance of the voltage (V^2) by which the model may misjudge the motion of a period.
+
+        Its gain and its lag are known to a share, so what pushes the plant beside the plan and what
+        holds it there are, each, and what the plan moves it with.
+        """
+        n, state, at, nominal = self.order, self.estimate, self.place(k), self.nominal(k)
+        pushed = voltage - nominal + float(state[n] + state[n + 1] * self.held(k))
+        away = float(state[0]) / self._stroke.models[at].gain
+        return DOUBT**2 * (pushed**2 + away**2 + (nominal - self._stroke.volts[at]) ** 2)
 
     def _deviation(self, reading: Reading) -> float:
         """By how much a reading lies from the nominal motion's (m or rad)."""
@@ -205,74 +242,71 @@ class DeviationFilter:
             return reading.rotation - self._motion.foreseen_rotation(reading.time)
         return self._station.position(reading) - self._motion.foreseen(reading.time)
 
-    def _advance(self, pressure: float) -> None:
-        """Let a control period pass, in which the pressure (Pa) was this."""
-        whole, push = self._system(self._taken)
-        time = self._taken * self._period
-        known = self.correction(time) if self._line is not None else self._held(time, pressure)
-        voltage = self._sent.popleft() - self.nominal(time) - known
-        agitation = FREE_V**2 if self.alone else self._agitation + self._doubt(voltage)
-        self.estimate = whole @ self.estimate + push * voltage
-        spread = whole @ self._covariance @ whole.T + agitation * push[:, None] * push
-        self._covariance = spread if self.alone else spread + self._drift
-        self._taken += 1
-
-    def _doubt(self, voltage: float) -> float:
-        """Variance of the voltage (V^2) by which the model may misjudge the motion.
-
-        Its gain and its lag are known to a share, so what pushes the plant beside the plan and what
-        holds it there are, each, and what the plan moves it with.
-        """
-        n, state, time = self.order, self.estimate, self._taken * self._period
-        pushed = voltage + float(state[n] + state[n + 1] * self.held(time))
-        at = self._at(time)
-        gain, planned = self._stroke.models[at].gain, self.nominal(time) - self._stroke.volts[at]
-        return DOUBT**2 * (pushed**2 + (float(state[0]) / gain) ** 2 + planned**2)
-
     def _note(self, reading: Reading) -> None:
         """Take in whether the cable pulls."""
-        n, before = self.order, self.cable.tightened
+        before = self.alone
         self.cable.see(reading)
-        if self.cable.tightened != before:
-            self._covariance[n, n] += self._onset**2
-            self.estimate[:n] = 0.0
-        if not self.alone and (self.cable.settling or self._beyond(self._taken - 1)):
+        if self.alone != before:
+            self._change_model()
+        beyond = not 0.0 <= self._motion.voltage(reading.time - self._period) <= VOLTAGE_LIMIT
+        if not self.alone and (self.cable.settling or beyond):
             # x is read off, and tells nothing of d and s.
-            covariance = self._covariance
+            n, covariance = self.order, self._covariance
             covariance[:n] = covariance[:, :n] = 0.0
-            covariance[range(n), range(n)] = (self._onset * self._stroke.models[0].gain) ** 2
+            covariance[range(n), range(n)] = self._apart**2
 
-    def _keep_share(self) -> None:
-        """Hold s to what it may be; what is beyond is no share and d's."""
-        n, most = self.order, MOST_SHARE
-        beyond = self.estimate[n + 1] - min(max(self.estimate[n + 1], -most), most)
-        if beyond:
-            self.estimate[n + 1] -= beyond
-            self.estimate[n] += beyond * self.held(self._taken * self._period)
-
-    def _beyond(self, k: int) -> bool:
-        """Whether the nominal plant itself needs what no voltage gives in a period."""
-        return not 0.0 <= self._motion.voltage(k * self._period) <= VOLTAGE_LIMIT
+    def _change_model(self) -> None:
+        """Go on with the muscle, which has a d and an s of its own."""
+        n, covariance = self.order, np.zeros_like(self._covariance)
+        self.estimate[:n] = 0.0
+        self.estimate[n:], covariance[n:, n:] = self._other
+        self._covariance = covariance
 
     def _correct(self, deviation: float) -> None:
         """Update the estimate by a measured deviation (m or rad)."""
         covariance, error = self._covariance, deviation - float(self.estimate[0])
         noise = self._free_noise if self.alone else self._noise
-        spread = covariance[0, 0] + noise
-        surprise = error * error / spread
-        self.surprise += self._period / 0.3 * (min(surprise, 16.0) - self.surprise)
-        surprising = surprise > SURPRISE**2 and self._taken > self._next_jump and self.surprise < 4
-        if surprising and (self.alone or not self.cable.settling):
+        surprise = error * error / (covariance[0, 0] + noise)
+        self._wonder(surprise)
+        if surprise > SURPRISE**2 and self._may_jump():
             size, apart = FREE_JUMP if self.alone else JUMP
             self._next_jump = self._taken + apart / self._period
             jump = self._system(self._taken - 1).push.copy()
             jump[self.order] = 1.0
             covariance = covariance + size**2 * jump[:, None] * jump
-            spread = covariance[0, 0] + noise
-        gain = covariance[:, 0] / spread
+        gain = covariance[:, 0] / (covariance[0, 0] + noise)
         self.estimate += gain * error
         self._keep_share()
         self._covariance = covariance - gain[:, None] * covariance[0]
+
+    def _wonder(self, surprise: float) -> None:
+        """Take a squared error over its variance into the mean of late."""
+        share = self._period / DOUBT_TIME_S
+        self.doubt += share * (min(surprise, MOST_SURPRISE) - self.doubt)
+
+    def _may_jump(self) -> bool:
+        """Whether d may have jumped: not again at once, nor with a model that is wrong anyhow."""
+        if self._taken <= self._next_jump or self.doubt > MOST_DOUBT:
+            return False
+        return self.alone or not self.cable.settling
+
+    def _keep_share(self) -> None:
+        """Hold s to what it may be; what is beyond is no share and d's."""
+        n = self.order
+        beyond = self.estimate[n + 1] - min(max(self.estimate[n + 1], -MOST_SHARE), MOST_SHARE)
+        if beyond:
+            self.estimate[n + 1] -= beyond
+            self.estimate[n] += beyond * self.held(self._taken)
+
+
+class _Plan:
+    """The nominal motion by the number of the control period: where, and by which voltage."""
+
+    def __init__(self, motion: NominalMotion) -> None:
+        period, stroke = motion.station.period, motion.stroke
+        numbers = range(len(motion.volts) + 1)
+        self.places = [stroke.nearest(motion.planned(k * period)) for k in numbers]
+        self.volts = [min(max(v, 0.0), VOLTAGE_LIMIT) for v in motion.volts.tolist()]
 
 
 def with_disturbance(local: LocalModel) -> tuple[np.ndarray, np.ndarray]:

@@ -40,6 +40,8 @@ class LinearMotion(NamedTuple):
     Attributes:
         volts: voltage of the actuator in force (V), shape (steps,).
         idle: voltage at which a nominal drive begins to pull; 0 of a regulator (V).
+        slackened: whether the nominal cable hangs loose in a period after it was taut, so that the
+            drive idles, shape (steps,).
         error: nominal position less the reference at the periods' ends (m or rad), shape
             (steps + 1,); 0 after the trial's end.
         readings: what the sensors would say (extension, rotation, load, pressure; SI), shape
@@ -59,6 +61,7 @@ class LinearMotion(NamedTuple):
 
     volts: np.ndarray
     idle: float
+    slackened: np.ndarray
     error: np.ndarray
     readings: np.ndarray
     a: np.ndarray
@@ -118,6 +121,7 @@ def linear_motion(
     return LinearMotion(
         volts,
         idle,
+        _slackened(readings[:-1, 2]) & moved_by_motor,
         error,
         readings,
         a,
@@ -138,6 +142,12 @@ def _idle_voltage(station: Station) -> float:
     """Motor voltage (V) at which the nominal drive begins to pull; 0 without a drive."""
     drive = station.model.parameters.get("drive")
     return max(0.0, -drive.offset / drive.gain) if drive else 0.0
+
+
+def _slackened(tension: np.ndarray) -> np.ndarray:
+    """Where a cable hangs loose after it was taut, by its tension (N)."""
+    loose = tension < LOOSE_N
+    return loose & np.logical_or.accumulate(~loose)
 
 
 def _kept(plant: Plant) -> list[int]:

@@ -133,7 +133,8 @@ def stroke_models(
         [_sampled(system, quantity, actuator, rate, period) for system in row] for row in systems
     ]
     order = max(_order(system) for row in sampled for system in row)
-    coefficients = np.mean([[observer_form(_reduced(one, order)) for one in row] for row in sampled], axis=0)
+    forms = [[observer_form(_reduced(one, order)) for one in row] for row in sampled]
+    coefficients = np.mean(forms, axis=0)
     slopes = [_pressure_slope(system, quantity, actuator) for system in systems[0]]
     held = [commands[0 if actuator == "motor" else 1] for _, commands in rests]
     fine = np.linspace(positions[0], positions[-1], FINE)

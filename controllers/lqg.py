@@ -31,6 +31,13 @@ FREE_MOST_V = 0.2
 nothing brakes the rotor, but a drive may have a dead zone of so much."""
 
 
+FAR_SHARE = 0.03
+"""Share of the range by which a rotor on a slack cable may be behind (of 90 deg: 2.7 deg)."""
+
+TRUSTED_DOUBT = 3.0
+"""Doubt of the filter beyond which k x is scaled down."""
+
+
 class Settings(NamedTuple):
     """Settings of `LQG`.
 
@@ -47,14 +54,13 @@ class Settings(NamedTuple):
 
 
 BOUNDS = {"effort": (0.15, 10.0), "agitation": (0.02, 0.3), "disturbance": (0.01, 0.2)}
-"""Bounds of a search. Below the first two, or above the last, a loop at 50 Hz with 20 ms of delay
-is too bold: stations with a third of the nominal damping (it has a wide interval) then swing from
-limit to limit. Within them the nominal loops' sensitivity stays below 2.4."""
+"""Bounds of a search. Bolder settings than these swing from limit to limit at 50 Hz with 20 ms of
+delay where a station has a third of the nominal damping, whose interval is that wide."""
 
 DEFAULTS = {
     "displacement": Settings(0.2, 0.03, 0.05),
     "rotation": Settings(0.4, 0.05, 0.05),
-    "contraction": Settings(0.1, 0.05, 0.1),
+    "contraction": Settings(0.2, 0.05, 0.1),
 }
 """Settings by kind of task, where `designs.json` has none."""
 
@@ -74,9 +80,10 @@ class LQG:
     d and s H are made good is the integral action, for the filter integrates what surprises it
     into them. It is told u as held to its limits, so that nothing winds up.
 
-    On a cable that hangs loose before the trial's first pull the rotor alone is controlled, by a
-    model of its own, and with little force, for nothing brakes it. Where a cable that pulled goes
-    slack, the plan alone drives the rotor: what noise pushes there stays.
+    Before the first pull the rotor alone is controlled, by a model of its own and with little
+    force, for nothing brakes it. On a cable that goes slack later the plan alone drives it. Where
+    the readings are further off than they should be for long, the model is wrong, and k x counts
+    for less.
 
     Args:
         settings: settings to use instead of those designed for the loop.
@@ -107,9 +114,10 @@ class LQG:
         """Take the nominal motion and its gains, and estimate anew."""
         settings = self._settings(station)
         self._motion = nominal_motion(reference, station)
-        self._stroke = self._motion.stroke
+        self._stroke, self._period = self._motion.stroke, station.period
         unknowns = Unknowns(settings.agitation, settings.disturbance)
         self._filter = DeviationFilter(self._motion, unknowns)
+        self._behind = 0.0
         self._gains = _scheduled(self._stroke, settings.effort)
         free = free_rotor(station, self._filter.order)
         kind = task_kind(station)
@@ -128,25 +136,41 @@ class LQG:
         estimator = self._filter
         estimator.see(observation)
         state, due = estimator.ahead()
-        if estimator.cable.loose and not estimator.alone:
-            wanted = self._motion.voltage(due)
+        if estimator.alone:
+            feedback = self._of_rotor(state)
+        elif estimator.cable.loose:
+            feedback = self._of_runaway(float(state[0]))
         else:
-            wanted = self._motion.voltage(due) + self._feedback(state, due)
-        voltage = min(max(wanted, 0.0), VOLTAGE_LIMIT)
+            feedback = self._of_muscle(state, due)
+        self._behind = float(state[0])
+        nominal = self._motion.voltage(due * self._period)
+        voltage = min(max(nominal + feedback, 0.0), VOLTAGE_LIMIT)
         estimator.send(voltage)
         return voltage
 
-    def _feedback(self, state: np.ndarray, due: float) -> float:
-        """Voltage (V) beside the plan's against an estimated state, in force at a time (s)."""
+    def _of_muscle(self, state: np.ndarray, due: int) -> float:
+        """Voltage (V) beside the plan's in a period, by the state estimated for it."""
         n, estimator = self._filter.order, self._filter
-        unknown = float(state[n])
-        if estimator.alone:
-            feedback = -float(self._free_gains @ state[:n]) - unknown
-            return min(max(feedback, -FREE_MOST_V), FREE_MOST_V)
-        unknown += float(state[n + 1]) * estimator.held(due)
-        gains = self._gains[self._stroke.nearest(self._motion.planned(due))]
-        trust = min(1.0, 3.0 / estimator.surprise)
-        return estimator.correction(due) - trust * float(gains @ state[:n]) - unknown
+        unknown = float(state[n] + state[n + 1] * estimator.held(due))
+        feedback = -float(self._gains[estimator.place(due)] @ state[:n])
+        # A model that is wrong makes of large gains a limit cycle.
+        trust = min(1.0, TRUSTED_DOUBT / estimator.doubt)
+        return estimator.correction(due) + trust * feedback - unknown
+
+    def _of_rotor(self, state: np.ndarray) -> float:
+        """As `_of_muscle`, of a rotor on a loose cable."""
+        n = self._filter.order
+        feedback = -float(self._free_gains @ state[:n]) - float(state[n])
+        return min(max(feedback, -FREE_MOST_V), FREE_MOST_V)
+
+    def _of_runaway(self, behind: float) -> float:
+        """As `_of_muscle`, where a cable that pulled hangs loose: the plan's voltage alone.
+
+        What noise pushes there stays. But a rotor that is far behind and falls further back coasts
+        away, and nothing else stops it.
+        """
+        far = behind < -FAR_SHARE * self._motion.station.task.protocol.span
+        return FREE_MOST_V if far and behind < self._behind else 0.0
 
     def linear(self, station: Station, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) once the filter has settled: volts by error.

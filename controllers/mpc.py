@@ -1,4 +1,4 @@
-"""Preview MPC: the voltages of the coming periods that the nominal model, kept up to date, needs."""
+"""Preview MPC: the best voltages of the coming periods, by the nominal model kept up to date."""
 
 from functools import lru_cache
 from typing import NamedTuple
@@ -34,8 +34,8 @@ class Settings(NamedTuple):
 
 
 DEFAULTS = {
-    "displacement": Settings(0.3, 10.0, 1.0),
-    "rotation": Settings(0.3, 10.0, 1.0),
+    "displacement": Settings(1.0, 10.0, 1.0),
+    "rotation": Settings(0.3, 5.0, 1.0),
     "contraction": Settings(0.3, 10.0, 1.0, 0.3),
 }
 """Settings by kind of task where `controllers/designs.json` has none."""
@@ -83,8 +83,8 @@ class PreviewMPC:
             often OSQP failed (`failures`) since `reset`.
 
     Source:
-        J. B. Rawlings, D. Q. Mayne and M. M. Diehl 2017, "Model predictive control", chapter 1 (offset
-        free by disturbance models).
+        J. B. Rawlings, D. Q. Mayne and M. M. Diehl 2017, "Model predictive control", chapter 1
+        (without offset by models of disturbances).
 
     Example:
         >>> from pma_gym.envs import PMAEnv
@@ -151,7 +151,7 @@ class PreviewMPC:
     def _problem(
         self, first: int, estimates: np.ndarray, weights: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """H and q of the program for the periods from `first` on, what they add up to halved."""
+        """H and q of the program for the periods from `first` on."""
         design, count = self._design, self._count
         foreseen = (design.ahead[:, first, 1:] @ estimates[:, :, None])[:, :, 0]
         free = weights @ (foreseen + design.carried[:, first, 1:])

@@ -29,7 +29,7 @@ def test_it_tracks_contraction_by_the_regulator(drive):
 
 
 def driven(controller, seed=3, task="displacement", **options):
-    """Error (m or rad) at 384 Hz and voltages (V) on a drawn station at 50 Hz, commands 20 ms late."""
+    """Error (m or rad) and voltages (V) on a drawn station at 50 Hz, commands 20 ms late."""
     nominal = load_model("station")
     model = varied_station(nominal, np.random.default_rng(seed))
     env = PMAEnv(
