@@ -42,7 +42,7 @@ def operator_rate(memory, p):
     Returns:
         (source, decay) of 0.
     """
-    return 0.0 * memory, 0.0
+    return 0.0 * memory, 0.0 * memory
 
 
 OPERATOR = Effect(
