@@ -23,11 +23,11 @@ from benchmarks.execution import Execution, compile_models, execute
 from benchmarks.files import write_bytes, write_text
 from benchmarks.replay import all_replay_errors
 from benchmarks.report.blocks import report_blocks, report_pictures
-from benchmarks.report.document import to_html, to_markdown
 from benchmarks.report.summary import print_failures, print_summary
 from benchmarks.results import Results, csv_text, json_text
 from benchmarks.suite import Suite
 from benchmarks.targets import check_targets
+from pma_gym.pages.document import to_html, to_markdown
 
 PLOTS = "plots"
 PARTIAL = "partial"

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 
 from benchmarks.budget.tables import unit_of
 from benchmarks.budget.trial import Budget
-from benchmarks.report.plot_style import legend_below, picture, png
+from pma_gym.pages.figures import legend_below, picture, png
 
 COLORS = {
     "rounding": "#882255",

@@ -17,9 +17,10 @@ from benchmarks.margins import (
     response_of,
     worst,
 )
-from benchmarks.report.document import TextTable
-from benchmarks.report.plot_style import Style, legend_below, picture, png
+from benchmarks.report.plot_style import Style
 from pma_gym.envs import Station
+from pma_gym.pages.document import TextTable
+from pma_gym.pages.figures import legend_below, picture, png
 from pma_gym.units import SI_FACTORS
 
 SHOWN_RAD_S = 0.3

@@ -21,8 +21,8 @@ from benchmarks.comparison.tables import (
     tasks_table,
     verdict_table,
 )
-from benchmarks.report.document import Block, Heading, Paragraph, Picture, TextTable
 from benchmarks.report.plot_style import styles_of
+from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 
 _RANKS = (
     "A rank is claimed only where all pairs, taken together with 95 % confidence, leave no other: "

@@ -10,7 +10,8 @@ from matplotlib.patches import Patch
 from benchmarks.comparison.standings import Standings
 from benchmarks.comparison.statistics import profile
 from benchmarks.comparison.tables import capital
-from benchmarks.report.plot_style import Style, legend_below, picture, png
+from benchmarks.report.plot_style import Style
+from pma_gym.pages.figures import legend_below, picture, png
 
 Styles = Mapping[str, Style]
 

@@ -12,7 +12,7 @@ from benchmarks.comparison.standings import Pair
 from benchmarks.comparison.statistics import Interval
 from benchmarks.comparison.suite import FrozenSuite
 from benchmarks.files import write_bytes, write_text
-from benchmarks.report.document import to_html, to_markdown
+from pma_gym.pages.document import to_html, to_markdown
 
 PLOTS = "plots"
 NUMBERS, PAIRS = "leaderboard.csv", "pairs.csv"

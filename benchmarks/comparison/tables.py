@@ -9,7 +9,7 @@ from benchmarks.comparison.spending import Spending
 from benchmarks.comparison.standings import Standing, Standings
 from benchmarks.comparison.statistics import Interval
 from benchmarks.comparison.verdicts import Verdict, mean_by_trial
-from benchmarks.report.document import TextTable
+from pma_gym.pages.document import TextTable
 
 NONE = "—"
 """A cell without a figure."""

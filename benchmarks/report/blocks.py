@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from benchmarks.replay import all_replay_errors
-from benchmarks.report.document import Block, Heading, Paragraph, Picture, TextTable
 from benchmarks.report.plots import actual_against_ideal_plot, tracking_plot
 from benchmarks.report.replay_blocks import replay_blocks
 from benchmarks.report.summary_plots import replay_plot, rmse_plot
@@ -12,6 +11,7 @@ from benchmarks.report.tables import regression_table, rmse_table, target_table
 from benchmarks.results import Results
 from benchmarks.score import PHASES
 from benchmarks.targets import Check
+from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import load_model
 
 _TASKS = {"displacement": "Isokinetic displacement", "rotation": "Isokinetic rotation"}

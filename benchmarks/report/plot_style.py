@@ -1,14 +1,8 @@
-"""How all plots look: one colour and one marker for each controller, in every picture."""
+"""Who is drawn how: one colour and one marker for each controller, in every picture."""
 
-import io
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
-
-import matplotlib as mpl
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from typing import Literal
 
 from benchmarks.suite import Suite
 
@@ -40,23 +34,6 @@ _OTHERS: tuple[tuple[str, str, Dashes], ...] = (
 REFERENCE = {"color": "#000000", "linestyle": (0, (5, 3)), "linewidth": 1.1}
 MEASURED = {"color": "#666666", "linewidth": 2.6, "alpha": 0.75}
 BOUND = {"color": "#000000", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
-DPI = 120
-
-_RULES: dict[Any, Any] = {
-    "font.family": "DejaVu Sans",
-    "font.size": 9.5,
-    "axes.titlesize": 10.5,
-    "axes.labelsize": 9.5,
-    "legend.fontsize": 9.5,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e3e6ea",
-    "grid.linewidth": 0.7,
-    "lines.linewidth": 1.3,
-    "figure.facecolor": "white",
-}
 
 
 @dataclass(frozen=True)
@@ -96,24 +73,3 @@ def styles_of(labels: Mapping[str, str]) -> dict[str, Style]:
         own = _FIXED[name] if name in _FIXED else free[len(styles) % len(free)]
         styles[name] = Style(label, *own)
     return styles
-
-
-@contextmanager
-def picture(width: float, height: float) -> Iterator[Figure]:
-    """An empty figure (inches) in the house style; drawn without a screen."""
-    with mpl.rc_context(_RULES):
-        figure = Figure(figsize=(width, height), layout="constrained")
-        FigureCanvasAgg(figure)
-        yield figure
-
-
-def png(figure: Figure) -> bytes:
-    """The figure as PNG; the same figure gives the same bytes."""
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=DPI, metadata={"Software": None})
-    return out.getvalue()
-
-
-def legend_below(figure: Figure, handles: Sequence[object], columns: int) -> None:
-    """One legend for all panels, under them."""
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)  # type: ignore[call-overload]

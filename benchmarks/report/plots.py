@@ -8,20 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from benchmarks.report.plot_style import (
-    MEASURED,
-    REFERENCE,
-    Style,
-    controller_styles,
-    legend_below,
-    picture,
-    png,
-)
+from benchmarks.report.plot_style import MEASURED, REFERENCE, Style, controller_styles
 from benchmarks.results import Results
 from benchmarks.score import UNITS, measured_score
 from pma_gym.data.protocol import PROTOCOLS, Protocol
 from pma_gym.data.trial import Trial
 from pma_gym.metrics import phase_times
+from pma_gym.pages.figures import legend_below, picture, png
 from pma_gym.units import SI_FACTORS
 
 _ENLARGED = {"displacement": 0.4, "rotation": 1.6}

@@ -9,10 +9,10 @@ from benchmarks.replay import (
     summarise,
     table_angle,
 )
-from benchmarks.report.document import Block, Heading, Paragraph, Picture, TextTable
 from benchmarks.report.tables import replay_table
 from benchmarks.results import Results
 from benchmarks.score import measured_score
+from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import shipped_models
 
 _UNITS = {"slope": "mm/s", "intercept": "mm", "rmse": "mm"}

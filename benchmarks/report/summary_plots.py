@@ -7,16 +7,10 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from benchmarks.replay import QUANTITIES, all_replay_errors, summarise
-from benchmarks.report.plot_style import (
-    BOUND,
-    MEASURED,
-    controller_styles,
-    legend_below,
-    picture,
-    png,
-)
+from benchmarks.report.plot_style import BOUND, MEASURED, controller_styles
 from benchmarks.results import Results
 from benchmarks.score import PHASES, UNITS, measured_score
+from pma_gym.pages.figures import legend_below, picture, png
 
 _GREY = "#666666"
 _QUANTITY_LABELS = {

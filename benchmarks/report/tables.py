@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterable, Sequence
 from statistics import fmean
 
 from benchmarks.replay import QUANTITIES, ReplayError, summarise
-from benchmarks.report.document import TextTable
 from benchmarks.results import Results
 from benchmarks.score import UNITS, PhaseScore, measured_score
 from benchmarks.suite import MEASURED
 from benchmarks.targets import Check
+from pma_gym.pages.document import TextTable
 
 RULE = [""]
 MISSING = "failed"

@@ -29,10 +29,10 @@ from benchmarks.comparison.publish import (
 from benchmarks.comparison.spending import spending
 from benchmarks.comparison.suite import Episode
 from benchmarks.comparison.target import parse_target
-from benchmarks.report.document import to_markdown
 from benchmarks.report.plot_style import styles_of
 from benchmarks.suite import SuiteError
 from controllers import CONTROLLERS
+from pma_gym.pages.document import to_markdown
 from tests.benchmarks.simulated_rows import LEVELS, simulated_row, simulated_rows, simulated_suite
 
 RUN_AT = {"started": "today", "command": "python -m benchmarks run"}

@@ -14,11 +14,11 @@ from benchmarks.environment_info import git_state
 from benchmarks.execution import Execution
 from benchmarks.job import run_job
 from benchmarks.replay import ReplayError
-from benchmarks.report.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
 from benchmarks.report.replay_blocks import displacement_verdict
 from benchmarks.report.tables import columns
 from benchmarks.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.suite import load_suite
+from pma_gym.pages.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
 
 CONTROLLER = """
 class Half:
