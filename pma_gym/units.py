@@ -75,15 +75,16 @@ def suffix(unit: str) -> str:
 
 @dataclass(frozen=True)
 class Quantity:
-    """Unit, bounds, neutral value and source of one physical parameter.
+    """Unit, bounds, neutral value, usual value and source of one physical parameter.
 
     Attributes:
-        unit: unit at the door (a key of `SI_FACTORS`); bounds and neutral value are in it.
+        unit: unit at the door (a key of `SI_FACTORS`); bounds, neutral and usual value are in it.
         lower: smallest value that makes physical sense.
         upper: largest value that makes physical sense.
         source: where the bounds and the usual value come from; says "assumption" for one.
         neutral: value at which the parameter has no effect at all, or None.
         instead: what to do for a value beyond the bounds; empty if the bounds are all.
+        usual: value of a typical specimen, where a fit starts, or None.
     """
 
     unit: str
@@ -92,13 +93,16 @@ class Quantity:
     source: str
     neutral: float | None = None
     instead: str = ""
+    usual: float | None = None
 
     def __post_init__(self) -> None:
-        """Refuse a unit without a factor and bounds in the wrong order."""
+        """Refuse a unit without a factor, reversed bounds, and a usual value beyond them."""
         if self.unit not in SI_FACTORS:
             raise ValueError(f"unknown unit {self.unit!r}; add it to pma_gym.units.SI_FACTORS")
         if not self.lower <= self.upper:
             raise ValueError(f"bounds {self.lower} to {self.upper} {self.unit} are reversed")
+        if self.usual is not None:
+            self.check("usual", self.usual)
 
     @property
     def factor(self) -> float:

@@ -61,6 +61,8 @@ def test_every_effect_has_its_law_and_parameters(page, name):
             line for line in own.splitlines() if line.startswith(f"| `{quantity.name(stem)}`")
         )
         assert quantity.source in row and quantity.unit in row
+        if quantity.usual is not None:
+            assert f"| {quantity.usual:.6g} |" in row
     for law in effect.laws():
         summary = law.__doc__.split("\n")[0].rstrip(":")
         assert summary in own

@@ -69,3 +69,5 @@ def test_a_quantity_refuses_an_unknown_unit_and_reversed_bounds():
         Quantity("psi", 0, 1, "test")
     with pytest.raises(ValueError, match="bounds 2 to 1 kPa are reversed"):
         Quantity("kPa", 2, 1, "test")
+    with pytest.raises(ValueError, match="usual must lie in 0 to 1 kPa, got 2"):
+        Quantity("kPa", 0, 1, "test", usual=2)

@@ -55,8 +55,18 @@ def _effect(effect: Effect, common: str) -> str:
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]
-    header = ["Parameter in a model file", "Unit", "Bounds", "Neutral", "Usual value, source"]
+    header = [
+        "Parameter in a model file",
+        "Unit",
+        "Bounds",
+        "Neutral",
+        "Usual",
+        "Where the usual value comes from",
+    ]
     parts.append(table(header, rows))
+    if effect.held:
+        names = ", ".join(code(effect.quantities[stem].name(stem)) for stem in effect.held)
+        parts.append(f"A diagnosis that fits this effect leaves {names} at the usual value.")
     return "\n\n".join(parts)
 
 
@@ -85,7 +95,8 @@ def _called_by(law: Callable) -> list[Callable]:
 def _parameter(stem: str, quantity: Quantity) -> list[str]:
     bounds = f"{number(quantity.lower)} to {number(quantity.upper)}"
     neutral = "" if quantity.neutral is None else number(quantity.neutral)
-    return [code(quantity.name(stem)), quantity.unit, bounds, neutral, quantity.source]
+    usual = "" if quantity.usual is None else number(quantity.usual)
+    return [code(quantity.name(stem)), quantity.unit, bounds, neutral, usual, quantity.source]
 
 
 def _models_with(effect: str) -> str:

@@ -14,12 +14,18 @@ class Cable(NamedTuple):
     """Parameters of `tension`."""
 
     stiffness: Annotated[
-        float, Quantity("N/mm", 1, 1e7, "Serres 2008, table I3, rotation against extension: 550")
+        float,
+        Quantity(
+            "N/mm", 1, 1e7, "Serres 2008, table I3, rotation against extension: 550", usual=550
+        ),
     ]
     damping: Annotated[
-        float, Quantity("N s/mm", 0, 100, "assumption: 2 % of critical, 0.0194 at 550 N/mm")
+        float,
+        Quantity("N s/mm", 0, 100, "assumption: 2 % of critical, 0.0194 at 550 N/mm", usual=0.0194),
     ]
-    slack: Annotated[float, Quantity("mm", 0, 20, "Serres 2008, table I3: about 0.85", 0.0)]
+    slack: Annotated[
+        float, Quantity("mm", 0, 20, "Serres 2008, table I3: about 0.85", 0.0, usual=0.85)
+    ]
 
 
 def tension(stretch, stretch_rate, p):
@@ -60,6 +66,7 @@ CABLE = Effect(
     name="cable",
     port="cable",
     parameters=Cable,
+    held=("damping",),
     law=tension,
     switch=tightness,
     signature="potentiometer minus LVDT proportional to tension; dead travel at low tension",

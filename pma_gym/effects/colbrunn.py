@@ -16,11 +16,13 @@ _FIT = "least-squares fit to Serres 2008, table I3, 200-575 kPa"
 class ColbrunnSpring(NamedTuple):
     """Parameters of `colbrunn_spring`."""
 
-    stiffness: Annotated[float, Quantity("N/mm", 0, 1000, f"{_FIT}: 13.19", 0.0)]
-    stiffening: Annotated[float, Quantity("N/mm/kPa", -1, 1, f"{_FIT}: 0.00072", 0.0)]
-    hardening_length: Annotated[float, Quantity("mm", 1, 1e6, f"{_FIT}: 88.03")]
-    reach: Annotated[float, Quantity("mm", 0, 5000, f"{_FIT}: 157.2")]
-    half_pressure: Annotated[float, Quantity("kPa", 1, 1e5, f"{_FIT}: 684.5")]
+    stiffness: Annotated[float, Quantity("N/mm", 0, 1000, f"{_FIT}: 13.19", 0.0, usual=13.19)]
+    stiffening: Annotated[
+        float, Quantity("N/mm/kPa", -1, 1, f"{_FIT}: 0.00072", 0.0, usual=0.00072)
+    ]
+    hardening_length: Annotated[float, Quantity("mm", 1, 1e6, f"{_FIT}: 88.03", usual=88.03)]
+    reach: Annotated[float, Quantity("mm", 0, 5000, f"{_FIT}: 157.2", usual=157.2)]
+    half_pressure: Annotated[float, Quantity("kPa", 1, 1e5, f"{_FIT}: 684.5", usual=684.5)]
 
 
 def colbrunn_spring(pressure, contraction, p):
@@ -56,6 +58,7 @@ COLBRUNN_SPRING = Effect(
     name="colbrunn_spring",
     port="muscle_force",
     parameters=ColbrunnSpring,
+    held=("hardening_length", "reach", "half_pressure"),
     law=colbrunn_spring,
     signature="one force against stretch beyond the free length, moved along by pressure",
 )

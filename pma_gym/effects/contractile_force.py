@@ -11,9 +11,18 @@ class ContractileForce(NamedTuple):
 
     slope: Annotated[
         float,
-        Quantity("N/kPa", 0, 20, "Serres 2008, section 5.1.1: 2.91; geometric 2.46 in 6.1", 0.0),
+        Quantity(
+            "N/kPa",
+            0,
+            20,
+            "Serres 2008, section 5.1.1: 2.91; geometric 2.46 in 6.1",
+            0.0,
+            usual=2.91,
+        ),
     ]
-    intercept: Annotated[float, Quantity("N", -500, 500, "Serres 2008, section 5.1.1: 44.6", 0.0)]
+    intercept: Annotated[
+        float, Quantity("N", -500, 500, "Serres 2008, section 5.1.1: 44.6", 0.0, usual=44.6)
+    ]
 
 
 def contractile_force(pressure, p):

@@ -13,13 +13,13 @@ BREAKAWAY_SHARE = 0.7
 class CoulombFriction(NamedTuple):
     """Parameters of `friction_force`."""
 
-    static: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.96", 0.0)]
-    dynamic: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.47", 0.0)]
+    static: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.96", 0.0, usual=1.96)]
+    dynamic: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.47", 0.0, usual=1.47)]
     stribeck_speed: Annotated[
-        float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10")
+        float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force")
+        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force", usual=10)
     ]
 
 
@@ -75,6 +75,7 @@ COULOMB_FRICTION = Effect(
     name="coulomb_friction",
     port="slide_force",
     parameters=CoulombFriction,
+    held=("presliding",),
     law=friction_force,
     path=friction_path,
     signature="odd step of force at zero speed; the slide sticks under small changes of load",

@@ -16,18 +16,19 @@ _SHARE = "literature on braided muscles: 1-5 % of the force; 3 % of 20 N/mm is 0
 class Creep(NamedTuple):
     """Parameters of the quick branch."""
 
-    stiffness: Annotated[float, Quantity("N/mm", 0, 20, _SHARE, 0.0)]
+    stiffness: Annotated[float, Quantity("N/mm", 0, 20, _SHARE, 0.0, usual=0.6)]
     time_constant: Annotated[
-        float, Quantity("s", 0.1, 10, "literature on braided muscles: 1-3 s; start from 2")
+        float, Quantity("s", 0.1, 10, "literature on braided muscles: 1-3 s; start from 2", usual=2)
     ]
 
 
 class SlowCreep(NamedTuple):
     """Parameters of the slow branch."""
 
-    stiffness: Annotated[float, Quantity("N/mm", 0, 20, _SHARE, 0.0)]
+    stiffness: Annotated[float, Quantity("N/mm", 0, 20, _SHARE, 0.0, usual=0.6)]
     time_constant: Annotated[
-        float, Quantity("s", 5, 500, "literature on braided muscles: 20-60 s; start from 40")
+        float,
+        Quantity("s", 5, 500, "literature on braided muscles: 20-60 s; start from 40", usual=40),
     ]
 
 

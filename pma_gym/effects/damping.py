@@ -12,11 +12,15 @@ _TABLE_2 = "Serres 2008, table 2"
 class Damping(NamedTuple):
     """Parameters of `damping`."""
 
-    contracting: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 2.90", 0.0)]
-    relaxing: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 1.57", 0.0)]
-    high_intercept: Annotated[float, Quantity("N s/mm", -20, 20, f"{_TABLE_2}: 0.311", 0.0)]
-    high_slope: Annotated[float, Quantity("N s/mm/kPa", -0.1, 0.1, f"{_TABLE_2}: 0.00338", 0.0)]
-    breakpoint: Annotated[float, Quantity("kPa", 0, 1000, f"{_TABLE_2}: 372")]
+    contracting: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 2.90", 0.0, usual=2.9)]
+    relaxing: Annotated[float, Quantity("N s/mm", 0, 20, f"{_TABLE_2}: 1.57", 0.0, usual=1.57)]
+    high_intercept: Annotated[
+        float, Quantity("N s/mm", -20, 20, f"{_TABLE_2}: 0.311", 0.0, usual=0.311)
+    ]
+    high_slope: Annotated[
+        float, Quantity("N s/mm/kPa", -0.1, 0.1, f"{_TABLE_2}: 0.00338", 0.0, usual=0.00338)
+    ]
+    breakpoint: Annotated[float, Quantity("kPa", 0, 1000, f"{_TABLE_2}: 372", usual=372)]
 
 
 def damping(pressure, velocity, p):
@@ -47,6 +51,7 @@ DAMPING = Effect(
     name="damping",
     port="muscle_damping",
     parameters=Damping,
+    held=("breakpoint",),
     law=damping,
     signature="force proportional to speed, another factor in each direction",
 )
@@ -56,10 +61,14 @@ class SymmetricDamping(NamedTuple):
     """Parameters of `symmetric_damping`."""
 
     intercept: Annotated[
-        float, Quantity("N s/mm", -20, 20, "fitted to Serres 2008, tables I2 and I3", 0.0)
+        float,
+        Quantity("N s/mm", -20, 20, "fitted to Serres 2008, tables I2 and I3", 0.0, usual=0.25),
     ]
     slope: Annotated[
-        float, Quantity("N s/mm/kPa", -0.1, 0.1, "fitted to Serres 2008, tables I2 and I3", 0.0)
+        float,
+        Quantity(
+            "N s/mm/kPa", -0.1, 0.1, "fitted to Serres 2008, tables I2 and I3", 0.0, usual=0.0015
+        ),
     ]
 
 

@@ -11,9 +11,14 @@ class Drive(NamedTuple):
     """Parameters of `drive_load`."""
 
     gain: Annotated[
-        float, Quantity("N/V", 1, 1000, "Serres 2008, fit to the measured loads of I3: 97.84")
+        float,
+        Quantity(
+            "N/V", 1, 1000, "Serres 2008, fit to the measured loads of I3: 97.84", usual=97.84
+        ),
     ]
-    offset: Annotated[float, Quantity("N", -100, 100, "Serres 2008, the same fit: -2.0")]
+    offset: Annotated[
+        float, Quantity("N", -100, 100, "Serres 2008, the same fit: -2.0", usual=-2.0)
+    ]
 
 
 def drive_load(motor_voltage, p):

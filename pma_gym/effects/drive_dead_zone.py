@@ -14,7 +14,7 @@ class DriveDeadZone(NamedTuple):
     """Parameters of `load_beyond_dead_zone`."""
 
     width: Annotated[
-        float, Quantity("N", 0, 200, "assumption: 0.05-0.2 V, so 5-20 at 97.84 N/V", 0.0)
+        float, Quantity("N", 0, 200, "assumption: 0.05-0.2 V, so 5-20 at 97.84 N/V", 0.0, usual=15)
     ]
 
 

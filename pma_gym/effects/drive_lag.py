@@ -10,10 +10,11 @@ class DriveLag(NamedTuple):
     """Parameters of `late_load`."""
 
     share: Annotated[
-        float, Quantity("1", 0, 1, "1 for a first-order lag, the usual current loop", 0.0)
+        float, Quantity("1", 0, 1, "1 for a first-order lag, the usual current loop", 0.0, usual=1)
     ]
     time_constant: Annotated[
-        float, Quantity("ms", 0.1, 200, "assumption: 1-5 for a current loop, 20 if filtered")
+        float,
+        Quantity("ms", 0.1, 200, "assumption: 1-5 for a current loop, 20 if filtered", usual=10),
     ]
 
 
@@ -51,6 +52,7 @@ DRIVE_LAG = Effect(
     name="drive_lag",
     port="drive_lag",
     parameters=DriveLag,
+    held=("share",),
     law=late_load,
     rate=late_rate,
     signature="load cell late, phase proportional to frequency; statically absent",

@@ -16,7 +16,12 @@ class DriveSaturation(NamedTuple):
     limit: Annotated[
         float,
         Quantity(
-            "N", 10, BOUNDLESS_N, "assumption: 700-976, 976 being what 10 V asks for", BOUNDLESS_N
+            "N",
+            10,
+            BOUNDLESS_N,
+            "assumption: 450, half of the 976 that 10 V asks for",
+            BOUNDLESS_N,
+            usual=450,
         ),
     ]
 

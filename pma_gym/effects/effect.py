@@ -36,6 +36,8 @@ class Effect:
         switch: a signal at whose zero the law has a kink; steps end there.
         signature: what sets the effect apart in measured data.
         memory_scale: what an error of the memory is counted against, roughly its range.
+        held: parameters (field names) that a diagnosis leaves at their usual values when it fits
+            the effect: geometry, and what only switches the law on.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Effect:
     switch: Callable | None = None
     signature: str = ""
     memory_scale: float = 1.0
+    held: tuple[str, ...] = ()
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
@@ -59,6 +62,17 @@ class Effect:
         """Parameters at which the law is exactly absent, or None if there are none such."""
         known = {n: q.to_si(q.neutral) for n, q in self.quantities.items() if q.neutral is not None}
         return self.start._replace(**known) if known else None
+
+    @property
+    def usual(self) -> Parameters:
+        """Parameters (SI) at their usual values; neutral, else mid-bounds, for one without.
+
+        >>> from pma_gym.effects import CATALOGUE
+        >>> CATALOGUE["hysteresis"].usual
+        Hysteresis(force=25.0, distance=0.0015)
+        """
+        known = {n: q.to_si(q.usual) for n, q in self.quantities.items() if q.usual is not None}
+        return (self.neutral or self.start)._replace(**known)
 
     @property
     def start(self) -> Parameters:

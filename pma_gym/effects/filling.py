@@ -18,13 +18,22 @@ class Filling(NamedTuple):
     """Parameters of `filling_rate`."""
 
     exponent: Annotated[
-        float, Quantity("1", 0, 1.67, "of a polytropic change: 1 isothermal, 1.4 adiabatic", 0.0)
+        float,
+        Quantity(
+            "1", 0, 1.67, "of a polytropic change: 1 isothermal, 1.4 adiabatic", 0.0, usual=1.2
+        ),
     ]
-    resting_length: Annotated[float, Quantity("mm", 100, 1000, "Serres 2008, 2.1.2.1: 250")]
-    resting_diameter: Annotated[float, Quantity("mm", 1, 100, "Serres 2008, 2.1.2.1: 20 (inner)")]
+    resting_length: Annotated[
+        float, Quantity("mm", 100, 1000, "Serres 2008, 2.1.2.1: 250", usual=250)
+    ]
+    resting_diameter: Annotated[
+        float, Quantity("mm", 1, 100, "Serres 2008, 2.1.2.1: 20 (inner)", usual=20)
+    ]
     turns: Annotated[
         float,
-        Quantity("1", 0.1, 20, "as `schulte_force`, fitted to Serres 2008, table I3: 2.085"),
+        Quantity(
+            "1", 0.1, 20, "as `schulte_force`, fitted to Serres 2008, table I3: 2.085", usual=2.085
+        ),
     ]
 
 
@@ -77,6 +86,11 @@ FILLING = Effect(
     name="filling",
     port="chamber",
     parameters=Filling,
+    held=(
+        "resting_length",
+        "resting_diameter",
+        "turns",
+    ),
     law=filling_rate,
     signature="measured pressure rises when the motor pulls and falls when it lets go",
 )

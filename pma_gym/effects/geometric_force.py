@@ -31,9 +31,9 @@ STRAIGHT = 1e-8
 """Square of the diameter (m^2) below which a braid counts as pulled straight: 0.1 mm."""
 
 _FIT = "least-squares fit to Serres 2008, table I3, 200-575 kPa"
-_SCALE = Quantity("1", 0, 2, "1 is the published law; less where a muscle gives less", 0.0)
-_LENGTH = Quantity("mm", 10, 1000, "Serres 2008, 2.1.2.1: 250")
-_DIAMETER = Quantity("mm", 1, 100, "Serres 2008, 2.1.2.1: 20 (inner)")
+_SCALE = Quantity("1", 0, 2, "1 is the published law; less where a muscle gives less", 0.0, usual=1)
+_LENGTH = Quantity("mm", 10, 1000, "Serres 2008, 2.1.2.1: 250", usual=250)
+_DIAMETER = Quantity("mm", 1, 100, "Serres 2008, 2.1.2.1: 20 (inner)", usual=20)
 
 
 class SchulteForce(NamedTuple):
@@ -42,7 +42,9 @@ class SchulteForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)")]
+    turns: Annotated[
+        float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)", usual=2.085)
+    ]
 
 
 def schulte_force(pressure, contraction, p):
@@ -75,15 +77,19 @@ class SchulzForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 1.780 (24.1 deg at rest)")]
+    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 1.780 (24.1 deg at rest)", usual=1.78)]
     elasticity: Annotated[
-        float, Quantity("N/mm", 0, 1000, f"{_FIT}: 3.348; modulus of the tube times its wall")
+        float,
+        Quantity(
+            "N/mm", 0, 1000, f"{_FIT}: 3.348; modulus of the tube times its wall", usual=3.348
+        ),
     ]
     shell_friction: Annotated[
-        float, Quantity("1", 0, 1, f"none found: {_FIT} gives 0.002 +- 0.001")
+        float, Quantity("1", 0, 1, f"none found: {_FIT} gives 0.002 +- 0.001", usual=0)
     ]
     tube_friction: Annotated[
-        float, Quantity("1", 0, 1, "none found: table I3 cannot tell it from shell_friction")
+        float,
+        Quantity("1", 0, 1, "none found: table I3 cannot tell it from shell_friction", usual=0),
     ]
 
 
@@ -132,11 +138,15 @@ class ChouHannafordForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[
-        float, Quantity("mm", 1, 100, "of the braid: inner diameter 20 + 2 thickness = 22")
+        float,
+        Quantity("mm", 1, 100, "of the braid: inner diameter 20 + 2 thickness = 22", usual=22),
     ]
-    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.012 (29.1 deg at rest)")]
+    turns: Annotated[
+        float, Quantity("1", 0.1, 20, f"{_FIT}: 2.012 (29.1 deg at rest)", usual=2.012)
+    ]
     thickness: Annotated[
-        float, Quantity("mm", 0, 10, f"assumption: 1 (braid and tube); {_FIT} would have 0")
+        float,
+        Quantity("mm", 0, 10, f"assumption: 1 (braid and tube); {_FIT} would have 0", usual=1),
     ]
 
 
@@ -175,9 +185,12 @@ class CaldwellForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)")]
+    turns: Annotated[
+        float, Quantity("1", 0.1, 20, f"{_FIT}: 2.085 (27.7 deg at rest)", usual=2.085)
+    ]
     cap_diameter: Annotated[
-        float, Quantity("mm", 0, 100, "assumption: 20, plugs as wide as the resting tube", 0.0)
+        float,
+        Quantity("mm", 0, 100, "assumption: 20, plugs as wide as the resting tube", 0.0, usual=20),
     ]
 
 
@@ -214,9 +227,14 @@ class TonduLopezForce(NamedTuple):
     scale: Annotated[float, _SCALE]
     resting_length: Annotated[float, _LENGTH]
     resting_diameter: Annotated[float, _DIAMETER]
-    turns: Annotated[float, Quantity("1", 0.1, 20, f"{_FIT}: 1.881 (25.3 deg at rest)")]
+    turns: Annotated[
+        float, Quantity("1", 0.1, 20, f"{_FIT}: 1.881 (25.3 deg at rest)", usual=1.881)
+    ]
     end_factor: Annotated[
-        float, Quantity("1", 0, 5, f"{_FIT}: 1.442; 1 for a cylinder, somewhat more in practice")
+        float,
+        Quantity(
+            "1", 0, 5, f"{_FIT}: 1.442; 1 for a cylinder, somewhat more in practice", usual=1.442
+        ),
     ]
 
 
@@ -250,11 +268,18 @@ def tondu_lopez_force(pressure, contraction, p):
 _SIGNATURE = "force falls with the square of length; single-valued and independent of rate"
 _PROPORTIONAL = _SIGNATURE + "; proportional to pressure"
 
+_GEOMETRY = ("resting_length", "resting_diameter")
+
 SCHULTE_FORCE = Effect(
-    "schulte_force", "muscle_force", SchulteForce, schulte_force, signature=_PROPORTIONAL
+    "schulte_force",
+    "muscle_force",
+    SchulteForce,
+    schulte_force,
+    signature=_PROPORTIONAL,
+    held=_GEOMETRY,
 )
 SCHULZ_FORCE = Effect(
-    "schulz_force", "muscle_force", SchulzForce, schulz_force, signature=_SIGNATURE
+    "schulz_force", "muscle_force", SchulzForce, schulz_force, signature=_SIGNATURE, held=_GEOMETRY
 )
 CHOU_HANNAFORD_FORCE = Effect(
     "chou_hannaford_force",
@@ -262,9 +287,15 @@ CHOU_HANNAFORD_FORCE = Effect(
     ChouHannafordForce,
     chou_hannaford_force,
     signature=_PROPORTIONAL,
+    held=_GEOMETRY,
 )
 CALDWELL_FORCE = Effect(
-    "caldwell_force", "muscle_force", CaldwellForce, caldwell_force, signature=_PROPORTIONAL
+    "caldwell_force",
+    "muscle_force",
+    CaldwellForce,
+    caldwell_force,
+    signature=_PROPORTIONAL,
+    held=_GEOMETRY,
 )
 TONDU_LOPEZ_FORCE = Effect(
     "tondu_lopez_force",
@@ -272,4 +303,5 @@ TONDU_LOPEZ_FORCE = Effect(
     TonduLopezForce,
     tondu_lopez_force,
     signature=_PROPORTIONAL,
+    held=_GEOMETRY,
 )

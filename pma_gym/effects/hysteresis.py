@@ -9,8 +9,12 @@ from pma_gym.units import Quantity
 class Hysteresis(NamedTuple):
     """Parameters of `hysteresis_force`."""
 
-    force: Annotated[float, Quantity("N", 0, 200, "literature on braided muscles: 15-40 N", 0.0)]
-    distance: Annotated[float, Quantity("mm", 0.05, 20, "literature on braided muscles: 1-2.5 mm")]
+    force: Annotated[
+        float, Quantity("N", 0, 200, "literature on braided muscles: 15-40 N", 0.0, usual=25)
+    ]
+    distance: Annotated[
+        float, Quantity("mm", 0.05, 20, "literature on braided muscles: 1-2.5 mm", usual=1.5)
+    ]
 
 
 def hysteresis_force(memory, p):

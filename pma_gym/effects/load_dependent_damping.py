@@ -15,10 +15,14 @@ _PEAK = "Serres 2008, table I2 at 250 kPa, 1.3 to 5.2 N s/mm at middle load"
 class LoadDependentDamping(NamedTuple):
     """Parameters of `load_factor`."""
 
-    linear: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: 12", 0.0)]
-    quadratic: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: -12", 0.0)]
-    force_slope: Annotated[float, Quantity("N/kPa", 0, 20, "Serres 2008, section 5.1.1: 2.91")]
-    force_intercept: Annotated[float, Quantity("N", 1, 500, "Serres 2008, section 5.1.1: 44.6")]
+    linear: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: 12", 0.0, usual=12)]
+    quadratic: Annotated[float, Quantity("1", -20, 20, f"{_PEAK}: -12", 0.0, usual=-12)]
+    force_slope: Annotated[
+        float, Quantity("N/kPa", 0, 20, "Serres 2008, section 5.1.1: 2.91", usual=2.91)
+    ]
+    force_intercept: Annotated[
+        float, Quantity("N", 1, 500, "Serres 2008, section 5.1.1: 44.6", usual=44.6)
+    ]
 
 
 def load_factor(pressure, cable_tension, p):
@@ -49,6 +53,10 @@ LOAD_DEPENDENT_DAMPING = Effect(
     name="load_dependent_damping",
     port="damping_factor",
     parameters=LoadDependentDamping,
+    held=(
+        "force_slope",
+        "force_intercept",
+    ),
     law=load_factor,
     signature="force proportional to speed, by a factor that depends on the load",
 )

@@ -10,7 +10,10 @@ class Operator(NamedTuple):
     """Parameters of `operator_force`."""
 
     share: Annotated[
-        float, Quantity("1", 0, 1, "1 where somebody is there; what he does is a disturbance", 0.0)
+        float,
+        Quantity(
+            "1", 0, 1, "1 where somebody is there; what he does is a disturbance", 0.0, usual=1
+        ),
     ]
 
 
@@ -49,6 +52,7 @@ OPERATOR = Effect(
     name="operator",
     port="slide_force",
     parameters=Operator,
+    held=("share",),
     law=operator_force,
     rate=operator_rate,
     signature="pulses of force that no command explains",

@@ -15,9 +15,18 @@ class PassiveStretch(NamedTuple):
 
     factor: Annotated[
         float,
-        Quantity("1", 0, 3, "1 for 96, 229, 416, 684 N at 1-4 %, an assumption for a MAS-20", 0.0),
+        Quantity(
+            "1",
+            0,
+            3,
+            "1 for 96, 229, 416, 684 N at 1-4 %, an assumption for a MAS-20",
+            0.0,
+            usual=1,
+        ),
     ]
-    resting_length: Annotated[float, Quantity("mm", 10, 5000, "Serres 2008, 2.1.2.1: 250")]
+    resting_length: Annotated[
+        float, Quantity("mm", 10, 5000, "Serres 2008, 2.1.2.1: 250", usual=250)
+    ]
 
 
 def stretch_force(contraction, p):
@@ -60,6 +69,7 @@ PASSIVE_STRETCH = Effect(
     name="passive_stretch",
     port="muscle_force",
     parameters=PassiveStretch,
+    held=("resting_length",),
     law=stretch_force,
     switch=slackness,
     signature="force misfit at negative contraction only, single-valued",

@@ -5,16 +5,18 @@ from typing import Annotated, NamedTuple
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
-_FIT = "fitted to Serres 2008, table I3"
+_FIT = "fitted to Serres 2008, table I3, beside `sarosi_force`"
 
 
 class PressureCurvature(NamedTuple):
     """Parameters of `pressure_curvature`."""
 
-    passive: Annotated[float, Quantity("N/%", -500, 500, _FIT, 0.0)]
-    softening: Annotated[float, Quantity("N/bar^2/%", -100, 100, _FIT, 0.0)]
-    offset: Annotated[float, Quantity("N/bar^2", -500, 500, _FIT, 0.0)]
-    resting_length: Annotated[float, Quantity("mm", 1, 5000, "Serres 2008, 2.1.2.1: 250")]
+    passive: Annotated[float, Quantity("N/%", -500, 500, _FIT, 0.0, usual=8.7)]
+    softening: Annotated[float, Quantity("N/bar^2/%", -100, 100, _FIT, 0.0, usual=-0.23)]
+    offset: Annotated[float, Quantity("N/bar^2", -500, 500, _FIT, 0.0, usual=-11.9)]
+    resting_length: Annotated[
+        float, Quantity("mm", 1, 5000, "Serres 2008, 2.1.2.1: 250", usual=250)
+    ]
 
 
 def pressure_curvature(pressure, contraction, p):
@@ -42,6 +44,7 @@ PRESSURE_CURVATURE = Effect(
     name="pressure_curvature",
     port="muscle_force",
     parameters=PressureCurvature,
+    held=("resting_length",),
     law=pressure_curvature,
     signature="force misfit that is parabolic in pressure, the same at every rate",
 )

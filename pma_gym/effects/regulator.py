@@ -10,8 +10,8 @@ from pma_gym.units import Quantity
 class RegulatorLine(NamedTuple):
     """Parameters of `commanded_pressure`."""
 
-    gain: Annotated[float, Quantity("kPa/V", 1, 1000, "Serres 2008, table 1: 59.9")]
-    offset: Annotated[float, Quantity("kPa", -200, 200, "Serres 2008, table 1: -20.4")]
+    gain: Annotated[float, Quantity("kPa/V", 1, 1000, "Serres 2008, table 1: 59.9", usual=59.9)]
+    offset: Annotated[float, Quantity("kPa", -200, 200, "Serres 2008, table 1: -20.4", usual=-20.4)]
 
 
 class RegulatorLag(NamedTuple):
@@ -19,7 +19,9 @@ class RegulatorLag(NamedTuple):
 
     time_constant: Annotated[
         float,
-        Quantity("s", 1e-4, 10, "Serres 2008, 2.1.2.3: response 0.22 s, read as 10-90 %: 0.10"),
+        Quantity(
+            "s", 1e-4, 10, "Serres 2008, 2.1.2.3: response 0.22 s, read as 10-90 %: 0.10", usual=0.1
+        ),
     ]
 
 

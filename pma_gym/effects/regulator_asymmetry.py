@@ -11,7 +11,15 @@ class RegulatorAsymmetry(NamedTuple):
     """Parameters of `regulator_asymmetry`."""
 
     vent_ratio: Annotated[
-        float, Quantity("1", 0.01, 100, "Serres 2008, 6.1: filling and venting differ", 1.0)
+        float,
+        Quantity(
+            "1",
+            0.01,
+            100,
+            "Serres 2008, 6.1: filling and venting differ; 1.5 is an assumption",
+            1.0,
+            usual=1.5,
+        ),
     ]
 
 

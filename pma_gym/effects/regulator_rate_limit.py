@@ -21,6 +21,7 @@ class RegulatorRateLimit(NamedTuple):
             BOUNDLESS_KPA_PER_S,
             "assumption: 2000-4000, some times the pressure in 0.22 s (Serres 2008, 2.1.2.3)",
             BOUNDLESS_KPA_PER_S,
+            usual=2000,
         ),
     ]
 

@@ -19,13 +19,14 @@ class ReppergerSpring(NamedTuple):
     """Parameters of `repperger_spring`."""
 
     stiffness: Annotated[
-        float, Quantity("N/mm", -200, 200, f"{_FIT}: 25.01; {_REYNOLDS}: 5.71", 0.0)
+        float, Quantity("N/mm", -200, 200, f"{_FIT}: 25.01; {_REYNOLDS}: 5.71", 0.0, usual=25.01)
     ]
     stiffening: Annotated[
-        float, Quantity("N/mm/kPa", -1, 1, f"{_FIT}: 0.03403; {_REYNOLDS}: 0.0307", 0.0)
+        float,
+        Quantity("N/mm/kPa", -1, 1, f"{_FIT}: 0.03403; {_REYNOLDS}: 0.0307", 0.0, usual=0.03403),
     ]
-    linear: Annotated[float, Quantity("N/mm^2", -50, 50, f"{_FIT}: -0.6378", 0.0)]
-    quadratic: Annotated[float, Quantity("N/mm^3", -1, 1, f"{_FIT}: 0.005308", 0.0)]
+    linear: Annotated[float, Quantity("N/mm^2", -50, 50, f"{_FIT}: -0.6378", 0.0, usual=-0.6378)]
+    quadratic: Annotated[float, Quantity("N/mm^3", -1, 1, f"{_FIT}: 0.005308", 0.0, usual=0.005308)]
 
 
 def repperger_spring(pressure, contraction, p):
@@ -59,14 +60,25 @@ class ReppergerDamping(NamedTuple):
     """Parameters of `repperger_damping`."""
 
     viscous: Annotated[
-        float, Quantity("N s/mm", 0, 20, f"{_STEPS}: 1.79; {_REYNOLDS}: 1.01 and 0.6", 0.0)
+        float,
+        Quantity("N s/mm", 0, 20, f"{_STEPS}: 1.79; {_REYNOLDS}: 1.01 and 0.6", 0.0, usual=1.79),
     ]
     stiffening: Annotated[
         float,
-        Quantity("N s/mm/kPa", -0.1, 0.1, f"{_STEPS}: 0.0016; {_REYNOLDS}: 0.00691, 0.000803", 0.0),
+        Quantity(
+            "N s/mm/kPa",
+            -0.1,
+            0.1,
+            f"{_STEPS}: 0.0016; {_REYNOLDS}: 0.00691, 0.000803",
+            0.0,
+            usual=0.0016,
+        ),
     ]
     speed_slope: Annotated[
-        float, Quantity("N s^2/mm^2", -1, 1, f"{_STEPS}, at half the first speed: 0.0020", 0.0)
+        float,
+        Quantity(
+            "N s^2/mm^2", -1, 1, f"{_STEPS}, at half the first speed: 0.0020", 0.0, usual=0.002
+        ),
     ]
 
 

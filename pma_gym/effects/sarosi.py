@@ -13,14 +13,17 @@ class SarosiForce(NamedTuple):
     """Parameters of `sarosi_force`, in the order of the source: a, b, -c, -d, e, f."""
 
     toe_slope: Annotated[
-        float, Quantity("N/bar", -500, 500, f"{_FIT}: 6.15; not told from 0 (sd 5.6)", 0.0)
+        float,
+        Quantity("N/bar", -500, 500, f"{_FIT}: 6.15; not told from 0 (sd 5.6)", 0.0, usual=6.15),
     ]
-    toe_force: Annotated[float, Quantity("N", -5000, 5000, f"{_FIT}: 299.7", 0.0)]
-    steepness: Annotated[float, Quantity("1/%", 0, 10, f"{_FIT}: 0.2955")]
-    softening: Annotated[float, Quantity("N/bar/%", -500, 500, f"{_FIT}: 8.878", 0.0)]
-    slope: Annotated[float, Quantity("N/bar", -5000, 5000, f"{_FIT}: 277.1", 0.0)]
-    offset: Annotated[float, Quantity("N", -5000, 5000, f"{_FIT}: -267.3", 0.0)]
-    resting_length: Annotated[float, Quantity("mm", 1, 5000, "Serres 2008, 2.1.2.1: 250")]
+    toe_force: Annotated[float, Quantity("N", -5000, 5000, f"{_FIT}: 299.7", 0.0, usual=299.7)]
+    steepness: Annotated[float, Quantity("1/%", 0, 10, f"{_FIT}: 0.2955", usual=0.2955)]
+    softening: Annotated[float, Quantity("N/bar/%", -500, 500, f"{_FIT}: 8.878", 0.0, usual=8.878)]
+    slope: Annotated[float, Quantity("N/bar", -5000, 5000, f"{_FIT}: 277.1", 0.0, usual=277.1)]
+    offset: Annotated[float, Quantity("N", -5000, 5000, f"{_FIT}: -267.3", 0.0, usual=-267.3)]
+    resting_length: Annotated[
+        float, Quantity("mm", 1, 5000, "Serres 2008, 2.1.2.1: 250", usual=250)
+    ]
 
 
 def sarosi_force(pressure, contraction, p):
@@ -52,6 +55,7 @@ SAROSI_FORCE = Effect(
     name="sarosi_force",
     port="muscle_force",
     parameters=SarosiForce,
+    held=("resting_length",),
     law=sarosi_force,
     signature="force stiffens towards the resting length; single-valued, independent of rate",
 )

@@ -10,21 +10,21 @@ from typing import Annotated, NamedTuple
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
-_GAIN = Quantity("%", -50, 50, "assumption: calibrations hold to 1-2", 0.0)
+_GAIN = Quantity("%", -50, 50, "assumption: calibrations hold to 1-2", 0.0, usual=1.5)
 
 
 class LvdtError(NamedTuple):
     """Error of the measured contraction."""
 
     gain: Annotated[float, _GAIN]
-    offset: Annotated[float, Quantity("mm", -20, 20, "assumption: 0.5", 0.0)]
+    offset: Annotated[float, Quantity("mm", -20, 20, "assumption: 0.5", 0.0, usual=0.5)]
 
 
 class LoadCellError(NamedTuple):
     """Error of the measured tension."""
 
     gain: Annotated[float, _GAIN]
-    offset: Annotated[float, Quantity("N", -200, 200, "assumption: 5", 0.0)]
+    offset: Annotated[float, Quantity("N", -200, 200, "assumption: 5", 0.0, usual=5)]
 
 
 class PressureTransducerError(NamedTuple):
@@ -32,16 +32,23 @@ class PressureTransducerError(NamedTuple):
 
     gain: Annotated[
         float,
-        Quantity("%", -50, 50, "Serres 2008, tables I2 and I3 read 1.016 P + 3.4 kPa: 1.6", 0.0),
+        Quantity(
+            "%",
+            -50,
+            50,
+            "Serres 2008, tables I2 and I3 read 1.016 P + 3.4 kPa: 1.6",
+            0.0,
+            usual=1.6,
+        ),
     ]
-    offset: Annotated[float, Quantity("kPa", -100, 100, "the same: 3.4", 0.0)]
+    offset: Annotated[float, Quantity("kPa", -100, 100, "the same: 3.4", 0.0, usual=3.4)]
 
 
 class PotentiometerError(NamedTuple):
     """Error of the measured angle."""
 
     gain: Annotated[float, _GAIN]
-    offset: Annotated[float, Quantity("deg", -45, 45, "assumption: 1", 0.0)]
+    offset: Annotated[float, Quantity("deg", -45, 45, "assumption: 1", 0.0, usual=1)]
 
 
 def sensor_error(signal, p):

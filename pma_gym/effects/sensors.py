@@ -12,6 +12,7 @@ def _bandwidth(usual: float) -> Quantity:
     """Bounds of a sensor's bandwidth, with its usual value (Hz)."""
     return Quantity(
         *("Hz", 1, 1e5, f"{_ASSUMED}: {usual:g}"),
+        usual=usual,
         instead="a sensor without lag and noise is one without its table: leave that out",
     )
 
@@ -20,28 +21,36 @@ class Lvdt(NamedTuple):
     """Displacement of the muscle (contraction)."""
 
     bandwidth: Annotated[float, _bandwidth(100)]
-    noise: Annotated[float, Quantity("mm", 0, 10, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0)]
+    noise: Annotated[
+        float, Quantity("mm", 0, 10, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
+    ]
 
 
 class LoadCell(NamedTuple):
     """Tension of the cable."""
 
     bandwidth: Annotated[float, _bandwidth(500)]
-    noise: Annotated[float, Quantity("N", 0, 100, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0)]
+    noise: Annotated[
+        float, Quantity("N", 0, 100, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
+    ]
 
 
 class PressureTransducer(NamedTuple):
     """Gauge pressure in the muscle."""
 
     bandwidth: Annotated[float, _bandwidth(50)]
-    noise: Annotated[float, Quantity("kPa", 0, 100, f"{_ASSUMED}: 0.3 (standard deviation)", 0.0)]
+    noise: Annotated[
+        float, Quantity("kPa", 0, 100, f"{_ASSUMED}: 0.3 (standard deviation)", 0.0, usual=0.3)
+    ]
 
 
 class Potentiometer(NamedTuple):
     """Angle of the pulley."""
 
     bandwidth: Annotated[float, _bandwidth(200)]
-    noise: Annotated[float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.1 (standard deviation)", 0.0)]
+    noise: Annotated[
+        float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.1 (standard deviation)", 0.0, usual=0.1)
+    ]
 
 
 def sensor_rate(signal, p):

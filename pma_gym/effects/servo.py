@@ -11,19 +11,25 @@ _TABLE_3 = "Serres 2008, table 3"
 class Servo(NamedTuple):
     """Stiffness and damping of the motor's position loop, and its pulley."""
 
-    stiffness: Annotated[float, Quantity("N m", 1e-3, 1e4, f"{_TABLE_3}: 10.26")]
-    damping: Annotated[float, Quantity("N m s", 1e-7, 1e3, f"{_TABLE_3}: 7.64e-4")]
+    stiffness: Annotated[float, Quantity("N m", 1e-3, 1e4, f"{_TABLE_3}: 10.26", usual=10.26)]
+    damping: Annotated[float, Quantity("N m s", 1e-7, 1e3, f"{_TABLE_3}: 7.64e-4", usual=0.000764)]
     radius: Annotated[
-        float, Quantity("mm", 1, 500, "Serres 2008, tables I13-I20: 45 mm for 90 deg is 28.65")
+        float,
+        Quantity(
+            "mm", 1, 500, "Serres 2008, tables I13-I20: 45 mm for 90 deg is 28.65", usual=28.65
+        ),
     ]
 
 
 class ServoInertia(NamedTuple):
     """Inertia, and the damping ratio that the drive gives it."""
 
-    inertia: Annotated[float, Quantity("kg m^2", 1e-9, 1, "assumption: 2.0e-3")]
+    inertia: Annotated[float, Quantity("kg m^2", 1e-9, 1, "assumption: 2.0e-3", usual=0.002)]
     damping_ratio: Annotated[
-        float, Quantity("1", 0.001, 10, "assumption: 0.7; the printed damping alone gives 0.003")
+        float,
+        Quantity(
+            "1", 0.001, 10, "assumption: 0.7; the printed damping alone gives 0.003", usual=0.7
+        ),
     ]
 
 

@@ -9,7 +9,7 @@ from pma_gym.units import Quantity
 class Slide(NamedTuple):
     """Moving mass; the plant reads it itself."""
 
-    mass: Annotated[float, Quantity("kg", 1e-3, 1000, "assumption: 0.5")]
+    mass: Annotated[float, Quantity("kg", 1e-3, 1000, "assumption: 0.5", usual=0.5)]
 
 
 SLIDE = Effect(name="slide", port="part", parameters=Slide)

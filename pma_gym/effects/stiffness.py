@@ -12,11 +12,15 @@ _TABLE_2 = "Serres 2008, table 2"
 class Stiffness(NamedTuple):
     """Parameters of `spring_stiffness`, one line below the breakpoint and one above."""
 
-    low_intercept: Annotated[float, Quantity("N/mm", 0, 200, f"{_TABLE_2}: 32.7", 0.0)]
-    low_slope: Annotated[float, Quantity("N/mm/kPa", -1, 1, f"{_TABLE_2}: -0.0321", 0.0)]
-    high_intercept: Annotated[float, Quantity("N/mm", 0, 200, f"{_TABLE_2}: 17.0", 0.0)]
-    high_slope: Annotated[float, Quantity("N/mm/kPa", -1, 1, f"{_TABLE_2}: 0.0179", 0.0)]
-    breakpoint: Annotated[float, Quantity("kPa", 0, 1000, f"{_TABLE_2}: 314")]
+    low_intercept: Annotated[float, Quantity("N/mm", 0, 200, f"{_TABLE_2}: 32.7", 0.0, usual=32.7)]
+    low_slope: Annotated[
+        float, Quantity("N/mm/kPa", -1, 1, f"{_TABLE_2}: -0.0321", 0.0, usual=-0.0321)
+    ]
+    high_intercept: Annotated[float, Quantity("N/mm", 0, 200, f"{_TABLE_2}: 17.0", 0.0, usual=17.0)]
+    high_slope: Annotated[
+        float, Quantity("N/mm/kPa", -1, 1, f"{_TABLE_2}: 0.0179", 0.0, usual=0.0179)
+    ]
+    breakpoint: Annotated[float, Quantity("kPa", 0, 1000, f"{_TABLE_2}: 314", usual=314)]
 
 
 def spring_stiffness(pressure, p):
@@ -57,6 +61,7 @@ STIFFNESS = Effect(
     name="stiffness",
     port="muscle_force",
     parameters=Stiffness,
+    held=("breakpoint",),
     law=spring_force,
     signature="force proportional to contraction, single-valued and independent of rate",
 )

@@ -11,12 +11,15 @@ class TorqueRipple(NamedTuple):
     """Parameters of `ripple_load`."""
 
     amplitude: Annotated[
-        float, Quantity("%", 0, 1, "servo motors' data sheets: at most 1 of the torque", 0.0)
+        float,
+        Quantity("%", 0, 1, "servo motors' data sheets: at most 1 of the torque", 0.0, usual=1),
     ]
     periods: Annotated[
-        float, Quantity("1", 1, 60, "assumption: 24 a turn, slots or commutator bars")
+        float, Quantity("1", 1, 60, "assumption: 24 a turn, slots or commutator bars", usual=24)
     ]
-    phase: Annotated[float, Quantity("deg", -180, 180, "where the motor happens to stand: 0")]
+    phase: Annotated[
+        float, Quantity("deg", -180, 180, "where the motor happens to stand: 0", usual=0)
+    ]
 
 
 def ripple_load(load_arriving, angle, p):

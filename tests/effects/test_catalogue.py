@@ -266,3 +266,17 @@ def test_the_middle_of_the_bounds_is_a_parameter_set(effect):
         assert effect.name == "position_map"
         return
     assert effect.parse(effect.at_the_door(effect.start)) == pytest.approx(effect.start, rel=1e-12)
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=lambda effect: effect.name)
+def test_usual_values_are_a_parameter_set_that_is_there(effect):
+    assert set(effect.held) <= effect.quantities.keys()
+    if effect.rows:
+        return
+    assert all(quantity.usual is not None for quantity in effect.quantities.values())
+    assert effect.parse(effect.at_the_door(effect.usual)) == pytest.approx(effect.usual, rel=1e-12)
+    if effect.neutral is not None:
+        free = set(effect.parameters._fields) - set(effect.held)
+        assert any(
+            getattr(effect.usual, n) != getattr(effect.neutral, n) for n in free or effect.held
+        )
