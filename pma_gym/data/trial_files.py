@@ -103,6 +103,11 @@ def place_in_file(path: str | os.PathLike[str], sample: int) -> str:
     return _load(Path(path)).place(sample)
 
 
+def read_header(path: str | os.PathLike[str]) -> list[str]:
+    """Names of a file's columns, as they stand there."""
+    return list(_load(Path(path)).header)
+
+
 def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
     """Write a trial as the station's log would be: time, commands and measurements.
 

@@ -1,0 +1,158 @@
+"""What `dataset.toml` says about a data set."""
+
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pma_gym.data.trial_columns import ColumnMap, TrialError, sources, suggestion
+
+DESCRIPTION = "dataset.toml"
+_KEYS = ("title", "model", "columns", "trials")
+_TRIAL_KEYS = ("order", "repeat_of", "note")
+
+
+@dataclass(frozen=True)
+class Description:
+    """The content of `dataset.toml`; all of it may be missing.
+
+    Attributes:
+        title: a line for people; empty if none is given.
+        model: name or path of a model, or None.
+        columns: the lab's column names to ours.
+        trials: `order`, `repeat_of` and `note` by file name.
+    """
+
+    title: str = ""
+    model: str | None = None
+    columns: ColumnMap = field(default_factory=dict)
+    trials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+
+def read_description(folder: Path, files: Sequence[str]) -> Description:
+    """What a folder's `dataset.toml` says; nothing if there is none.
+
+    Args:
+        folder: the data set.
+        files: names of its trials' files.
+    Raises:
+        TrialError: no TOML, unknown keys, a trial or a model file that is not there.
+    """
+    path = folder / DESCRIPTION
+    if not path.is_file():
+        near = [p.name for p in folder.glob("*.toml") if p.stem.lower() in ("dataset", "data_set")]
+        if near:
+            raise TrialError(f"{folder / near[0]} must be called {DESCRIPTION}; rename it")
+        return Description()
+    document = _parsed(path)
+    _check_keys(f"{DESCRIPTION}", document, _KEYS)
+    columns = _table(document, "columns")
+    for name in columns:
+        try:
+            # Alone: two names of one quantity are two layouts of files, if no file has both.
+            sources([name], columns, DESCRIPTION)
+        except TrialError as error:
+            raise TrialError(f"{DESCRIPTION}: {error}") from None
+    return Description(
+        title=_text(document, "title", DESCRIPTION) or "",
+        model=_model(folder, _text(document, "model", DESCRIPTION)),
+        columns=columns,
+        trials=_trials(_table(document, "trials"), files),
+    )
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise TrialError(
+            f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8"
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise TrialError(
+            f"{path} is not valid TOML: {error}; a line is a table, [columns], or name = value, a "
+            'text in quotes: "Weg" = "contraction_mm"'
+        ) from None
+
+
+def _check_keys(place: str, found: Iterable[str], known: Sequence[str]) -> None:
+    for key in found:
+        if key not in known:
+            raise TrialError(
+                f"{place} takes {', '.join(known)}, got {key!r}{suggestion(key, known)}; remove or "
+                "rename it"
+            )
+
+
+def _table(document: Mapping[str, Any], key: str) -> dict[str, Any]:
+    table = document.get(key, {})
+    if not isinstance(table, dict):
+        raise TrialError(f"{key} in {DESCRIPTION} must be a table, [{key}], got {table!r}")
+    return table
+
+
+def _text(table: Mapping[str, Any], key: str, place: str) -> str | None:
+    value = table.get(key)
+    if value is not None and (not isinstance(value, str) or not value.strip()):
+        raise TrialError(f'{key} in {place} must be a text, {key} = "...", got {value!r}')
+    return value
+
+
+def _model(folder: Path, given: str | None) -> str | None:
+    """The model's name, or its file as seen from here."""
+    if given is None or not (given.endswith(".toml") or "/" in given or "\\" in given):
+        return given
+    path = folder / given
+    if not path.is_file():
+        raise TrialError(
+            f"model in {DESCRIPTION} is {given!r}, but there is no file {path}; a path counts "
+            "from the data set's folder"
+        )
+    return str(path)
+
+
+def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """What is said about each trial, checked."""
+    for name, table in tables.items():
+        if name not in files:
+            raise TrialError(
+                f'[trials."{name}"] in {DESCRIPTION} names no file of the data set'
+                f"{suggestion(name, files)}; write the file's whole name, ending included"
+            )
+        place = f'[trials."{name}"] in {DESCRIPTION}'
+        if not isinstance(table, dict):
+            raise TrialError(f"{place} must be a table, got {table!r}")
+        _check_keys(place, table, _TRIAL_KEYS)
+        _text(table, "note", place)
+        _check_order(place, table.get("order", 0.0))
+        _check_repeat(place, name, _text(table, "repeat_of", place), tables, files)
+    return {name: {**table} for name, table in tables.items()}
+
+
+def _check_order(place: str, order: object) -> None:
+    given = order if isinstance(order, int | float) and not isinstance(order, bool) else math.nan
+    if not math.isfinite(given):
+        raise TrialError(
+            f"order in {place} must be a number, the larger the later it was measured, got "
+            f"{order!r}; write order = 1 for the first"
+        )
+
+
+def _check_repeat(
+    place: str, name: str, original: str | None, tables: Mapping[str, Any], files: Sequence[str]
+) -> None:
+    if original is None:
+        return
+    if original not in files:
+        raise TrialError(
+            f"repeat_of in {place} is {original!r}, which names no trial"
+            f"{suggestion(original, files)}; write the file's whole name, ending included"
+        )
+    further = tables.get(original, {})
+    if original == name or (isinstance(further, dict) and further.get("repeat_of")):
+        raise TrialError(
+            f"repeat_of in {place} is {original!r}, which is itself a repeat; name the first trial "
+            "with these commands in all its repeats"
+        )

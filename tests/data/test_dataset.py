@@ -1,0 +1,297 @@
+"""Data sets: what a lab's folder becomes, and one message for each thing that is wrong with it."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+
+from pma_gym.data.dataset import read_dataset
+from pma_gym.data.trial import Trial, TrialError
+from pma_gym.data.trial_files import TrialWarning, write_trial
+
+ROWS = 60
+
+
+def columns(**changed):
+    """A pull at 300 kPa by the names of a file: plausible numbers of every sensor."""
+    time = np.arange(ROWS) / 20
+    swing = np.sin(2 * np.pi * time / 3.0) ** 2
+    made = {
+        "time_s": time,
+        "motor_voltage_v": 4.0 * swing,
+        "pressure_command_kpa": 200.0 + 100.0 * swing,
+        "contraction_mm": 40.0 - 20.0 * swing,
+        "rotation_deg": 44.0 * swing,
+        "load_n": 390.0 * swing + 2.0,
+        "pressure_kpa": 205.0 + 100.0 * swing,
+    }
+    made |= changed
+    return {name: values for name, values in made.items() if values is not None}
+
+
+def write(path, **changed):
+    """A CSV file of `columns`; a string stands as it is in every row."""
+    table = columns(**changed)
+    rows = [
+        ",".join(str(values if isinstance(values, str) else values[i]) for values in table.values())
+        for i in range(ROWS)
+    ]
+    path.write_text("\n".join([",".join(table), *rows]) + "\n")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    made = tmp_path / "lab"
+    made.mkdir()
+    return made
+
+
+def refusal(folder):
+    """The message that a folder is refused with; warnings are not looked at."""
+    with warnings.catch_warnings(), pytest.raises(TrialError) as caught:
+        warnings.simplefilter("ignore", TrialWarning)
+        read_dataset(folder)
+    return str(caught.value)
+
+
+def describe(folder, text):
+    (folder / "dataset.toml").write_text(text)
+
+
+def test_a_folder_of_csv_files_is_a_data_set(folder):
+    for name in ("ramp10.csv", "ramp2.csv", ".hidden.csv", "~$ramp2.xlsx"):
+        write(folder / name)
+    (folder / "model.toml").write_text("")
+    (folder / "old").mkdir()
+    write(folder / "old" / "ramp3.csv")
+    dataset = read_dataset(folder)
+    assert [each.name for each in dataset.trials] == ["ramp2.csv", "ramp10.csv"]
+    assert (dataset.title, dataset.model, len(dataset)) == ("lab", None, 2)
+    first = dataset.trials[0]
+    assert (first.order, first.repeat_of, first.note) == (None, None, "")
+    assert first.trial.measurements["contraction"][0] == pytest.approx(40e-3)
+
+
+def test_a_description_names_title_model_columns_and_trials(folder):
+    write(folder / "a.csv", contraction_mm=None, Weg=60.0 - columns()["contraction_mm"])
+    write(folder / "b.csv", contraction_mm=None, Weg=60.0 - columns()["contraction_mm"])
+    describe(
+        folder,
+        """
+        title = "Rig 2"
+        model = "rig.toml"
+        [columns]
+        "Weg" = { name = "contraction_mm", factor = -1.0, offset = 60.0 }
+        [trials."b.csv"]
+        repeat_of = "a.csv"
+        order = 2
+        note = "after lunch"
+        """,
+    )
+    (folder / "rig.toml").write_text("")
+    dataset = read_dataset(folder)
+    assert (dataset.title, dataset.model) == ("Rig 2", str(folder / "rig.toml"))
+    second = dataset.trials[1]
+    assert (second.order, second.repeat_of, second.note) == (2, "a.csv", "after lunch")
+    assert second.trial.measurements["contraction"][0] == pytest.approx(40e-3)
+
+
+def test_a_shipped_model_stays_a_name(folder):
+    write(folder / "a.csv")
+    describe(folder, 'model = "serres2008"')
+    assert read_dataset(folder).model == "serres2008"
+
+
+def test_parquet_and_xlsx_are_trials_too(folder):
+    pytest.importorskip("pyarrow")
+    pytest.importorskip("openpyxl")
+    time = np.arange(4.0)
+    trial = Trial(time, {"motor_voltage": time}, {"load": 100.0 * time})
+    for name in ("a.parquet", "b.xlsx", "c.csv"):
+        write_trial(trial, folder / name)
+    loads = [each.trial.measurements["load"] for each in read_dataset(folder).trials]
+    assert len(loads) == 3
+    for load in loads:
+        np.testing.assert_allclose(load, 100.0 * time)
+
+
+def test_a_folder_that_is_none_is_refused(folder, tmp_path):
+    write(tmp_path / "ramp.csv")
+    assert "ramp.csv is a file; a data set is a folder" in refusal(tmp_path / "ramp.csv")
+    assert "there is no folder" in refusal(tmp_path / "none")
+    assert "lab holds no trial: no .csv, .parquet, .xlsx file lies in it (it is empty)" in refusal(
+        folder
+    )
+    (folder / "log.mat").write_text("")
+    assert "(its files end in .mat); save each trial as a CSV file" in refusal(folder)
+    (folder / "runs").mkdir()
+    write(folder / "runs" / "a.csv")
+    assert re.search("some lie in .*lab/runs; name that folder", refusal(folder))
+
+
+@pytest.mark.parametrize("twin", ["ramp.parquet", "Ramp.csv", "RAMP.CSV"])
+def test_two_files_of_one_name_are_refused(folder, twin):
+    write(folder / "ramp.csv")
+    write(folder / twin)
+    message = refusal(folder)
+    assert twin in message and "two trials of one name; remove one, or rename" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("titel = 'x'", "takes title, model, columns, trials, got 'titel' (did you mean 'title'?)"),
+        ("title = 3", 'title in dataset.toml must be a text, title = "...", got 3'),
+        ("title 3", "dataset.toml is not valid TOML: .*line 1"),
+        ("columns = 3", "columns in dataset.toml must be a table, [columns], got 3"),
+        ("model = 'rig.toml'", "there is no file .*rig.toml; a path counts from the data set's"),
+        ("[trials.'ram.csv']", "names no file of the data set (did you mean 'ramp.csv'?)"),
+        ("[trials.'ramp.csv']\nodrer = 1", "got 'odrer' (did you mean 'order'?)"),
+        ("[trials.'ramp.csv']\norder = 'a'", "must be a number, the larger the later"),
+        (
+            "[trials.'ramp.csv']\nrepeat_of = 'ramp'",
+            "'ramp', which names no trial; write the file's whole",
+        ),
+        ("[trials.'ramp.csv']\nrepeat_of = 'ramp.csv'", "which is itself a repeat"),
+        ("[columns]\n'U' = 'motor_volt'", "dataset.toml: [columns] 'U' must name one of"),
+        ("[columns]\n'U' = { name = 'load_n', factor = 0 }", "'U' factor must not be 0"),
+    ],
+)
+def test_a_description_that_cannot_be_used_is_refused(folder, text, message):
+    write(folder / "ramp.csv")
+    describe(folder, text)
+    pattern = re.escape(message).replace(r"\.\*", ".*")
+    assert re.search(pattern, refusal(folder))
+
+
+def test_a_description_under_another_name_is_refused(folder):
+    write(folder / "ramp.csv")
+    (folder / "Dataset.toml").write_text("")
+    if not (folder / "dataset.toml").exists():
+        assert "must be called dataset.toml" in refusal(folder)
+
+
+def only_contraction(name):
+    """A file whose one measurement goes by another name."""
+    gone = dict.fromkeys(("rotation_deg", "load_n", "pressure_kpa", "contraction_mm"))
+    return gone | {name: columns()["contraction_mm"]}
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("Contraction_mm", '"Contraction_mm" = "contraction_mm"'),
+        ("contraction (m)", '"contraction (m)" = { name = "contraction_mm", factor = 1000 }'),
+        ("displacement", '"displacement" = "contraction_mm"'),
+        ("PressureBar", '"PressureBar" = { name = "pressure_kpa", factor = 100 }'),
+    ],
+)
+def test_a_look_alike_of_the_only_measurement_is_refused(folder, name, line):
+    write(folder / "ramp.csv", **only_contraction(name))
+    message = refusal(folder)
+    assert "ramp.csv has no measurement" in message
+    assert "looks like" in message and message.endswith(line)
+
+
+def test_a_look_alike_beside_measurements_is_warned_of_once(folder):
+    for name in ("a.csv", "b.csv"):
+        write(folder / name, load_n=None, Load_kN=columns()["load_n"] / 1e3, Temp="21")
+    with pytest.warns(TrialWarning) as caught:
+        read_dataset(folder)
+    (message,) = (str(warning.message) for warning in caught)
+    assert message.startswith(
+        "all files: unknown columns are ignored: 'Load_kN', 'Temp'; 'Load_kN'"
+    )
+    assert message.endswith('"Load_kN" = { name = "load_n", factor = 1000 }')
+
+
+def test_a_proposed_experiment_is_no_trial(folder):
+    write(folder / "a.csv")
+    write(folder / "next.csv")
+    with pytest.warns(TrialWarning, match="next.csv is passed over"):
+        assert len(read_dataset(folder)) == 1
+
+
+NORMAL = columns()
+SLIPS = {
+    "contraction_mm": [
+        (1e-3, "metres, or its sensor was not connected", "factor = 1000"),
+        (1e3, "micrometres", "factor = 0.001"),
+        (1e5, "raw counts", "give .columns. of dataset.toml a factor"),
+    ],
+    "pressure_kpa": [
+        (1e-2, "bar", "factor = 100"),
+        (1e3, "pascals", "factor = 0.001"),
+        (1 / 6.894757, "psi", "factor = 6.894757"),
+    ],
+    "pressure_command_kpa": [(1e-2, "bar", "factor = 100")],
+    "load_n": [(1e-3, "kilonewtons", "factor = 1000"), (1e3, "millinewtons", "factor = 0.001")],
+    "rotation_deg": [(np.pi / 180, "radians", "factor = 57.29578"), (1 / 360, "turns", "360")],
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "unit", "mend"),
+    [(name, *slip) for name, slips in SLIPS.items() for slip in slips],
+)
+def test_a_unit_slip_is_refused_with_its_mend(folder, name, factor, unit, mend):
+    write(folder / "ramp.csv", **{name: factor * NORMAL[name]})
+    message = refusal(folder)
+    assert message.startswith(name) and re.search(r"\(row \d+ of ramp.csv\)", message)
+    assert f"it looks like {unit}" in message and re.search(mend, message)
+    if "write under" in message:
+        describe(folder, "[columns]\n" + message.partition("dataset.toml: ")[2])
+        assert len(read_dataset(folder)) == 1
+
+
+def test_a_slip_in_a_mapped_column_names_the_labs_own(folder):
+    write(folder / "ramp.csv", contraction_mm=None, Weg=1e-3 * NORMAL["contraction_mm"])
+    describe(folder, "[columns]\n'Weg' = 'contraction_mm'")
+    assert "multiply factor and offset of 'Weg' in [columns] by 1000" in refusal(folder)
+
+
+def test_pressures_that_are_both_in_bar_are_refused(folder):
+    both = ("pressure_kpa", "pressure_command_kpa")
+    write(folder / "ramp.csv", **{name: NORMAL[name] / 100 for name in both})
+    assert "pressure_kpa reaches 3.05 kPa and no more, and so does its command" in refusal(folder)
+
+
+@pytest.mark.parametrize("name", ["contraction_mm", "rotation_deg", "load_n", "pressure_kpa"])
+def test_a_sensor_that_says_nothing_is_refused(folder, name):
+    write(folder / "ramp.csv", **{name: np.full(ROWS, 25.0)})
+    message = refusal(folder)
+    assert f"{name} of ramp.csv is 25 in all 60 readings although" in message
+    assert message.endswith("if the sensor was not connected, remove the column")
+
+
+def test_what_may_rightly_stand_still_is_read(folder):
+    """A hold: commands do not move, so nothing needs to."""
+    still = {name: np.full(ROWS, NORMAL[name][0]) for name in NORMAL if name != "time_s"}
+    write(folder / "hold.csv", **still)
+    slack = {"motor_voltage_v": 0.0 * NORMAL["time_s"], "rotation_deg": 0.0 * NORMAL["time_s"]}
+    write(folder / "slack.csv", **slack, load_n=None)
+    assert len(read_dataset(folder)) == 2
+
+
+def test_gaps_are_read_and_long_ones_are_warned_of(folder):
+    gap = np.where(np.arange(ROWS) < 40, np.nan, NORMAL["load_n"])
+    short = np.where(np.arange(ROWS) < 20, np.nan, NORMAL["contraction_mm"])
+    write(folder / "a.csv", load_n=gap, contraction_mm=short, rotation_deg="")
+    with pytest.warns(TrialWarning) as caught:
+        dataset = read_dataset(folder)
+    said = [str(warning.message) for warning in caught]
+    assert said == [
+        "a.csv: rotation_deg is empty in every row; it counts as not measured",
+        "a.csv: load_n is empty in 40 of 60 rows, the longest gap from row 2 to row 41; there it "
+        "counts as not measured",
+    ]
+    assert np.isnan(dataset.trials[0].trial.measurements["load"]).sum() == 40
+
+
+def test_a_broken_file_is_named(folder):
+    write(folder / "a.csv")
+    write(folder / "b.csv", time_s=-NORMAL["time_s"])
+    assert "time_s must increase strictly, row 3 of b.csv" in refusal(folder)
+    write(folder / "b.csv", load_n="n/a")
+    assert "load_n must hold numbers, row 2 of b.csv has 'n/a'; leave the cell" in refusal(folder)
