@@ -96,10 +96,10 @@ def fit(
         return Residuals(model, some, free, tolerance, joined, threads)
 
     few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
-    rough = None if few is None else _Search(few, central, ROUGH)
+    rough = None if few is None else Search(few, central, ROUGH)
     if rough is not None:
         rough.run(progress)
-    search = _Search(residuals(trials), central, 1.0, rough)
+    search = Search(residuals(trials), central, 1.0, rough)
     return search.result(search.run(progress))
 
 
@@ -108,7 +108,7 @@ def _some(trials: Sequence[Trial]) -> list[Trial]:
     return [trials[i] for i in sorted(chosen)]
 
 
-class _Search:
+class Search:
     """Parameters on their way to the best.
 
     Args:
@@ -127,7 +127,7 @@ class _Search:
     """
 
     def __init__(
-        self, residuals: Residuals, central: bool, rough: float, before: "_Search | None" = None
+        self, residuals: Residuals, central: bool, rough: float, before: "Search | None" = None
     ) -> None:
         self.residuals, self.central, self.rough = residuals, central, rough
         self.lower, self.upper = residuals.lower, residuals.upper

@@ -6,7 +6,7 @@ rows is ever held.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import repeat
@@ -116,6 +116,7 @@ class Residuals:
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
         self._buffer = np.empty(0)
+        self._own: list[tuple[int, Array]] = []
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums at parameters, with the Jacobian by finite differences.
@@ -173,13 +174,12 @@ class Residuals:
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self._factors[column]
-        tables = [table(self.plant.program, vector) for vector in vectors]
+        every = self._every(vectors)
         count, number = len(tried), len(self.plant.states)
+        tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
-        states, zeros = settle.all_at_rest(
-            self.plant, commands[0], commands[1], np.tile(vectors, (len(self._trials), 1))
-        )
+        states, zeros = settle.all_at_rest(self.plant, commands[0], commands[1], every)
         found: list[Array] = []
         self._settled = bool(np.isfinite(zeros).all() and np.isfinite(states).all())
         if not self._settled:
@@ -193,13 +193,33 @@ class Residuals:
                     logged = self._trials[i]
                     columns = (logged.time, logged.motor, logged.regulator, self.joined)
                     runs += [
-                        Run(*columns, tables[k], states[i, k], zeros[i, k], FIRST_S, space[k])
+                        Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
                         for k in range(count)
                     ]
                 simulate_all(self.plant.program, runs, self.threads)
                 logs = [self._trials[i] for i in block]
                 found += pool.map(work, logs, spaces, zeros[block], repeat(vectors))
         return found
+
+    def _every(self, vectors: Array) -> Array:
+        """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
+        every = np.tile(vectors, (len(self._trials), 1))
+        for place, values in self._own:
+            every[:, place] = np.repeat(values, len(vectors))
+        return every
+
+    def _tables(self, every: Array, count: int) -> list[list[Array]]:
+        """Tables of every trial; the same ones where trials have no parameters of their own."""
+        program = self.plant.program
+        if not self._own:
+            return [[table(program, vector) for vector in every[:count]]] * len(self._trials)
+        parts = np.split(every, len(self._trials))
+        return [[table(program, vector) for vector in part] for part in parts]
+
+    def _places(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
+        """Where values (SI) go that a parameter has in each trial, by its path."""
+        found = _free(self.plant.model, list(own))
+        return [(each.place, np.asarray(own[each.path], float)) for each in found]
 
     def _blocks(self, bytes_a_row: int) -> list[list[int]]:
         """Trials that fit into memory together."""

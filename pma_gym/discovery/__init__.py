@@ -1,0 +1,1 @@
+"""Finding the missing physics: one module a step."""

@@ -1,0 +1,372 @@
+"""What a diagnosis says: verdict, where, which effects, how large, what gap they close."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.plant.model import Model
+
+SCHEMA = 1
+"""Version of `diagnosis.json`."""
+
+Array = NDArray[np.float64]
+
+Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
+"""`effect`: the catalogue has what is missing. `parameters`: known parameters were off. `agrees`:
+nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
+`undecidable`: these data cannot tell."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter's value with its 95 % interval, in its unit at the door.
+
+    Attributes:
+        value: the value.
+        low: lower end of the interval; None where the data do not bound it.
+        high: upper end.
+        unit: the unit.
+    """
+
+    value: float
+    low: float | None
+    high: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter of the model that the data ask to change.
+
+    Attributes:
+        start: its value in the model that was given.
+        now: its estimate, together with whatever effects were added.
+        significant: whether its interval leaves the value that it had.
+    """
+
+    start: float
+    now: Estimate
+    significant: bool
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where simulation and data disagree, before anything was refitted but parameters.
+
+    Attributes:
+        signal: name of the measurement at the door, `contraction_mm`.
+        region: where, in words.
+        share_of_gap: share of the signal's unexplained mean square that lies there.
+        p_value: of so much there by chance, adjusted for all regions that were looked at.
+    """
+
+    signal: str
+    region: str
+    share_of_gap: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that the diagnosis adds to the model.
+
+    Attributes:
+        name: its name in the catalogue.
+        confused_with: other candidates that explain these data as well.
+        p_value: family-wise over the whole catalogue.
+        parameters: estimates by name at the door.
+    """
+
+    name: str
+    confused_with: tuple[str, ...]
+    p_value: float
+    parameters: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far simulation and measurement of one signal lie apart (root mean square, at the door).
+
+    Attributes:
+        before: the model as it was given.
+        parameters: its parameters refitted, nothing added.
+        after: the amended model.
+        floor: the noise of the measurement.
+        held_out: whether `after` comes from fits that had not seen the trial.
+    """
+
+    before: float
+    parameters: float
+    after: float
+    floor: float
+    held_out: bool
+
+    @property
+    def closed(self) -> float | None:
+        """(before - after) / (before - floor), at most 1; None where there was no gap."""
+        gap = self.before - self.floor
+        if gap <= 0.02 * self.floor or self.before == 0.0:
+            return None
+        return min(1.0, (self.before - self.after) / gap)
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """How one effect of the catalogue fared.
+
+    Attributes:
+        name: its name.
+        delta_log_likelihood: gain in whitened log-likelihood over the refitted model.
+        held_out_gain: the same on trials that it was not fitted to, per reading of theirs; None
+            where it was not tried.
+        p_value: family-wise, of so large a gain by chance.
+        change: rms of what it changes in the signals beyond what parameters could, over noise.
+        resolvable: smallest size that these data would have shown, as a share of its usual one;
+            None where no size would show.
+        fitted: whether it was fitted, or only screened.
+        why: in words, why it was kept or dropped.
+    """
+
+    name: str
+    delta_log_likelihood: float
+    held_out_gain: float | None
+    p_value: float
+    change: float
+    resolvable: float | None
+    fitted: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class NextExperiment:
+    """What to measure next.
+
+    Attributes:
+        protocol: its name and settings in words.
+        separates: candidates that it tells apart.
+        expected_odds: likelihood ratio to expect between the two that are hardest to tell.
+        minutes: how long it takes.
+        trial: its commands.
+    """
+
+    protocol: str
+    separates: tuple[str, ...]
+    expected_odds: float
+    minutes: float
+    trial: Trial
+
+
+@dataclass(frozen=True)
+class ResidualLaw:
+    """What a flexible law finds missing where no effect of the catalogue fits.
+
+    Attributes:
+        quantity: what is missing, `force on the slide (N)`.
+        variable: what it depends on, with unit, `contraction (mm)`.
+        at: values of the variable, shape (n,).
+        law: the law there, shape (n,).
+        low: lower end of its 95 % band.
+        high: upper end.
+        words: its shape in words.
+    """
+
+    quantity: str
+    variable: str
+    at: Array
+    law: Array
+    low: Array
+    high: Array
+    words: str
+
+
+@dataclass(frozen=True)
+class TrialRecord:
+    """One trial's curves, for the report; SI, shape (rows, 4) in the order of outputs, NaN = gap.
+
+    Attributes:
+        name: the trial's file, or its number.
+        time: (s), shape (rows,).
+        measured: readings.
+        before: simulated by the model as it was given.
+        parameters: by the model with its parameters refitted.
+        after: by the amended model; from a fit that had not seen the trial where `held_out`.
+        gaps: by signal at the door.
+        held_out: see `after`.
+    """
+
+    name: str
+    time: Array
+    measured: Array
+    before: Array
+    parameters: Array
+    after: Array
+    gaps: Mapping[str, Gap]
+    held_out: bool
+
+
+@dataclass(frozen=True)
+class Map:
+    """A signal's residual over two conditions, for the report.
+
+    Attributes:
+        signal: at the door.
+        x_name: what runs along x, with unit.
+        y_name: along y.
+        x_edges: shape (n + 1,).
+        y_edges: shape (m + 1,).
+        residual: mean residual after the parameters were refitted, over the noise, shape (m, n);
+            NaN where there are no data.
+    """
+
+    signal: str
+    x_name: str
+    y_name: str
+    x_edges: Array
+    y_edges: Array
+    residual: Array
+
+
+@dataclass(frozen=True)
+class Floor:
+    """The noise of one signal and where it is known from.
+
+    Attributes:
+        value: standard deviation at the door.
+        source: `repeats`, `rest segments`, `autoregression` or `the model's sensor`.
+        by_source: what each source that there was says.
+        step: smallest step between readings (quantisation), at the door; 0 if none shows.
+        memory: coefficients of the autoregression that whitens it.
+    """
+
+    value: float
+    source: str
+    by_source: Mapping[str, float]
+    step: float
+    memory: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The answer, with all its evidence.
+
+    Attributes:
+        verdict: see `Verdict`.
+        sentence: the verdict as a person would say it.
+        where: where they disagree, the largest share first.
+        effects: what is missing; empty unless the verdict is `effect`.
+        parameters: the model's own parameters that moved, by path.
+        gap: by signal at the door, over all trials.
+        candidates: the whole catalogue, the likeliest first.
+        next_experiment: what to measure next, where that would tell more.
+        model: the amended model.
+        given: the model as it was given.
+        not_identifiable: paths of parameters that these data do not determine, with the reason.
+        blind: effects that would not have shown in these data even at their usual size.
+        law: the residual law, where the verdict is `unknown` or there is more to see.
+        floors: noise by signal at the door.
+        trials: curves of each trial.
+        maps: residuals over conditions.
+        steps: what was done, in order, a sentence each, with its figures.
+        seconds: how long each step took, by its name; not written to the JSON.
+        warnings: what the reader must know first.
+    """
+
+    verdict: Verdict
+    sentence: str
+    where: tuple[Place, ...]
+    effects: tuple[NamedEffect, ...]
+    parameters: Mapping[str, Moved]
+    gap: Mapping[str, Gap]
+    candidates: tuple[Candidate, ...]
+    next_experiment: NextExperiment | None
+    model: Model
+    given: Model
+    not_identifiable: Mapping[str, str] = field(default_factory=dict)
+    blind: tuple[str, ...] = ()
+    law: ResidualLaw | None = None
+    floors: Mapping[str, Floor] = field(default_factory=dict)
+    trials: tuple[TrialRecord, ...] = ()
+    maps: tuple[Map, ...] = ()
+    steps: tuple[str, ...] = ()
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+    def document(self) -> dict[str, Any]:
+        """The content of `diagnosis.json`."""
+        following = self.next_experiment
+        return {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "sentence": self.sentence,
+            "where": [vars(place) for place in self.where],
+            "effects": [
+                {
+                    "name": effect.name,
+                    "confused_with": list(effect.confused_with),
+                    "p_value": effect.p_value,
+                    "parameters": {
+                        name: vars(estimate) for name, estimate in effect.parameters.items()
+                    },
+                }
+                for effect in self.effects
+            ],
+            "parameters": {
+                path: {
+                    "from": moved.start,
+                    "to": moved.now.value,
+                    "low": moved.now.low,
+                    "high": moved.now.high,
+                    "unit": moved.now.unit,
+                    "significant": moved.significant,
+                }
+                for path, moved in self.parameters.items()
+            },
+            "gap": {
+                signal: {**vars(gap), "closed": gap.closed} for signal, gap in self.gap.items()
+            },
+            "candidates": [vars(candidate) for candidate in self.candidates],
+            "next_experiment": following
+            and {
+                "protocol": following.protocol,
+                "separates": list(following.separates),
+                "expected_odds": following.expected_odds,
+                "minutes": following.minutes,
+                "file": "next.csv",
+            },
+            "not_identifiable": dict(self.not_identifiable),
+            "blind": list(self.blind),
+            "law": self.law
+            and {
+                "quantity": self.law.quantity,
+                "variable": self.law.variable,
+                "at": self.law.at.tolist(),
+                "law": self.law.law.tolist(),
+                "low": self.law.low.tolist(),
+                "high": self.law.high.tolist(),
+                "words": self.law.words,
+            },
+            "floors": {
+                signal: {
+                    "value": floor.value,
+                    "source": floor.source,
+                    "by_source": dict(floor.by_source),
+                    "step": floor.step,
+                    "memory": list(floor.memory),
+                }
+                for signal, floor in self.floors.items()
+            },
+            "warnings": list(self.warnings),
+        }
+
+    def text(self) -> str:
+        """`document` as JSON; the same diagnosis gives the same bytes.
+
+        Raises:
+            ValueError: a number that is not finite, which JSON does not know.
+        """
+        return json.dumps(self.document(), indent=1, allow_nan=False) + "\n"

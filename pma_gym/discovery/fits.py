@@ -1,0 +1,145 @@
+"""Fits of a model, alone or with suspects in it, to whitened trials."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.evidence import Evidence
+from pma_gym.discovery.noise import Whitening
+from pma_gym.discovery.parameters import Own, values
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.plant.fitting import Search
+from pma_gym.plant.least_squares import inverse
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model fitted to trials.
+
+    Attributes:
+        model: the model with its parameters.
+        names: the suspects in it.
+        paths: its free parameters.
+        values: their values at the door, shape (p,).
+        covariance: theirs, from the whitened readings and the prior, shape (p, p).
+        chi_square: of the whitened readings, with what the prior adds.
+        steps: moves of the parameters that their derivatives were taken with.
+        converged: whether a further step would gain nothing worth while.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    paths: tuple[str, ...]
+    values: Array
+    covariance: Array
+    chi_square: float
+    steps: Array
+    converged: bool
+
+    def estimate(self, path: str) -> tuple[float, float]:
+        """A parameter's value and its standard error, at the door."""
+        at = self.paths.index(path)
+        return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What all fits share.
+
+    Attributes:
+        trials: the trials.
+        given: the model as it was given.
+        own: its own parameters and what they may be off by.
+        noise: whitening of each output.
+        threads: how many threads simulate.
+    """
+
+    trials: Sequence[Trial]
+    given: Model
+    own: Own
+    noise: tuple[Whitening, ...]
+    threads: int = 1
+
+    def evidence(
+        self, model: Model, extra: Sequence[Suspect] = (), trials: Sequence[int] | None = None
+    ) -> Evidence:
+        """Trials beside a model with suspects in it; its own parameters and theirs are free."""
+        paths, own = list(self.own.free), {}
+        for suspect in extra:
+            paths += [
+                path for path, free in zip(suspect.paths, suspect.fitted, strict=True) if free
+            ]
+            own |= suspect.own
+        prior = np.full(len(paths), np.inf)
+        prior[: len(self.own.prior)] = self.own.prior
+        chosen = range(len(self.trials)) if trials is None else trials
+        centre = values(model, paths)
+        centre[: len(self.own.free)] = values(self.given, self.own.free)
+        return Evidence(
+            model,
+            [self.trials[i] for i in chosen],
+            paths,
+            self.noise,
+            prior,
+            centre,
+            {path: [each[i] for i in chosen] for path, each in own.items()},
+            threads=self.threads,
+        )
+
+    def probed(self, model: Model, suspect: Suspect) -> Evidence:
+        """Trials beside a model with one suspect in it, all of whose parameters are free."""
+        return Evidence(
+            suspect.beside(model),
+            self.trials,
+            suspect.paths,
+            self.noise,
+            np.full(len(suspect.paths), np.inf),
+            own=suspect.own,
+            threads=self.threads,
+        )
+
+    def fit(
+        self,
+        model: Model,
+        extra: Sequence[Suspect] = (),
+        starts: Mapping[str, Array] | None = None,
+        trials: Sequence[int] | None = None,
+    ) -> Fitted | None:
+        """Fit a model with suspects in it.
+
+        Args:
+            model: where its own parameters begin.
+            extra: the suspects.
+            starts: values of all their `paths`, by name; where they are in the model if not given.
+            trials: which trials; all if not given.
+        Returns:
+            The fit, or None where the model cannot be simulated.
+        """
+        for suspect in extra:
+            model = suspect.beside(model)
+            if starts is not None and suspect.name in starts:
+                begun = dict(zip(suspect.paths, map(float, starts[suspect.name]), strict=True))
+                model = model.replace(begun)
+        evidence = self.evidence(model, extra, trials)
+        try:
+            search = Search(evidence, False, 1.0)
+        except ValueError:
+            return None
+        converged = search.run(None)
+        found = dict(zip(search.named(search.values), search.values, strict=True))
+        return Fitted(
+            model.replace({path: float(value) for path, value in found.items()}),
+            tuple(suspect.name for suspect in extra),
+            tuple(found),
+            search.values,
+            inverse(search.best.curvature),
+            search.best.chi_square,
+            search.moves,
+            converged,
+        )

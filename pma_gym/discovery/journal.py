@@ -1,0 +1,69 @@
+"""What an interrupted diagnosis leaves: every finished fit, so that it can go on."""
+
+import hashlib
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pma_gym.data.trial import Trial
+from pma_gym.files import replace_file
+from pma_gym.plant.model import Model, dump_model
+
+
+class Journal:
+    """Finished fits by name, in a folder; or nothing at all.
+
+    A fit is found again only for the same trials, model and question: its key holds their digest.
+
+    Args:
+        folder: where they are kept; made when the first one is; None keeps nothing.
+        trials, model, question: what is asked.
+    """
+
+    def __init__(
+        self, folder: Path | None, trials: Sequence[Trial], model: Model, question: str
+    ) -> None:
+        self._folder = folder
+        self._digest = "" if folder is None else digest(trials, model, question)
+
+    def found(self, name: str) -> dict[str, Any] | None:
+        """What was kept by a name, or None."""
+        path = self._path(name)
+        if path is None or not path.is_file():
+            return None
+        try:
+            entry = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return entry if isinstance(entry, dict) else None
+
+    def keep(self, name: str, entry: dict[str, Any]) -> None:
+        """Keep an entry; its file is there whole or not at all."""
+        path = self._path(name)
+        if path is not None:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            replace_file(path, json.dumps(entry).encode())
+
+    def _path(self, name: str) -> Path | None:
+        if self._folder is None:
+            return None
+        key = hashlib.sha256(f"{self._digest} {name}".encode()).hexdigest()[:24]
+        return self._folder / f"{key}.json"
+
+
+def digest(trials: Sequence[Trial], model: Model, question: str) -> str:
+    """What trials, a model and a question are, in a few characters."""
+    found = hashlib.sha256(question.encode())
+    found.update(dump_model(model).encode())
+    for trial in trials:
+        for name, values in (
+            ("time", trial.time),
+            *sorted(trial.commands.items()),
+            *sorted(trial.measurements.items()),
+        ):
+            found.update(name.encode())
+            found.update(np.ascontiguousarray(values, float).tobytes())
+    return found.hexdigest()

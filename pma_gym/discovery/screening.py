@@ -1,0 +1,228 @@
+"""Screening: how much each suspect could explain, from one look at each of its probes.
+
+What a probe changes in the signals is made white, and what the model's own parameters could do of
+it is projected out. The rest, times a free factor, is set against the residual. Chance is simulated
+by turning the signs of pieces of a second of the residual, for the whole catalogue at once, so the
+p-value holds for the largest of all.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.evidence import Evidence
+from pma_gym.discovery.suspects import Suspect
+
+Array = NDArray[np.float64]
+
+RESAMPLES = 1999
+"""Simulated residuals for p-values."""
+
+SHOWN_GAIN = 25.0
+"""Chi-square that an effect must gain to be seen for certain: five standard deviations."""
+
+FACTORS = (0.1, 8.0)
+"""By what a probe may be multiplied to start a fit from."""
+
+LEAST_PART = 1e-6
+"""Share of a probe's change that parameters must leave, or it is one of theirs."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the best probe of a suspect could explain.
+
+    Attributes:
+        suspect: the suspect.
+        gain: fall of chi-square.
+        p_value: family-wise.
+        probe: which probe it is; -1 where none changes anything.
+        factor: by which it explains most.
+        change: rms of what it then changes beyond what parameters could, over the noise, in the
+            signal where that is most.
+        resolvable: factor on the usual size from which on it would be seen; None if it never is.
+        starts: probes and factors to begin fits from, the best first.
+    """
+
+    suspect: Suspect
+    gain: float
+    p_value: float
+    probe: int
+    factor: float
+    change: float
+    resolvable: float | None
+    starts: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The refitted model that suspects are tried beside.
+
+    Attributes:
+        evidence: the trials beside it.
+        values: its parameters at the door.
+        columns: whitened residual and derivatives of each trial, shape (1 + p, 4, rows).
+        inverse: of the curvature with the prior, shape (p, p).
+    """
+
+    evidence: Evidence
+    values: Array
+    columns: list[Array]
+    inverse: Array
+
+    @classmethod
+    def at(cls, evidence: Evidence, values: Array, steps: Array) -> "Baseline":
+        """At parameters, whose derivatives take such steps.
+
+        Raises:
+            ValueError: the model cannot be simulated there.
+        """
+        columns = evidence.columns(np.concatenate([values[None], values + np.diag(steps)]))
+        if columns is None:
+            raise ValueError("the refitted model cannot be simulated")
+        for part in columns:
+            part[1:] /= steps[:, None, None].astype(np.float32)
+        total = evidence.products(columns).total()
+        curvature = total[1:, 1:] + np.diag(evidence.prior**-2.0)
+        scale = 1.0 / np.sqrt(np.diag(curvature))
+        inner = np.linalg.pinv(curvature * np.outer(scale, scale), hermitian=True)
+        return cls(evidence, values, columns, inner * np.outer(scale, scale))
+
+
+def look(
+    baseline: Baseline,
+    suspects: Sequence[Suspect],
+    seed: int,
+    evidence_of: Callable[[Suspect], Evidence],
+    progress: Callable[[int], None] | None = None,
+) -> list[Look]:
+    """Look at every suspect.
+
+    Args:
+        baseline: the refitted model.
+        suspects: the suspects.
+        seed: of the simulated residuals.
+        evidence_of: the trials beside the refitted model with a suspect in it, whose parameters
+            are free.
+        progress: called with the number of suspects that are done.
+    """
+    size = len(baseline.columns[0])
+    found = []
+    for number, suspect in enumerate(suspects):
+        found.append(_probe(baseline, evidence_of(suspect), suspect, size))
+        if progress is not None:
+            progress(number + 1)
+    return _judged(found, suspects, seed)
+
+
+@dataclass(frozen=True)
+class _Probed:
+    """Scores of a suspect's probes, by pieces: slopes g (n, pieces), strengths h (n,), changes."""
+
+    slopes: Array
+    strengths: Array
+    changes: Array
+
+
+def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed | None:
+    tried = np.concatenate([suspect.absent[None], suspect.probes])
+    columns = evidence.columns(tried)
+    if columns is None:
+        columns = _one_by_one(evidence, tried)
+    joined = [
+        np.concatenate([ours, theirs[1:]])
+        for ours, theirs in zip(baseline.columns, columns, strict=True)
+    ]
+    pieces = baseline.evidence.products(joined)
+    total = pieces.total()
+    across = total[1:size, size:]
+    weights = baseline.inverse @ across
+    strengths = np.diag(total)[size:] - np.sum(across * weights, axis=0)
+    whole = np.diag(total)[size:]
+    strengths = np.where(strengths > LEAST_PART * np.maximum(whole, 1e-12), strengths, 0.0)
+    slopes = pieces.products[:, size:, 0] - pieces.products[:, 1:size, 0] @ weights
+    return _Probed(slopes.T, strengths, _changes(baseline, joined, weights, size))
+
+
+def _one_by_one(evidence: Evidence, tried: Array) -> list[Array]:
+    """As `Evidence.columns`; a probe that cannot be simulated changes nothing."""
+    rows = [evidence.columns(np.stack([tried[0], row])) for row in tried[1:]]
+    first = evidence.columns(tried[:1])
+    if first is None:
+        raise ValueError(f"model {evidence.plant.model.name} cannot be simulated")
+    return [
+        np.concatenate(
+            [part, *(np.zeros_like(part) if row is None else row[i][1:] for row in rows)]
+        )
+        for i, part in enumerate(first)
+    ]
+
+
+def _changes(baseline: Baseline, columns: Sequence[Array], weights: Array, size: int) -> Array:
+    """Rms of what each probe changes beyond parameters, over the noise, where that is most."""
+    squares = np.zeros((weights.shape[1], 4))
+    counts = np.zeros(4)
+    for logged, part in zip(baseline.evidence.logged, columns, strict=True):
+        rest = part[size:] - np.tensordot(weights.T.astype(np.float32), part[1:size], axes=1)
+        squares += np.sum(rest**2, axis=2)
+        counts += [len(logged.time) * measured for measured in logged.measures]
+    return np.sqrt(np.max(squares / np.maximum(counts, 1.0), axis=1))
+
+
+def _judged(found: Sequence[_Probed | None], suspects: Sequence[Suspect], seed: int) -> list[Look]:
+    generator = np.random.Generator(np.random.Philox(seed))
+    pieces = next(each.slopes.shape[1] for each in found if each is not None)
+    flips = generator.choice([-1.0, 1.0], size=(RESAMPLES, pieces))
+    largest = np.zeros(RESAMPLES)
+    for each, suspect in zip(found, suspects, strict=True):
+        if each is not None:
+            drawn = _gains(flips @ each.slopes.T, each.strengths, suspect.signs)
+            largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
+    looks = []
+    for each, suspect in zip(found, suspects, strict=True):
+        if each is None or not each.strengths.any():
+            looks.append(Look(suspect, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
+            continue
+        sums = each.slopes.sum(axis=1)
+        gains = _gains(sums[None], each.strengths, suspect.signs)[0]
+        best = int(np.argmax(gains))
+        p_value = (1.0 + np.sum(largest >= gains[best])) / (RESAMPLES + 1.0)
+        factors = np.divide(
+            -sums, each.strengths, out=np.zeros_like(sums), where=each.strengths > 0
+        )
+        usual = int(np.argmax(each.strengths))
+        looks.append(
+            Look(
+                suspect,
+                float(gains[best]),
+                float(p_value),
+                best,
+                float(factors[best]),
+                float(abs(factors[best]) * each.changes[best]),
+                float(np.sqrt(SHOWN_GAIN / each.strengths[usual])),
+                _starts(gains, factors),
+            )
+        )
+    return looks
+
+
+def _gains(slopes: Array, strengths: Array, signs: NDArray[np.bool_]) -> Array:
+    """Fall of chi-square by each probe's best factor, which is positive unless signs say so."""
+    allowed = np.where((slopes < 0.0) | signs, slopes, 0.0)
+    return np.divide(allowed**2, strengths, out=np.zeros_like(allowed), where=strengths > 0.0)
+
+
+def _starts(gains: Array, factors: Array) -> tuple[tuple[int, float], ...]:
+    """The best probe, and another that explains nearly as much and is not next to it."""
+    order = np.argsort(-gains, kind="stable")
+    best = [int(order[0])]
+    for other in order[1:]:
+        if gains[other] > 0.5 * gains[best[0]] and abs(int(other) - best[0]) > 1:
+            best.append(int(other))
+            break
+    low, high = FACTORS
+    return tuple(
+        (k, float(np.copysign(np.clip(abs(factors[k]), low, high), factors[k]))) for k in best
+    )

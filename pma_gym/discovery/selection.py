@@ -1,0 +1,321 @@
+"""Selection: which suspects are added to the model, one after the other.
+
+The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
+two hundred data sets. What passes is fitted together with the model's parameters; the likeliest is
+taken; the noise is learnt anew from what it leaves; then the same again beside it. In the end each
+effect is left out once: one that is not missed goes.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.journal import Journal
+from pma_gym.discovery.noise import Whitening, autoregression
+from pma_gym.discovery.screening import Baseline, Look, look
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import OUTPUTS
+
+Array = NDArray[np.float64]
+
+ALARM = 0.005
+"""Family-wise rate of false alarms that the gate lets through."""
+
+LEAST_CHANGE = 0.15
+"""Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
+most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
+
+SECOND_SHARE = 0.08
+"""Least share of the first effect's gain that another must bring: what a law of the catalogue
+misses of its real likeness is of that order."""
+
+MOST_EFFECTS = 3
+"""Most effects that are added."""
+
+TRIED, NEAR = 8, 0.05
+"""How many suspects are fitted at most, and the share of the best look's gain that one needs."""
+
+COST = 3.0
+"""Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One round of the selection.
+
+    Attributes:
+        bench: with the noise of this round.
+        before: the model that suspects were tried beside.
+        baseline: the same, ready to be looked beside.
+        looks: at every suspect.
+        fits: of those that were fitted, by name, each together with what was there before.
+        gate: the looks that passed.
+    """
+
+    bench: Bench
+    before: Fitted
+    baseline: Baseline
+    looks: tuple[Look, ...]
+    fits: dict[str, Fitted]
+    gate: tuple[Look, ...]
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was selected.
+
+    Attributes:
+        stages: the rounds.
+        chosen: the suspects in the model, in the order in which they came.
+        fit: the model with them.
+        bench: with the noise that it leaves.
+    """
+
+    stages: tuple[Stage, ...]
+    chosen: tuple[Suspect, ...]
+    fit: Fitted
+    bench: Bench
+
+
+def select(
+    bench: Bench,
+    refitted: Fitted,
+    suspects: Sequence[Suspect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Selection:
+    """Select suspects.
+
+    Args:
+        bench: the trials.
+        refitted: the model with its own parameters refitted.
+        suspects: the whole catalogue.
+        seed: of simulated residuals.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    chosen: tuple[Suspect, ...] = ()
+    stages: list[Stage] = []
+    best = refitted
+    while len(chosen) < MOST_EFFECTS:
+        rest = [suspect for suspect in suspects if suspect not in chosen]
+        stage = _stage(bench, best, chosen, rest, seed, journal, progress)
+        stages.append(stage)
+        added = _likeliest(stage, stages[0])
+        if added is None:
+            break
+        chosen = (*chosen, next(s for s in suspects if s.name == added))
+        bench = replace(bench, noise=relearnt(bench, stage.fits[added], chosen))
+        best = _refit(bench, stage.fits[added], chosen, journal)
+        if len(chosen) > 1:
+            chosen, best = _without_idle(bench, best, chosen, refitted, journal)
+            if len(chosen) < len(stages):
+                # One was replaced by another: what it leaves is looked at once more, no further.
+                break
+    return Selection(tuple(stages), chosen, best, bench)
+
+
+def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:
+    """Whitening of what a fit leaves, never of less than is seen at rest."""
+    evidence = bench.evidence(fit.model, chosen)
+    left = residuals(evidence, fit)
+    found = []
+    for channel, before in enumerate(bench.noise):
+        parts = [part[channel] for part in left]
+        known = [part for part in parts if np.isfinite(part).any()]
+        found.append(autoregression(known, before.level) if known else before)
+    return tuple(found)
+
+
+def residuals(evidence, fit: Fitted) -> list[Array]:  # noqa: ANN001
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    readings = evidence.readings(fit.values)
+    assert readings is not None
+    return left_over(evidence, readings)
+
+
+def left_over(evidence, readings: Sequence[Array]) -> list[Array]:  # noqa: ANN001
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    found = []
+    for logged, held in zip(evidence.logged, readings, strict=True):
+        left = held - logged.measured
+        for channel, name in enumerate(OUTPUTS):
+            if not logged.measures[channel]:
+                left[channel] = np.nan
+                continue
+            left[channel, logged.missing[channel]] = np.nan
+            if name in ("contraction", "rotation"):
+                left[channel] -= np.nanmean(left[channel])
+        found.append(left)
+    return found
+
+
+def _stage(
+    bench: Bench,
+    before: Fitted,
+    chosen: tuple[Suspect, ...],
+    rest: Sequence[Suspect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Stage:
+    step = f"looking for effect {len(chosen) + 1}"
+    progress(step, 0, len(rest))
+    baseline = Baseline.at(bench.evidence(before.model, chosen), before.values, before.steps)
+    plain = _plain(bench, before)
+    looks = look(
+        baseline,
+        rest,
+        seed + len(chosen),
+        lambda suspect: bench.probed(plain, suspect),
+        lambda done: progress(step, done, len(rest)),
+    )
+    looks.sort(key=lambda each: -each.gain)
+    gate = tuple(each for each in looks if passes(each))
+    fits: dict[str, Fitted] = {}
+    if gate:
+        worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
+        for number, each in enumerate(worth[:TRIED]):
+            progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+            found = _fit(bench, before, chosen, each, journal)
+            if found is not None:
+                fits[each.suspect.name] = found
+    return Stage(bench, before, baseline, tuple(looks), fits, gate)
+
+
+def passes(each: Look) -> bool:
+    """Whether chance, or arithmetic, would not show as much."""
+    return each.p_value <= ALARM and each.change >= LEAST_CHANGE
+
+
+def cost(fit: Fitted) -> float:
+    """Twice the negative log-likelihood, with what parameters cost."""
+    return fit.chi_square + 2.0 * COST * len(fit.paths)
+
+
+def _likeliest(stage: Stage, first: Stage) -> str | None:
+    """The suspect to add, or None."""
+    if not stage.gate or not stage.fits:
+        return None
+    name = min(stage.fits, key=lambda each: cost(stage.fits[each]))
+    gain = stage.before.chi_square - stage.fits[name].chi_square
+    if gain < 30.0:
+        return None
+    if stage is not first:
+        least = min(first.fits.values(), key=cost)
+        if gain < SECOND_SHARE * (first.before.chi_square - least.chi_square):
+            return None
+    return name
+
+
+def _plain(bench: Bench, before: Fitted) -> Model:
+    """The given model with the parameters of a fit, without the effects that were added."""
+    own = {path: float(before.values[before.paths.index(path)]) for path in bench.own.free}
+    return bench.given.replace(own)
+
+
+def _fit(
+    bench: Bench,
+    before: Fitted,
+    chosen: tuple[Suspect, ...],
+    each: Look,
+    journal: Journal,
+) -> Fitted | None:
+    """The best of fits from the probes that explain most."""
+    key = f"{bench.noise} {before.names} {each.suspect.name} {each.starts}"
+    kept = journal.found(key)
+    extra = (*chosen, each.suspect)
+    if kept is not None:
+        return restored(kept, bench, before, extra)
+    best: Fitted | None = None
+    for probe, factor in each.starts:
+        start = {each.suspect.name: each.suspect.grown(probe, factor)}
+        found = bench.fit(before.model, extra, start)
+        if found is not None and (best is None or found.chi_square < best.chi_square):
+            best = found
+    if best is not None:
+        journal.keep(key, kept_form(best))
+    return best
+
+
+def _refit(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
+    key = f"again {bench.noise} {fit.names} {fit.values.tolist()}"
+    kept = journal.found(key)
+    if kept is not None:
+        return restored(kept, bench, fit, chosen)
+    found = bench.fit(fit.model, chosen) or fit
+    journal.keep(key, kept_form(found))
+    return found
+
+
+def _without_idle(
+    bench: Bench,
+    best: Fitted,
+    chosen: tuple[Suspect, ...],
+    refitted: Fitted,
+    journal: Journal,
+) -> tuple[tuple[Suspect, ...], Fitted]:
+    """The effects less those that nobody misses, and the fit of those that stay."""
+    worst = refitted.chi_square
+    for suspect in chosen[:-1]:
+        others = tuple(each for each in chosen if each is not suspect)
+        begun = _plain(bench, best)
+        starts = {
+            each.name: np.array(
+                [best.model.at_the_door(p.split(".")[0])[p.split(".")[1]] for p in each.paths],
+                float,
+            )
+            for each in others
+        }
+        found = bench.fit(begun, others, starts)
+        if found is None:
+            continue
+        missed = found.chi_square - best.chi_square
+        if missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0)):
+            return others, _refit(bench, found, others, journal)
+    return chosen, best
+
+
+def kept_form(fit: Fitted) -> dict:
+    """A fit as a journal keeps it."""
+    return {
+        "paths": list(fit.paths),
+        "values": fit.values.tolist(),
+        "covariance": fit.covariance.tolist(),
+        "chi_square": fit.chi_square,
+        "steps": fit.steps.tolist(),
+        "converged": bool(fit.converged),
+    }
+
+
+def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect]) -> Fitted:
+    """A fit from a journal."""
+    model = before.model
+    for suspect in extra:
+        model = suspect.beside(model)
+        switched = {
+            path: float(value)
+            for path, value, free in zip(
+                suspect.paths, suspect.probes[0], suspect.fitted, strict=True
+            )
+            if not free
+        }
+        model = model.replace(switched) if switched else model
+    found = dict(zip(kept["paths"], kept["values"], strict=True))
+    return Fitted(
+        model.replace(found),
+        tuple(suspect.name for suspect in extra),
+        tuple(kept["paths"]),
+        np.array(kept["values"]),
+        np.array(kept["covariance"]),
+        kept["chi_square"],
+        np.array(kept["steps"]),
+        kept["converged"],
+    )
