@@ -54,7 +54,36 @@ class Picture:
     caption: str
 
 
-Block = Heading | Paragraph | TextTable | Picture
+@dataclass(frozen=True)
+class Callout:
+    """What the reader must not miss, in a box.
+
+    Attributes:
+        text: large.
+        note: below it, in the size of text; empty for none.
+        tone: `good`, `bad` or `open`, for its colour.
+    """
+
+    text: str
+    note: str = ""
+    tone: str = "open"
+
+
+@dataclass(frozen=True)
+class Formula:
+    """Lines that keep their layout: equations, commands, a part of a file."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Steps:
+    """A numbered list; marked up as a paragraph is."""
+
+    items: Sequence[str]
+
+
+Block = Heading | Paragraph | TextTable | Picture | Callout | Formula | Steps
 
 _PAGE = Path(__file__).parent / "page.html"
 _GROUP = " | "
@@ -75,6 +104,12 @@ def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: 
                 parts.append(f"{'#' * level} {text}")
             case Paragraph(text):
                 parts.append(text)
+            case Callout(text, note):
+                parts.append("\n>\n".join(f"> {each}" for each in (f"**{text}**", note) if each))
+            case Formula(text):
+                parts.append(f"```text\n{text}\n```")
+            case Steps(items):
+                parts.append("\n".join(f"{i}. {item}" for i, item in enumerate(items, start=1)))
             case TextTable():
                 parts.append(_markdown_table(block))
             case Picture(name, caption) if name in pictures:
@@ -114,6 +149,13 @@ def _html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             return f"<h{level}>{_inline(text)}</h{level}>"
         case Paragraph(text):
             return f"<p>{_inline(text)}</p>"
+        case Callout(text, note, tone):
+            more = f"<p>{_inline(note)}</p>" if note else ""
+            return f'<div class="callout {tone}"><p class="large">{_inline(text)}</p>{more}</div>'
+        case Formula(text):
+            return f"<pre>{html.escape(text, quote=False)}</pre>"
+        case Steps(items):
+            return f"<ol>{''.join(f'<li>{_inline(item)}</li>' for item in items)}</ol>"
         case TextTable():
             return _html_table(block)
         case Picture(name, caption) if name in pictures:

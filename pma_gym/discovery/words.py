@@ -1,0 +1,227 @@
+"""What a diagnosis found, in words and figures that people read."""
+
+import math
+import re
+import sys
+
+from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
+from pma_gym.discovery.diagnosis import Diagnosis, Estimate
+from pma_gym.effects import CATALOGUE
+
+VERDICTS = {
+    "effect": "An effect is missing",
+    "parameters": "Parameters were off",
+    "agrees": "Model and data agree",
+    "unknown": "Something unknown is missing",
+    "undecidable": "These data cannot tell",
+}
+"""Each verdict in a few words."""
+
+_SIGNALS = {
+    "contraction_mm": "contraction",
+    "rotation_deg": "rotation of the pulley",
+    "load_n": "load",
+    "pressure_kpa": "pressure",
+}
+
+_NAMES = {"lvdt": "LVDT", "coulomb": "Coulomb"}
+_PEOPLE = ("sarosi", "schulte", "schulz", "chou", "hannaford", "caldwell", "tondu", "lopez")
+
+
+def effect_name(name: str) -> str:
+    """An effect's name as people write it.
+
+    >>> effect_name("coulomb_friction"), effect_name("lvdt_error")
+    ('Coulomb friction', 'LVDT error')
+    """
+    words = [
+        _NAMES.get(word, word.capitalize() if word in _PEOPLE else word) for word in name.split("_")
+    ]
+    return " ".join(words)
+
+
+def effect_names(names: tuple[str, ...] | list[str], joint: str = "and") -> str:
+    """Several effects: `creep, hysteresis and filling`."""
+    return listed([effect_name(name) for name in names], joint)
+
+
+def listed(words: list[str], joint: str = "and") -> str:
+    """Words in a row: `a, b and c`.
+
+    >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
+    ('a, b and c', 'a', '')
+    """
+    if len(words) < 2:
+        return "".join(words)
+    return f"{', '.join(words[:-1])} {joint} {words[-1]}"
+
+
+def effect_summary(name: str) -> str:
+    """What the effect is: the first line of its file, or of its law."""
+    effect = CATALOGUE.get(name)
+    if effect is None or effect.law is None:
+        return ""
+    own = sys.modules[effect.law.__module__].__doc__ or effect.law.__doc__ or ""
+    return own.strip().splitlines()[0] if own.strip() else ""
+
+
+def effect_equation(name: str) -> str:
+    """The indented lines of the law's docstring, as they stand there; empty if it has none."""
+    effect = CATALOGUE.get(name)
+    text = (effect.law.__doc__ or "") if effect and effect.law else ""
+    found = re.search(r"\n\n((?: {8}\S[^\n]*\n)+)", text)
+    return "\n".join(line.strip() for line in found[1].splitlines()) if found else ""
+
+
+def signal_name(signal: str) -> str:
+    """`contraction_mm` as `contraction`."""
+    return _SIGNALS.get(signal, signal)
+
+
+def signal_unit(signal: str) -> str:
+    """`contraction_mm` is in mm."""
+    return BY_NAME[signal].unit
+
+
+def door_name(quantity: str) -> str:
+    """`contraction` is `contraction_mm` at the door."""
+    return BY_QUANTITY[quantity].name
+
+
+def figure(value: float | None, digits: int = 3) -> str:
+    """A number with three significant digits, without an exponent where people write none.
+
+    >>> figure(0.8391), figure(1234.5), figure(4.5e-5), figure(None), figure(12.0)
+    ('0.839', '1230', '4.5e-05', '–', '12')
+    """
+    if value is None or not math.isfinite(value):
+        return "–"
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e6 else text
+
+
+def estimate(value: float, low: float | None, high: float | None) -> str:
+    """A value with as many decimals as its interval deserves.
+
+    >>> estimate(14.2371, 13.12, 15.38), estimate(0.021, 0.0187, 0.0233), estimate(14.2371, None, 3)
+    ('14.2', '0.0210', '14.2')
+    """
+    if low is None or high is None or not 0.0 < high - low < math.inf:
+        return figure(value)
+    decimals = 1 - math.floor(math.log10(0.5 * (high - low)))
+    return f"{value:.{max(decimals, 0)}f}" if decimals <= 8 else figure(value)
+
+
+def interval(known: Estimate) -> str:
+    """The 95 % interval of an estimate: `13.1 to 15.4`."""
+    low, high = known.low, known.high
+    if low is None and high is None:
+        return "not bounded by these data"
+    if low is None or high is None:
+        return f"above {figure(low)}" if high is None else f"below {figure(high)}"
+    return f"{estimate(low, low, high)} to {estimate(high, low, high)}"
+
+
+def estimate_words(known: Estimate) -> str:
+    """`14.2 N (95 %: 13.1 to 15.4)`."""
+    unit = "" if known.unit == "1" else f" {known.unit}"
+    return f"{estimate(known.value, known.low, known.high)}{unit} (95 %: {interval(known)})"
+
+
+def chance(p_value: float) -> str:
+    """A p-value: `p < 0.001`."""
+    return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.2g}"
+
+
+def percent(share: float | None) -> str:
+    """A share: `71 %`.
+
+    >>> percent(0.714), percent(0.9991), percent(None)
+    ('71 %', '99.9 %', '–')
+    """
+    if share is None:
+        return "–"
+    return f"{100 * share:.1f} %" if 0.99 < share < 1.0 else f"{100 * share:.0f} %"
+
+
+def odds(ratio: float) -> str:
+    """Expected odds, which only their size says anything about."""
+    return "over 1000 to 1" if ratio > 1000 else f"about {ratio:.2g} to 1"
+
+
+def what_to_do(diagnosis: Diagnosis) -> list[str]:
+    """The next things to do, the first first."""
+    steps = {
+        "effect": _use_effect,
+        "parameters": _use_parameters,
+        "agrees": _use_as_is,
+        "unknown": _describe,
+        "undecidable": _measure,
+    }[diagnosis.verdict](diagnosis)
+    if diagnosis.next_experiment and diagnosis.verdict != "undecidable":
+        steps.append(_run_next(diagnosis))
+    return steps
+
+
+def _use_effect(diagnosis: Diagnosis) -> list[str]:
+    steps = [
+        "Use the amended model, `model.toml` beside this page: "
+        '`gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
+    ]
+    for effect in diagnosis.effects:
+        if effect.confused_with:
+            rivals = effect_names(effect.confused_with, "or")
+            steps.append(
+                f"Do not yet rely on its name: {rivals} would explain these data as well. The "
+                "amended model predicts trials like these either way."
+            )
+    return steps
+
+
+def _use_parameters(diagnosis: Diagnosis) -> list[str]:
+    moved = [path for path, each in diagnosis.parameters.items() if each.significant]
+    named = listed([f"`{path}`" for path in moved[:3]])
+    steps = ["Use the refitted model, `model.toml` beside this page; no new effect is needed."]
+    if moved:
+        steps.append(f"Check on the rig why {named} differ{'s' if len(moved) == 1 else ''}.")
+    return steps
+
+
+def _use_as_is(diagnosis: Diagnosis) -> list[str]:
+    steps = [f"Keep the model {diagnosis.given.name}: nothing in these trials speaks against it."]
+    if diagnosis.blind:
+        steps.append(
+            f"These trials would not have shown {effect_names(diagnosis.blind, 'or')}; if one of "
+            "them matters to you, measure what excites it."
+        )
+    return steps
+
+
+def _describe(diagnosis: Diagnosis) -> list[str]:
+    steps = ["Look at the law below: its shape is what any explanation must have."] * bool(
+        diagnosis.law
+    )
+    return [
+        *steps,
+        "Write it as an effect of your own, one Python file, and diagnose again with "
+        "`--effect FILE.py`.",
+    ]
+
+
+def _measure(diagnosis: Diagnosis) -> list[str]:
+    if diagnosis.next_experiment is None:
+        return ["Measure trials that move the station further: more speeds, loads and pressures."]
+    return [
+        _run_next(diagnosis),
+        "Keep the model as it is until then: `model.toml` has its parameters refitted, no more.",
+    ]
+
+
+def _run_next(diagnosis: Diagnosis) -> str:
+    following = diagnosis.next_experiment
+    assert following is not None
+    protocol = following.protocol[:1].lower() + following.protocol[1:]
+    return (
+        f"Run `next.csv` on the rig ({protocol}; {figure(following.minutes, 2)} min), "
+        "save its log into the data set under a name of its own, and diagnose again."
+    )
