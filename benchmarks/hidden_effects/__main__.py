@@ -1,0 +1,65 @@
+"""`python -m benchmarks.hidden_effects`: draw cases, have them diagnosed, count."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+# Each process computes on its own core.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+from benchmarks.hidden_effects import drawing, judging, scoring  # noqa: E402
+from benchmarks.hidden_effects.cases import BLOCKS  # noqa: E402
+from benchmarks.hidden_effects.effects import ALL  # noqa: E402
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+Folder = Annotated[Path, typer.Argument(help="Folder that `draw` wrote.", exists=True)]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+
+
+@app.command()
+def draw(
+    cases: Annotated[int, typer.Option(min=1, help="How many.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to; cases that it has are kept.")],
+    seed: Annotated[int, typer.Option(help="Same seed, same bits.")] = 0,
+    blocks: Annotated[str, typer.Option(help="By commas; cases take turns.")] = ",".join(BLOCKS),
+    effects: Annotated[
+        str, typer.Option(help="Effects that cases of block single take turns in; all if empty.")
+    ] = "",
+    ratio: Annotated[str, typer.Option(help="Range of r, the change over the noise.")] = "0.5,2",
+    trials: Annotated[int, typer.Option(min=3, help="Trials of a case.")] = 6,
+    seconds: Annotated[float, typer.Option(min=3.0, help="Length of a trial (s).")] = 8.0,
+    jobs: Jobs = 1,
+) -> None:
+    """Draw cases: OUT/cases holds what a diagnosis may read, OUT/truth the rest."""
+    chosen = [name for name in effects.split(",") if name]
+    for given, known in ((blocks.split(","), BLOCKS), (chosen, tuple(ALL))):
+        for name in given:
+            if name not in known:
+                raise typer.BadParameter(f"{name!r} is none of {', '.join(known)}")
+    low, high = (float(end) for end in ratio.split(","))
+    plan = drawing.Plan(seed, tuple(blocks.split(",")), tuple(chosen), (low, high), trials, seconds)
+    drawing.draw(plan, cases, out, jobs)
+
+
+@app.command()
+def judge(
+    folder: Folder,
+    jobs: Jobs = 1,
+    options: Annotated[str, typer.Option(help="More options of `pma-gym diagnose`.")] = "",
+    limit: Annotated[float, typer.Option(help="Seconds after which a case is given up.")] = 900.0,
+) -> None:
+    """Diagnose every case that has no answer yet."""
+    judging.judge(folder, jobs, options.split(), limit)
+
+
+@app.command()
+def score(folder: Folder) -> None:
+    """Count what was named right; writes FOLDER/score.json."""
+    typer.echo(scoring.score(folder))
+
+
+if __name__ == "__main__":
+    app()
