@@ -125,13 +125,18 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
     """
     path = Path(path)
     check_writable(path)
+    replace_file(path, encode_trial(trial, path))
+
+
+def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
+    """What `write_trial` writes to a file of this name."""
     held = {"time": trial.time, **trial.commands, **trial.measurements}
     columns = {
         column.name: column.from_si(held[column.quantity])
         for column in COLUMNS
         if column.quantity in held
     }
-    replace_file(path, ENCODERS[_suffix(path)](columns, trial.provenance))
+    return ENCODERS[_suffix(Path(path))](columns, trial.provenance)
 
 
 def _load(path: Path) -> Table:

@@ -1,33 +1,21 @@
-"""`pma-gym`: simulate commands, evaluate trials, look at models, from a shell."""
+"""`pma-gym`: simulate, evaluate, diagnose and fit, from a shell."""
 
-import platform
 import sys
-import warnings
 from collections.abc import Sequence
 from enum import StrEnum
-from importlib import metadata
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
-from rich.table import Table
 
+from pma_gym.cli.discovery import diagnose, fit
+from pma_gym.cli.information import print_installation, print_model
+from pma_gym.cli.terminal import console, read, say
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.data.trial_columns import SampleError
-from pma_gym.data.trial_files import (
-    TrialWarning,
-    check_writable,
-    place_in_file,
-    read_trial,
-    write_trial,
-)
-from pma_gym.effects import CATALOGUE
-from pma_gym.effects.effect import Value
-from pma_gym.envs import ENVIRONMENTS
-from pma_gym.plant.model import Model, Note, load_model, shipped_models
+from pma_gym.data.trial_files import check_writable, place_in_file, write_trial
+from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import broken_limit
 
@@ -38,8 +26,6 @@ app = typer.Typer(
     rich_markup_mode=None,
     help="A pneumatic muscle's test station, simulated.",
 )
-
-_PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
 _PRESSURE_TOLERANCE = 1.0
 """Rounding of a settled pressure (Pa) that is no extrapolation."""
@@ -72,7 +58,7 @@ def simulate(
     if out.exists() and commands.exists() and out.samefile(commands):
         raise TrialError(f"--out {out} is the command file itself; name another file")
     plant = Plant(load_model(model))
-    given = _read(commands)
+    given = read(commands)
     try:
         trial = plant.simulate(given, noise, seed, joined=hold is Hold.LINEAR)
     except SampleError as error:
@@ -81,7 +67,7 @@ def simulate(
         raise TrialError(f"{commands.name}: {error}") from error
     write_trial(trial, out)
     for line in _doubts(plant.model, trial):
-        _say(f"warning: {line}")
+        say(f"warning: {line}")
     noisy = f"with noise, seed {seed}" if noise else "without noise"
     print(f"{len(trial)} samples, {trial.duration:.6g} s, on {plant.model.name} {noisy}: {out}")
 
@@ -95,7 +81,7 @@ def evaluate(
     # Imported here: the studies bring python-control along, and that brings matplotlib.
     from pma_gym.studies import evaluation
 
-    evaluation.print_evaluation(evaluation.evaluate(_read(trial), task), _console())
+    evaluation.print_evaluation(evaluation.evaluate(read(trial), task), console())
 
 
 @app.command()
@@ -104,9 +90,13 @@ def info(
 ) -> None:
     """Versions, models and environments; or a model's effects and parameters."""
     if model is None:
-        _print_installation(_console())
+        print_installation(console())
     else:
-        _print_model(load_model(model), _console())
+        print_model(load_model(model), console())
+
+
+app.command()(diagnose)
+app.command()(fit)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -115,18 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         app(args=None if arguments is None else list(arguments), prog_name="pma-gym")
     # Errors of trials and models are ValueErrors; anything else is a fault of this package.
     except (ValueError, OSError) as error:
-        _say(f"error: {error}")
+        say(f"error: {error}")
         sys.exit(2)
-
-
-def _read(path: Path) -> Trial:
-    """The trial in a file; what was passed over in it is said."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always", TrialWarning)
-        trial = read_trial(path)
-    for warning in caught:
-        _say(f"warning: {warning.message}")
-    return trial
 
 
 def _doubts(model: Model, trial: Trial) -> list[str]:
@@ -149,67 +129,3 @@ def _doubts(model: Model, trial: Trial) -> list[str]:
         if limit:
             doubts.append(f"{limit}: a real station would have been stopped")
     return doubts
-
-
-def _print_installation(console: Console) -> None:
-    """Versions, shipped models and registered environments."""
-    versions = Table("package", "version", title="Versions", title_justify="left")
-    versions.add_row("python", platform.python_version())
-    for name in _PACKAGES:
-        versions.add_row(name, metadata.version(name))
-    models = Table("model", "plant", "what", title="Models", title_justify="left")
-    for name in shipped_models():
-        model = load_model(name)
-        models.add_row(name, model.plant, escape(model.title))
-    environments = Table("environment", "task", title="Environments", title_justify="left")
-    for name, task in ENVIRONMENTS.items():
-        environments.add_row(name, task)
-    for table in (versions, models, environments):
-        console.print(table)
-
-
-def _print_model(model: Model, console: Console) -> None:
-    """A model's effects and parameters: value, 95 % interval, unit and source."""
-    console.print(f"{model.name} ({model.plant}): {model.title}", highlight=False, markup=False)
-    table = Table("effect", "parameter")
-    for name in ("value", "95 % interval"):
-        table.add_column(name, justify="right")
-    table.add_column("unit")
-    table.add_column("source")
-    for effect in model.parameters:
-        table.add_section()
-        shown = effect
-        stems = CATALOGUE[effect].names_at_the_door()
-        for door, value in model.at_the_door(effect).items():
-            note = model.notes.get(f"{effect}.{door}", Note())
-            unit = CATALOGUE[effect].quantities[stems[door]].unit
-            cells = (stems[door], _text(value), _interval(note), unit, note.source)
-            table.add_row(shown, *map(escape, cells))
-            shown = ""
-    console.print(table)
-
-
-def _text(value: Value) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(_text(one) for one in value)
-    return f"{value:.6g}"
-
-
-def _interval(note: Note) -> str:
-    if note.low is None or note.high is None:
-        return ""
-    return f"{note.low:.4g} to {note.high:.4g}"
-
-
-def _console() -> Console:
-    """Where tables go; as wide as they need where nobody watches."""
-    console = Console()
-    return console if console.is_terminal else Console(width=160)
-
-
-def _say(message: str) -> None:
-    print(message, file=sys.stderr)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,0 +1,182 @@
+"""`pma-gym diagnose` and `pma-gym fit`: a lab's logs against a model."""
+
+import json
+import platform
+import sys
+from collections.abc import Callable
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from pma_gym.cli.progress import StepProgress
+from pma_gym.cli.results import Results
+from pma_gym.cli.terminal import say, warnings_said
+from pma_gym.data.dataset import Dataset, read_dataset
+from pma_gym.data.trial_files import encode_trial
+from pma_gym.files import OutputError
+from pma_gym.plant.model import Model, dump_model, load_model
+
+if TYPE_CHECKING:
+    from pma_gym.discovery.diagnosis import Diagnosis
+
+INTERRUPTED = 130
+DEFAULT_MODEL = "station"
+_FITTED = ("schema", "verdict", "sentence", "parameters", "gap", "not_identifiable", "warnings")
+"""What `fit.json` has of a diagnosis."""
+
+DatasetArgument = Annotated[
+    Path, typer.Argument(help="Folder of CSV, Parquet or XLSX files, one a trial.")
+]
+ModelOption = Annotated[
+    str | None,
+    typer.Option(help="Shipped name or TOML file; else the data set's own, else station."),
+]
+OutOption = Annotated[
+    Path | None, typer.Option(help="Folder for the results; else the data set's name and command.")
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of resampling and of starts.")]
+JobsOption = Annotated[int, typer.Option(min=1, help="How many cores to use.")]
+EffectOption = Annotated[
+    list[Path] | None, typer.Option(help="Python file with effects of your own; may be repeated.")
+]
+ForceOption = Annotated[bool, typer.Option("--force", help="Replace an older result.")]
+
+
+def diagnose(
+    dataset: DatasetArgument,
+    model: ModelOption = None,
+    out: OutOption = None,
+    seed: SeedOption = 0,
+    jobs: JobsOption = 1,
+    effect: EffectOption = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on with a run that was interrupted.")
+    ] = False,
+    force: ForceOption = False,
+) -> None:
+    """Say where logs and model disagree, which effect is missing and how large it is."""
+    results = Results(
+        out or _default(dataset, "diagnosis"),
+        ("model.toml", "next.csv", "report.html", "diagnosis.json"),
+    )
+    _check_apart(results, dataset)
+    results.check(force, resume)
+    trials, given = _inputs(dataset, model, effect)
+    results.open(resume)
+    from pma_gym import discovery
+    from pma_gym.discovery.report import report_page
+
+    arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
+    found = _run(discovery.diagnose, trials, given, results, arguments, "--resume")
+    origin = _origin(dataset, trials, seed)
+    files = {
+        "diagnosis.json": found.text().encode(),
+        "model.toml": dump_model(found.model).encode(),
+        "report.html": report_page(found, trials.title, origin).encode(),
+    }
+    if found.next_experiment:
+        files["next.csv"] = encode_trial(found.next_experiment.trial, "next.csv")
+    results.write(files)
+    from pma_gym.discovery.summary import diagnosis_summary
+
+    print(diagnosis_summary(found))
+    _print_files(results)
+
+
+def fit(
+    dataset: DatasetArgument,
+    model: ModelOption = None,
+    out: OutOption = None,
+    seed: SeedOption = 0,
+    jobs: JobsOption = 1,
+    effect: EffectOption = None,
+    force: ForceOption = False,
+) -> None:
+    """Refit a model's parameters to logs, without looking for new effects."""
+    results = Results(out or _default(dataset, "fit"), ("model.toml", "fit.json"))
+    _check_apart(results, dataset)
+    results.check(force)
+    trials, given = _inputs(dataset, model, effect)
+    results.open()
+    from pma_gym import discovery
+
+    found = _run(discovery.refit, trials, given, results, {"seed": seed, "jobs": jobs}, "")
+    document = found.document()
+    kept = {key: document[key] for key in _FITTED}
+    results.write(
+        {
+            "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
+            "model.toml": dump_model(found.model).encode(),
+        }
+    )
+    from pma_gym.discovery.summary import print_fit
+
+    print_fit(found)
+    _print_files(results)
+
+
+def _default(dataset: Path, command: str) -> Path:
+    """`lab-diagnosis` here, for the data set `/data/lab`."""
+    return Path(f"{dataset.resolve().name}-{command}")
+
+
+def _check_apart(results: Results, dataset: Path) -> None:
+    """Refuse to write among the logs: next.csv and model.toml may be the lab's own there."""
+    if results.folder.resolve() == dataset.resolve():
+        raise OutputError(
+            f"--out {results.folder} is the data set itself; name a folder of its own for the "
+            "results"
+        )
+
+
+def _inputs(folder: Path, model: str | None, effects: list[Path] | None) -> tuple[Dataset, Model]:
+    """The data set and the model, all that can be refused before anything is computed."""
+    with warnings_said():
+        trials = read_dataset(folder)
+    for path in effects or ():
+        from pma_gym.effects.own import load_effects
+
+        load_effects(path)
+    return trials, load_model(model or trials.model or DEFAULT_MODEL)
+
+
+def _run(
+    function: Callable[..., Any],
+    trials: Dataset,
+    model: Model,
+    results: Results,
+    arguments: dict[str, Any],
+    resume: str,
+) -> "Diagnosis":
+    """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
+    try:
+        with StepProgress() as progress:
+            return function(trials, model, progress=progress, **arguments)
+    except KeyboardInterrupt:
+        kept = resume and results.journal.is_dir()
+        results.leave()
+        how = f"the same command with {resume} goes on" if kept else "nothing was finished yet"
+        say(f"interrupted; {how}")
+        raise typer.Exit(INTERRUPTED) from None
+    except BaseException:
+        results.leave()
+        raise
+
+
+def _origin(folder: Path, trials: Dataset, seed: int) -> dict[str, str]:
+    """What the page says so that it can be made again."""
+    names = ("pma-gym", "numpy", "scipy")
+    versions = ", ".join(f"{name} {metadata.version(name)}" for name in names)
+    return {
+        "Data set": f"`{folder}`, {len(trials)} trials",
+        "Seed": str(seed),
+        "Versions": f"{versions}, Python {platform.python_version()}",
+        "Command": f"`pma-gym {' '.join(sys.argv[1:])}`",
+    }
+
+
+def _print_files(results: Results) -> None:
+    found = [name for name in reversed(results.names) if (results.folder / name).exists()]
+    print(f"Written to {results.folder}: {', '.join(found)}")

@@ -1,0 +1,70 @@
+"""`pma-gym diagnose` end to end, on logs simulated with an effect that the model lacks."""
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from pma_gym import discovery
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_files import write_trial
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+
+pytestmark = pytest.mark.skipif(
+    not hasattr(discovery, "diagnose"), reason="the engine is not there yet"
+)
+
+
+def pull(period, pressure):
+    time = np.arange(0.0, 8.0, 1 / 128)
+    volts = 2.5 * (1.0 - np.cos(2 * np.pi * time / period))
+    return Trial(time, {"motor_voltage": volts, "pressure_command": np.full(time.size, pressure)})
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """Six logs of a station with 25 N of dry friction."""
+    folder = tmp_path_factory.mktemp("data") / "lab"
+    folder.mkdir()
+    friction = {"coulomb_friction.static_n": 25.0, "coulomb_friction.dynamic_n": 20.0}
+    rig = Plant(load_model("serres2008").replace(friction))
+    for seed, (period, pressure) in enumerate(
+        (period, pressure) for period in (2.0, 4.0) for pressure in (200e3, 300e3, 450e3)
+    ):
+        trial = rig.simulate(pull(period, pressure), seed=seed)
+        write_trial(trial, folder / f"pull_{period:g}s_{pressure / 1e3:g}kPa.csv")
+    return folder
+
+
+def command(*arguments, cwd):
+    return subprocess.run(
+        [sys.executable, "-m", "pma_gym.cli", *map(str, arguments)],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+    )
+
+
+def test_a_log_with_friction_is_diagnosed_twice_alike(lab, tmp_path):
+    texts = []
+    for name in ("one", "two"):
+        done = command("diagnose", lab, "--model", "serres2008", "--out", name, cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+        texts.append((tmp_path / name / "diagnosis.json").read_text())
+    assert texts[0] == texts[1]
+    found = json.loads(texts[0])
+    # serres2008 has 1.5 N of this friction: its size is a parameter, and the answer is its value.
+    assert found["verdict"] in ("parameters", "effect")
+    assert load_model(tmp_path / "one" / "model.toml").plant == "station"
+    assert "<html" in (tmp_path / "one" / "report.html").read_text()
+
+
+def test_a_fit_finds_the_friction(lab, tmp_path):
+    done = command("fit", lab, "--model", "serres2008", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / "lab-fit" / "fit.json").read_text())
+    dynamic = found["parameters"]["coulomb_friction.dynamic_n"]
+    assert dynamic["low"] <= 20.0 <= dynamic["high"]

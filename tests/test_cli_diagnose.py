@@ -1,0 +1,228 @@
+"""`pma-gym diagnose` and `fit` around a stand-in for the engine: files, exit codes, messages."""
+
+import json
+import sys
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from pma_gym.cli import main
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_files import read_trial, write_trial
+from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Moved, NextExperiment, Place
+from pma_gym.plant.model import load_model
+
+TIME = np.arange(20) / 10
+TRIAL = Trial(TIME, {"motor_voltage": TIME}, {"load": 98.0 * TIME})
+FOUND = Diagnosis(
+    verdict="parameters",
+    sentence="The drive pulls 3 % less than the model says.",
+    where=(Place("load_n", "above 100 N", 0.7, 0.002),),
+    effects=(),
+    parameters={"drive.gain_n_per_v": Moved(97.84, Estimate(95.02, 94.1, 95.9, "N/V"), True)},
+    gap={"load_n": Gap(5.0, 0.6, 0.6, 0.5, True)},
+    candidates=(),
+    next_experiment=NextExperiment("Staircase", ("creep",), 40.0, 1.5, TRIAL),
+    model=load_model("serres2008").replace({"drive.gain_n_per_v": 95.02}),
+    given=load_model("serres2008"),
+    not_identifiable={"rotor.inertia_kg_m2": "no trial is fast enough"},
+    warnings=("Only one trial.",),
+)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Runs the command in a folder with a data set `lab`: exit code, output, errors."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "lab").mkdir()
+    write_trial(TRIAL, tmp_path / "lab" / "ramp.csv")
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["pma-gym", *arguments])
+        with pytest.raises(SystemExit) as caught:
+            main([str(argument) for argument in arguments])
+        printed = capsys.readouterr()
+        return caught.value.code or 0, printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def engine(monkeypatch):
+    """A stand-in that finds `answer`, or raises it; remembers what it was given."""
+
+    class Engine:
+        answer = FOUND
+        calls = []
+
+        def __call__(self, trials, model=None, *, progress=None, journal=None, **rest):
+            self.calls.append((trials, model, rest))
+            progress("Noise", 0, 1)
+            progress("Noise", 1, 1)
+            if journal:
+                journal.mkdir(exist_ok=True)
+                (journal / "1.json").write_text("{}")
+            if isinstance(self.answer, BaseException):
+                raise self.answer
+            return self.answer
+
+    found = Engine()
+    found.calls = []
+    for name in ("diagnose", "refit"):
+        monkeypatch.setattr(f"pma_gym.discovery.{name}", found, raising=False)
+    return found
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path):
+    code, out, err = run("diagnose", "lab", "--model", "serres2008", "--seed", "3", "--jobs", "2")
+    assert (code, err) == (0, "Noise ...\n")
+    ((trials, model, rest),) = engine.calls
+    assert (len(trials), model.name, rest) == (1, "serres2008", {"seed": 3, "jobs": 2})
+    folder = tmp_path / "lab-diagnosis"
+    assert names(folder) == ["diagnosis.json", "model.toml", "next.csv", "report.html"]
+    assert json.loads((folder / "diagnosis.json").read_text())["verdict"] == "parameters"
+    amended = load_model(folder / "model.toml")
+    assert amended.at_the_door("drive")["gain_n_per_v"] == pytest.approx(95.02)
+    assert len(read_trial(folder / "next.csv")) == 20
+    assert "Seed" in (folder / "report.html").read_text()
+    assert out.splitlines() == [
+        "Parameters were off.",
+        FOUND.sentence,
+        "",
+        "Note: Only one trial.",
+        "Where:      load, above 100 N: 70 % of its misfit (p = 0.002)",
+        "Parameters: drive.gain_n_per_v from 97.84 to 95.02 N/V (95 %: 94.10 to 95.90)",
+        "Misfit:     load 5 N as given, 0.6 refitted, 0.6 proposed (held out), noise 0.5; "
+        "98 % of the gap closed",
+        "Now:        Use the refitted model, model.toml; no new effect is needed.",
+        "Now:        Check on the rig why drive.gain_n_per_v differs.",
+        "Now:        Run next.csv on the rig (staircase; 1.5 min), save its log into the data set "
+        "under a name of its own, and diagnose again.",
+        "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, model.toml",
+    ]
+
+
+def test_the_model_is_the_data_sets_own_unless_named(run, engine, tmp_path):
+    assert run("diagnose", "lab")[0] == 0
+    (tmp_path / "lab" / "dataset.toml").write_text('model = "schulz"\ntitle = "Rig 2"')
+    assert run("diagnose", "lab", "--out", "two")[0] == 0
+    assert run("diagnose", "lab", "--out", "three", "--model", "serres2008")[0] == 0
+    assert [model.name for _, model, _ in engine.calls] == ["station", "schulz", "serres2008"]
+    assert "Rig 2" in (tmp_path / "two" / "report.html").read_text()
+
+
+@pytest.mark.parametrize("command", ["diagnose", "fit"])
+def test_an_older_result_is_kept_unless_forced(run, engine, tmp_path, command):
+    assert run(command, "lab", "--out", "old")[0] == 0
+    before = {path: path.read_bytes() for path in (tmp_path / "old").iterdir()}
+    code, out, err = run(command, "lab", "--out", "old")
+    assert (code, out, len(engine.calls)) == (2, "", 1)
+    assert err.startswith("error: old holds an older result (model.toml, ")
+    assert "--force replaces it, --out FOLDER writes to another place" in err
+    assert before == {path: path.read_bytes() for path in (tmp_path / "old").iterdir()}
+    engine.answer = replace(FOUND, next_experiment=None)
+    assert run(command, "lab", "--out", "old", "--force")[0] == 0
+    assert "next.csv" not in names(tmp_path / "old")
+
+
+def test_ctrl_c_says_how_to_go_on(run, engine, tmp_path):
+    engine.answer = KeyboardInterrupt()
+    code, out, err = run("diagnose", "lab")
+    assert (code, out) == (130, "")
+    assert err.endswith("interrupted; the same command with --resume goes on\n")
+    assert names(tmp_path / "lab-diagnosis") == ["unfinished"]
+    engine.answer = FOUND
+    code, _, err = run("diagnose", "lab")
+    assert code == 2
+    assert "lab-diagnosis holds an unfinished run; --resume goes on with it, --force begins" in err
+    assert run("diagnose", "lab", "--resume")[0] == 0
+    assert "unfinished" not in names(tmp_path / "lab-diagnosis")
+
+
+def test_ctrl_c_in_a_fit_leaves_nothing(run, engine, tmp_path):
+    engine.answer = KeyboardInterrupt()
+    code, _, err = run("fit", "lab")
+    assert code == 130
+    assert "interrupted; nothing was finished yet" in err
+    assert names(tmp_path) == ["lab"]
+
+
+def test_force_begins_an_unfinished_run_anew(run, engine, tmp_path):
+    (tmp_path / "lab-diagnosis" / "unfinished").mkdir(parents=True)
+    (tmp_path / "lab-diagnosis" / "unfinished" / "old.json").write_text("{}")
+    engine.answer = KeyboardInterrupt()
+    assert run("diagnose", "lab", "--force")[0] == 130
+    assert names(tmp_path / "lab-diagnosis" / "unfinished") == ["1.json"]
+
+
+@pytest.mark.parametrize("command", ["diagnose", "fit"])
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none"], "error: there is no folder none; check the name of the data set"),
+        (["lab/ramp.csv"], "error: lab/ramp.csv is a file; a data set is a folder"),
+        (["lab", "--model", "statoin"], "did you mean 'station'?"),
+        (["lab", "--model", "old.toml"], "old.toml: schema must be 1"),
+        (["lab", "--out", "no/where"], "there is no folder no; make it, or name another"),
+        (["lab", "--out", "old.toml"], "--out old.toml is no folder"),
+        (["lab", "--out", "lab"], "--out lab is the data set itself"),
+        (["lab", "--jobs", "0"], "--jobs"),
+    ],
+)
+def test_input_that_cannot_be_used_ends_in_one_message(
+    run, engine, tmp_path, command, arguments, message
+):
+    (tmp_path / "old.toml").write_text("schema = 7\n")
+    before = names(tmp_path)
+    code, out, err = run(command, *arguments)
+    assert (code, out, engine.calls) == (2, "", [])
+    assert message in err and "Traceback" not in err
+    assert names(tmp_path) == before
+
+
+def test_what_the_engine_refuses_leaves_nothing(run, engine, tmp_path):
+    engine.answer = ValueError("ramp.csv has 3 samples, fewer than the 12 parameters")
+    code, _, err = run("fit", "lab")
+    assert code == 2
+    assert err.endswith("error: ramp.csv has 3 samples, fewer than the 12 parameters\n")
+    assert names(tmp_path) == ["lab"]
+
+
+def test_fit_prints_and_writes_the_parameters(run, engine, tmp_path):
+    code, out, err = run("fit", "lab", "--model", "serres2008")
+    assert (code, err) == (0, "Noise ...\n")
+    assert names(tmp_path / "lab-fit") == ["fit.json", "model.toml"]
+    document = json.loads((tmp_path / "lab-fit" / "fit.json").read_text())
+    assert document["parameters"]["drive.gain_n_per_v"]["to"] == 95.02
+    assert document["not_identifiable"] == {"rotor.inertia_kg_m2": "no trial is fast enough"}
+    assert "candidates" not in document
+    (row,) = (line for line in out.splitlines() if "drive.gain_n_per_v" in line)
+    for cell in ("97.84", "95.02", "94.10 to 95.90", "N/V", "differs"):
+        assert cell in row
+    assert "not identifiable: no trial is fast enough" in out
+    (row,) = (line for line in out.splitlines() if "load (N)" in line)
+    assert [cell for cell in ("5", "0.6", "0.5") if cell in row] == ["5", "0.6", "0.5"]
+
+
+def test_warnings_of_the_data_set_are_said(run, engine, tmp_path):
+    path = tmp_path / "lab" / "ramp.csv"
+    path.write_text(path.read_text().replace("load_n", "load_n,Temp", 1).replace("\n", ",1\n"))
+    path.write_text(path.read_text().replace("Temp,1", "Temp", 1))
+    code, _, err = run("diagnose", "lab")
+    assert code == 0
+    assert err.startswith("warning: ramp.csv: unknown columns are ignored: 'Temp'\n")
+
+
+def test_effects_of_ones_own_are_loaded_before_the_model(run, engine, tmp_path, monkeypatch):
+    loaded = []
+    own = SimpleNamespace(load_effects=loaded.append)
+    monkeypatch.setitem(sys.modules, "pma_gym.effects.own", own)
+    code, _, _ = run("diagnose", "lab", "--effect", "a.py", "--effect", "b.py")
+    assert code == 0
+    assert [path.name for path in loaded] == ["a.py", "b.py"]
