@@ -1,11 +1,13 @@
 """The catalogue: every phenomenon that a plant can have, one file each."""
 
+from pma_gym.effects.bearing_friction import BEARING_FRICTION
 from pma_gym.effects.cable import CABLE
 from pma_gym.effects.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.creep import CREEP, SLOW_CREEP
 from pma_gym.effects.damping import DAMPING, SYMMETRIC_DAMPING
+from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
 from pma_gym.effects.drive import DRIVE
 from pma_gym.effects.drive_dead_zone import DRIVE_DEAD_ZONE
 from pma_gym.effects.drive_lag import DRIVE_LAG
@@ -22,12 +24,15 @@ from pma_gym.effects.geometric_force import (
 from pma_gym.effects.hysteresis import HYSTERESIS
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.load_dependent_damping import LOAD_DEPENDENT_DAMPING
+from pma_gym.effects.nonlinear_stiffness import NONLINEAR_STIFFNESS
 from pma_gym.effects.operator import OPERATOR
 from pma_gym.effects.passive_stretch import PASSIVE_STRETCH
 from pma_gym.effects.position_map import POSITION_MAP
+from pma_gym.effects.potentiometer_backlash import POTENTIOMETER_BACKLASH
 from pma_gym.effects.pressure_curvature import PRESSURE_CURVATURE
 from pma_gym.effects.regulator import REGULATOR_LAG, REGULATOR_LINE
 from pma_gym.effects.regulator_asymmetry import REGULATOR_ASYMMETRY
+from pma_gym.effects.regulator_deadband import REGULATOR_DEADBAND
 from pma_gym.effects.regulator_rate_limit import REGULATOR_RATE_LIMIT
 from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
 from pma_gym.effects.rotor import ROTOR
@@ -43,6 +48,7 @@ from pma_gym.effects.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.slide import SLIDE
 from pma_gym.effects.stiffness import STIFFNESS
 from pma_gym.effects.torque_ripple import TORQUE_RIPPLE
+from pma_gym.effects.warm_up import WARM_UP
 
 CATALOGUE: dict[str, Effect] = {
     effect.name: effect
@@ -58,6 +64,8 @@ CATALOGUE: dict[str, Effect] = {
         COLBRUNN_SPRING,
         REPPERGER_SPRING,
         PRESSURE_CURVATURE,
+        NONLINEAR_STIFFNESS,
+        WARM_UP,
         PASSIVE_STRETCH,
         DAMPING,
         SYMMETRIC_DAMPING,
@@ -72,14 +80,18 @@ CATALOGUE: dict[str, Effect] = {
         DRIVE,
         DRIVE_DEAD_ZONE,
         DRIVE_SATURATION,
+        DRIVE_DELAY,
         DRIVE_LAG,
         TORQUE_RIPPLE,
+        BEARING_FRICTION,
         ROTOR,
         SLIDE,
         REGULATOR_LINE,
+        REGULATOR_DELAY,
         REGULATOR_LAG,
         REGULATOR_ASYMMETRY,
         REGULATOR_RATE_LIMIT,
+        REGULATOR_DEADBAND,
         FILLING,
         POSITION_MAP,
         SERVO,
@@ -92,6 +104,7 @@ CATALOGUE: dict[str, Effect] = {
         LOAD_CELL_ERROR,
         PRESSURE_TRANSDUCER_ERROR,
         POTENTIOMETER_ERROR,
+        POTENTIOMETER_BACKLASH,
         LIMITS,
         VALIDITY,
     )

@@ -78,5 +78,9 @@ COULOMB_FRICTION = Effect(
     held=("presliding",),
     law=friction_force,
     path=friction_path,
-    signature="odd step of force at zero speed; the slide sticks under small changes of load",
+    signature=(
+        "odd step of force at zero speed, the same at every load and pressure; the slide sticks "
+        "under small changes of load. Stribeck: static over dynamic, the step is higher within "
+        "stribeck_speed of rest, so slow motion comes in jerks"
+    ),
 )

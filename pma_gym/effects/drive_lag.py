@@ -55,6 +55,9 @@ DRIVE_LAG = Effect(
     held=("share",),
     law=late_load,
     rate=late_rate,
-    signature="load cell late, phase proportional to frequency; statically absent",
+    signature=(
+        "load cell late against the voltage: it answers at once and approaches exponentially, its "
+        "phase proportional to frequency at low ones; statically absent"
+    ),
     memory_scale=50.0,
 )

@@ -35,6 +35,8 @@ class Effect:
             costs the integrator nothing; instead of `rate`.
         switch: a signal at whose zero the law has a kink; steps end there.
         signature: what sets the effect apart in measured data.
+        memories: how many numbers the memory has. Of more than one, laws get `memory` as a tuple,
+            and the rate law returns a (source, decay) for each.
         memory_scale: what an error of the memory is counted against, roughly its range.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
@@ -49,6 +51,7 @@ class Effect:
     switch: Callable | None = None
     signature: str = ""
     memory_scale: float = 1.0
+    memories: int = 1
     held: tuple[str, ...] = ()
 
     @cached_property
@@ -165,6 +168,18 @@ class Effect:
             many = isinstance(value, tuple)
             out[door] = tuple(map(quantity.from_si, value)) if many else quantity.from_si(value)
         return out
+
+    @property
+    def memory_names(self) -> tuple[str, ...]:
+        """Names of the states that hold its memory: `memory_creep`, `memory_drive_delay_1`."""
+        if not (self.rate or self.path):
+            return ()
+        name = f"memory_{self.name}"
+        return (
+            (name,)
+            if self.memories == 1
+            else tuple(f"{name}_{i + 1}" for i in range(self.memories))
+        )
 
     def laws(self) -> Iterator[Callable]:
         """The law and the rate law, where there are any."""

@@ -53,5 +53,8 @@ HYSTERESIS = Effect(
     parameters=Hysteresis,
     law=hysteresis_force,
     rate=hysteresis_rate,
-    signature="loops whose area does not depend on rate, with nested minor loops",
+    signature=(
+        "loops whose area does not depend on rate, with nested minor loops; the force lags behind "
+        "the way over some millimetres after a turn, where dry friction turns at once"
+    ),
 )

@@ -63,5 +63,8 @@ REGULATOR_LAG = Effect(
     "regulator_lag",
     RegulatorLag,
     regulator_rate,
-    signature="measured pressure late, phase proportional to frequency",
+    signature=(
+        "measured pressure late: it answers at once and approaches exponentially, its phase "
+        "proportional to frequency up to 1 / (2 pi tau) and never beyond 90 deg"
+    ),
 )

@@ -67,7 +67,10 @@ def sensor_error(signal, p):
     return p.gain * signal + p.offset
 
 
-_SIGNATURE = "sensors disagree with each other statically, in proportion or by a constant"
+_SIGNATURE = (
+    "this sensor disagrees with the others statically, in proportion or by a constant, and nothing "
+    "that is done to the station follows the error"
+)
 
 
 def _error(sensor: str, output: str, parameters: type) -> Effect:

@@ -66,9 +66,17 @@ def sensor_rate(signal, p):
     return decay * signal, decay
 
 
-LVDT = Effect("lvdt", "sensor:contraction", Lvdt, rate=sensor_rate)
-LOAD_CELL = Effect("load_cell", "sensor:load", LoadCell, rate=sensor_rate)
-PRESSURE_TRANSDUCER = Effect(
-    "pressure_transducer", "sensor:pressure", PressureTransducer, rate=sensor_rate
+_SIGNATURE = (
+    "this sensor comes later than the others, by a lag of 1 / (2 pi bandwidth); noise that is the "
+    "same at rest and in motion"
 )
-POTENTIOMETER = Effect("potentiometer", "sensor:rotation", Potentiometer, rate=sensor_rate)
+
+
+def _sensor(name: str, output: str, parameters: type) -> Effect:
+    return Effect(name, f"sensor:{output}", parameters, rate=sensor_rate, signature=_SIGNATURE)
+
+
+LVDT = _sensor("lvdt", "contraction", Lvdt)
+LOAD_CELL = _sensor("load_cell", "load", LoadCell)
+PRESSURE_TRANSDUCER = _sensor("pressure_transducer", "pressure", PressureTransducer)
+POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)

@@ -29,6 +29,7 @@ PORTS: dict[str, Port] = {
     "servo": Port("rate of the motor's displacement (m/s)", least=1, most=1),
     "servo_inertia": Port("acceleration of the motor's displacement (m/s^2)", most=1),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": Port("factor on the regulator's rate, multiplied"),
 }
@@ -38,6 +39,9 @@ REFUSED: dict[str, str] = {
     "repperger_damping": (
         "its damping grows with the velocity, of which a cascade knows only the sign; take "
         "[damping] or [symmetric_damping], or plant = 'station'"
+    ),
+    "potentiometer_backlash": (
+        "a cascade's motor has an angle but no spin to move it by; take plant = 'station'"
     ),
 }
 """Effects that would fit a port and mean nothing there, and why."""
@@ -64,7 +68,8 @@ def write_equations(equations: Equations) -> None:
     """Write the dissertation's cascade, with the model's effects at its ports."""
     eq = equations
     stiffness, force = eq.parameters["stiffness"], eq.parameters["contractile_force"]
-    eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("pressure_asked", eq.one("regulator_line"))
+    eq.let("pressure_command", eq.passed("regulator_delay", "pressure_asked"))
     eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     eq.let("displacement_input", eq.one("position_map"))
@@ -84,6 +89,7 @@ def write_equations(equations: Equations) -> None:
     eq.add_state("extension", pull, SCALES["extension"])
     _write_servo(eq)
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
+    eq.add_memories(("regulator_delay",))
     eq.add_sensors(SCALES)
 
 

@@ -182,11 +182,12 @@ class Equations:
 
         return trace(law, *(signal(name) for name in signals(law)))
 
-    def memory(self, effect: Effect) -> Value:
+    def memory(self, effect: Effect) -> Any:  # noqa: ANN401
         """The memory of an effect; one of the way travelled, as far as the step has come."""
-        name = f"memory_{effect.name}"
         if effect.path is None:
-            return self[name]
+            values = tuple(self[name] for name in effect.memory_names)
+            return values if effect.memories > 1 else values[0]
+        (name,) = effect.memory_names
         for path in self.paths:
             if path.name == name:
                 return path.after
@@ -236,6 +237,10 @@ class Equations:
         assert effect.law is not None
         return self.call(effect, effect.law, **other)
 
+    def passed(self, port: str, name: str) -> Value:
+        """A named value as the effect at a port passes it on; as it is if there is none."""
+        return self.one(port) if self.at(port) else self[name]
+
     def add_state(self, name: str, rate: Value, scale: float | None) -> None:
         """Add a state by its rate, and what an error of it is counted against."""
         self.states.append(State(name, self[name], self.graph.value(rate), scale))
@@ -251,8 +256,13 @@ class Equations:
         """Add the memory of every effect that has one at these ports."""
         for effect in self.effects.values():
             if effect.port in ports and effect.rate:
-                rate = self.call(effect, effect.rate)
-                self.add_decaying(f"memory_{effect.name}", rate, effect.memory_scale)
+                self._add_memory(effect, effect.rate)
+
+    def _add_memory(self, effect: Effect, law: Callable) -> None:
+        found = self.call(effect, law)
+        rates = found if effect.memories > 1 else (found,)
+        for name, rate in zip(effect.memory_names, rates, strict=True):
+            self.add_decaying(name, rate, effect.memory_scale)
 
     def add_switch(self, name: str, value: Value, overshoot: float, turning: bool = False) -> None:
         """Add a value at whose zero steps end; all states must have been added."""
@@ -266,10 +276,10 @@ class Equations:
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, by what an error of its output is counted against.
 
-        It follows its output, and whatever errors stand at the same port.
+        It follows its output, and whatever errors stand at the same port, with their memories.
         """
         for effect in self.effects.values():
-            if effect.port.startswith("sensor:") and effect.rate:
+            if effect.port.startswith("sensor:") and effect.rate and not effect.law:
                 output = effect.port.removeprefix("sensor:")
                 truth = self.outputs[output]
                 errors = [
@@ -279,3 +289,6 @@ class Equations:
                 ]
                 rate = self.call(effect, effect.rate, signal=sum(errors, truth))
                 self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])
+                for error in self.at(effect.port):
+                    if error.law and error.rate:
+                        self._add_memory(error, error.rate)

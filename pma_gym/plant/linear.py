@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pma_gym.effects import CATALOGUE
 from pma_gym.plant.plant import OUTPUTS, Condition, Plant
 from pma_gym.plant.settle import static_force
 
@@ -15,7 +16,12 @@ SEEN = (*OUTPUTS, "extension")
 DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 """Sign of the velocity by direction of motion."""
 
-FOLLOWING = ("memory_drive_lag",)
+FOLLOWING = tuple(
+    name
+    for effect in CATALOGUE.values()
+    if effect.port in ("drive_delay", "drive_lag", "regulator_delay")
+    for name in effect.memory_names
+)
 """Memories that follow a command within milliseconds, and so belong to the linear system."""
 
 _STEP, _PRESSURE_STEP, _VOLTAGE_STEP = 1e-7, 100.0, 1e-4

@@ -69,9 +69,10 @@ class Notation(Equations):
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
         """The memory of an effect, where it stands."""
-        name = f"memory_{effect.name}"
-        if effect.path is not None:
-            self.roads[name] = effect
+        if effect.path is None:
+            return super().memory(effect)
+        (name,) = effect.memory_names
+        self.roads[name] = effect
         return self[name]
 
     def add_switch(self, *_: Any, **__: Any) -> None:

@@ -1,10 +1,11 @@
 """A plant at rest: the state in which it stands still at constant commands."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pma_gym.effects.effect import signals
 from pma_gym.plant.program import parameter_names
 
 if TYPE_CHECKING:
@@ -62,9 +63,10 @@ def _search(
     vectors: np.ndarray | None,
 ) -> "_Search":
     search = _Search(plant, motor_voltages, regulator_voltages, vectors)
+    search.relax_memory("regulator_delay")
     _settle_pressure(search)
-    if (late := "memory_drive_lag") in plant.states:
-        search.relax(late)
+    for port in ("drive_delay", "drive_lag"):
+        search.relax_memory(port)
     find = _station if plant.model.plant == "station" else _cascade
     find(search)
     for name in plant.states:
@@ -129,6 +131,33 @@ class _Search:
         for _ in range(3):
             self[name] -= self.rate(of or name) / slope
 
+    def relax_memory(self, port: str) -> None:
+        """Put the memory of the effect at a port that follows a command where it rests."""
+        for effect in self.plant.model.effects.values():
+            if effect.port == port and effect.memories > 1:
+                self._relax_together(effect.memory_names)
+            elif effect.port == port and effect.rate:
+                self.relax(effect.memory_names[0])
+
+    def _relax_together(self, names: Sequence[str]) -> None:
+        """Put states where their rates vanish, which are linear in them."""
+        for name in names:
+            self[name] = 0.0
+        still = self._rates(names)
+        slopes = np.empty((len(still), len(names), len(names)))
+        for i, name in enumerate(names):
+            self[name] = 1.0
+            slopes[:, :, i] = self._rates(names) - still
+            self[name] = 0.0
+        # From there again: the differences above have lost digits.
+        for _ in range(4):
+            change = np.linalg.solve(slopes, self._rates(names)[..., None])[..., 0]
+            for i, name in enumerate(names):
+                self[name] -= change[:, i]
+
+    def _rates(self, names: Sequence[str]) -> np.ndarray:
+        return np.stack([self.rate(name) for name in names], axis=1)
+
     def parameters(self, effect: str) -> dict[str, np.ndarray]:
         """An effect's parameters, one each or one for all."""
         return _columns(self.plant, self.vectors, effect)
@@ -145,17 +174,24 @@ _STEADY = 1.0
 
 
 def _settle_pressure(search: _Search) -> None:
-    """Pressures at which the regulators rest; a limit on their rate has them searched for there."""
-    if "regulator_rate_limit" not in search.plant.model.effects:
+    """Pressures at which the regulators rest.
+
+    A limit on their rate has them searched for where they are asked to be, and a deadband, in which
+    they rest anywhere, has them begin there.
+    """
+    if not {"regulator_rate_limit", "regulator_deadband"} & search.plant.model.effects.keys():
         search.relax("pressure")
         return
     with np.errstate(divide="ignore", invalid="ignore"):
         search.relax("pressure")
-    found, line = search["pressure"].copy(), search.parameters("regulator_line")
-    settled = np.abs(search.rate("pressure")) <= _STEADY
-    asked = np.maximum(line["gain"] * search.inputs[:, 1] + line["offset"], 0.0)
-    search.relax("pressure", about=asked)
-    search["pressure"] = np.where(settled, found, search["pressure"])
+        found, line = search["pressure"].copy(), search.parameters("regulator_line")
+        settled = np.abs(search.rate("pressure")) <= _STEADY
+        asked = np.maximum(line["gain"] * search.inputs[:, 1] + line["offset"], 0.0)
+        search.relax("pressure", about=asked)
+    found = np.where(settled, found, search["pressure"])
+    if "regulator_deadband" in search.plant.model.effects:
+        found = np.where(search.parameters("regulator_deadband")["width"] > 0.0, asked, found)
+    search["pressure"] = found
 
 
 def _cascade(search: _Search) -> None:
@@ -178,7 +214,8 @@ def _station(search: _Search) -> None:
     load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
     search["contraction"] = _balance(search, np.maximum(load, 0.0))
     search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
-    if any(effect.port == RIPPLE for effect in search.plant.model.effects.values()):
+    ripples = [e for e in search.plant.model.effects.values() if e.port == RIPPLE and e.law]
+    if any("angle" in signals(effect.law) for effect in ripples if effect.law):
         _settle_by_angle(search)
 
 
@@ -328,13 +365,15 @@ def at_no_load(
         vectors: parameters of each, shape (n, numbers); the plant's own if not given.
     Returns:
         State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the cable
-        does not hang slack at 0 V, a muscle finds no balance, or sensors do not rest at the truth:
-        `Plant.settle` knows those.
+        does not hang slack at 0 V, a muscle finds no balance, sensors do not rest at the truth, or
+        the regulator's command has a memory: `Plant.settle` knows those.
     """
     if plant.model.plant != "station":
         return None
     effects = plant.model.effects.values()
     if any(effect.port.startswith("sensor:") and effect.law for effect in effects):
+        return None
+    if any(effect.port == "regulator_delay" for effect in effects):
         return None
     limits, drive = (_columns(plant, vectors, effect) for effect in ("limits", "drive"))
     zero = balances(plant, pressures, np.zeros(len(pressures)), vectors)

@@ -21,9 +21,11 @@ PORTS: dict[str, Port] = {
     "cable": Port("tension of the cable (N)", least=1, most=1),
     "drive": Port("load that the drive asks for (N)", least=1, most=1),
     "drive_shape": Port("that load (N), changed by one effect after the other"),
+    "drive_delay": Port("load that the drive has heard of (N)", most=1),
     "drive_lag": Port("load that arrives at the pulley (N)", most=1),
     "drive_ripple": Port("load on top of what arrives (N), added"),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": Port("factor on the regulator's rate, multiplied"),
     "chamber": Port("rate of the pressure beside the regulator's (Pa/s), added"),
@@ -59,7 +61,8 @@ def write_equations(equations: Equations) -> None:
     rotor = eq.parameters["rotor"]
     eq.travelled = (eq["contraction"], eq["velocity"])
     _write_drive(eq)
-    eq.let("pressure_command", eq.one("regulator_line"))
+    eq.let("pressure_asked", eq.one("regulator_line"))
+    eq.let("pressure_command", eq.passed("regulator_delay", "pressure_asked"))
     eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     eq.let("stretch", rotor.radius * eq["angle"] + (eq["contraction"] - eq["zero_contraction"]))
@@ -87,9 +90,9 @@ def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
 
 def _write_drive(eq: Equations) -> None:
     """The load on its way from the command to the pulley."""
-    eq.let("load_command", eq.chain("drive_shape", "load", eq.one("drive")))
-    late = eq.at("drive_lag")
-    eq.let("load_arriving", eq.one("drive_lag") if late else eq["load_command"])
+    eq.let("load_asked", eq.chain("drive_shape", "load", eq.one("drive")))
+    eq.let("load_command", eq.passed("drive_delay", "load_asked"))
+    eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
 
 
 def _write_states(eq: Equations) -> None:
@@ -104,7 +107,7 @@ def _write_states(eq: Equations) -> None:
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / rotor.inertia, SCALES["spin"])
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
-    eq.add_memories(("muscle_force", "slide_force", "cable", "drive_lag"))
+    eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)
     eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
     for effect in (*eq.at("cable"), *eq.at("muscle_force")):

@@ -1,4 +1,4 @@
-"""Stations with an effect more, at values that are typical for it."""
+"""Stations with an effect more, at values that are typical for it, or usual."""
 
 from functools import cache
 
@@ -32,7 +32,7 @@ TYPICAL = {
 def _plant(name, values, tolerance):
     base = load_model("station")
     effect = CATALOGUE[name]
-    typical = effect.parse(TYPICAL[name])
+    typical = effect.parse(TYPICAL[name]) if name in TYPICAL else effect.usual
     given = effect.neutral if values is None else effect.changed(typical, dict(values))
     parameters = {**base.parameters, name: given}
     return Plant(Model(f"station with {name}", "", "station", parameters), tolerance)

@@ -28,6 +28,7 @@ SIGNALS = {
     "stretch_rate": (-0.1, 0.1),
     "motor_voltage": (0.0, 10.0),
     "regulator_voltage": (0.0, 10.0),
+    "pressure_asked": (0.0, 600e3),
     "pressure_command": (0.0, 600e3),
     "regulator_pace": (0.5, 2.0),
     "displacement_input": (0.0, 0.05),
@@ -38,9 +39,11 @@ SIGNALS = {
     "direction": (1.0, 1.0),
     "cable_tension": (0.0, 1000.0),
     "load": (0.0, 1000.0),
+    "load_asked": (0.0, 1000.0),
     "load_command": (0.0, 1000.0),
     "load_arriving": (0.0, 1000.0),
     "angle": (-0.1, 2.5),
+    "spin": (-4.0, 4.0),
     "regulator_time_constant": (0.01, 0.2),
 }
 """Ranges of what laws are given (SI)."""
@@ -51,8 +54,10 @@ PHENOMENA = (
     "damping_factor",
     "slide_force",
     "drive_shape",
+    "drive_delay",
     "drive_lag",
     "drive_ripple",
+    "regulator_delay",
     "regulator_pace",
     "chamber",
 )
@@ -82,20 +87,42 @@ def arguments(effect, law, rows, seed=0):
     return [
         shipped("servo" if name == "servo" else effect.name)
         if name in ("p", "servo")
-        else generator.uniform(*SIGNALS[name], rows)
+        else drawn(generator, effect, name, rows)
         for name in signals(law)
     ]
 
 
+def drawn(generator, effect, name, rows):
+    """Numbers of a signal; of a memory of several a tuple of them."""
+    if name == "memory" and effect.memories > 1:
+        return tuple(generator.uniform(*SIGNALS[name], rows) for _ in range(effect.memories))
+    return generator.uniform(*SIGNALS[name], rows)
+
+
+def flat(found):
+    """What a law returns, as one list: a number, a pair, or pairs for several memories."""
+    parts = found if isinstance(found, tuple) else (found,)
+    return [number for part in parts for number in (part if isinstance(part, tuple) else (part,))]
+
+
 def one_row(given, row):
-    return [value if isinstance(value, tuple) else float(value[row]) for value in given]
+    def number(value):
+        if isinstance(value, tuple):
+            return value if hasattr(value, "_fields") else tuple(map(number, value))
+        return float(value[row])
+
+    return [number(value) for value in given]
 
 
 def traced(law, given):
     """What the law gives for arrays once it is a graph, one row an output."""
     graph, arguments, numbers = Graph(), [], {}
     for name, value in zip(signals(law), given, strict=True):
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) and not hasattr(value, "_fields"):
+            places = [f"{name}_{i}" for i in range(len(value))]
+            arguments.append(tuple(graph.input(place, CHANGING) for place in places))
+            numbers |= dict(zip(places, value, strict=True))
+        elif isinstance(value, tuple):
             arguments.append(graph.inputs(name, value))
             for field, number in value._asdict().items():
                 row = number if isinstance(number, tuple) else ()
@@ -105,16 +132,14 @@ def traced(law, given):
             arguments.append(graph.input(name, CHANGING))
             numbers[name] = value
     found = trace(law, *arguments)
-    parts = found if isinstance(found, tuple) else (found,)
-    return evaluate([graph.value(part) for part in parts], numbers)
+    return evaluate([graph.value(part) for part in flat(found)], numbers)
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
 def test_one_text_gives_one_number(effect, law):
     given = arguments(effect, law, 64)
-    plain = [law(*one_row(given, row)) for row in range(64)]
-    together = lanes(law)(*given)
-    parts = together if isinstance(together, tuple) else (together,)
+    plain = [flat(law(*one_row(given, row))) for row in range(64)]
+    parts = flat(lanes(law)(*given))
     # Compiled code has the bits of the graph: `tests/kernels`.
     for part, found, expected in zip(
         parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True
@@ -130,10 +155,10 @@ def test_one_text_gives_one_number(effect, law):
 def test_a_law_is_finite_wherever_its_signals_go(effect, law):
     given = arguments(effect, law, 200, seed=1)
     for row in range(200):
-        out = law(*one_row(given, row))
-        assert all(math.isfinite(value) for value in (out if isinstance(out, tuple) else (out,)))
+        out = flat(law(*one_row(given, row)))
+        assert all(math.isfinite(value) for value in out)
         if law is effect.rate:
-            assert out[1] >= 0.0
+            assert all(decay >= 0.0 for decay in out[1::2])
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)

@@ -20,6 +20,7 @@ ROWS = {
 }
 SIGNALS = {
     "pressure": (0.0, 650e3),
+    "pressure_asked": (0.0, 650e3),
     "pressure_command": (0.0, 650e3),
     "contraction": (-0.02, 0.07),
     "velocity": (-0.2, 0.2),
@@ -37,9 +38,11 @@ SIGNALS = {
     "displacement_rate": (-0.5, 0.5),
     "cable_tension": (0.0, 1000.0),
     "load": (0.0, 1000.0),
+    "load_asked": (0.0, 1000.0),
     "load_command": (0.0, 1000.0),
     "load_arriving": (0.0, 1000.0),
     "angle": (-0.1, 2.5),
+    "spin": (-4.0, 4.0),
     "regulator_time_constant": (0.01, 0.2),
 }
 LAWS = {f"{e.name}.{law.__name__}": (e, law) for e in CATALOGUE.values() for law in e.laws()}
@@ -57,7 +60,7 @@ class Case:
         for argument in signals(self.law):
             arguments.append(self.argument(argument))
         found = trace(self.law, *arguments)
-        self.outputs = list(found) if isinstance(found, tuple) else [found]
+        self.outputs = flat(found)
         self.inputs = live_inputs(self.outputs)
         self.given = {value.data: self.given[value.data] for value in self.inputs}
         self.arguments = arguments
@@ -68,6 +71,10 @@ class Case:
             like = effect.parameters(**ROWS) if effect.rows else effect.start
             self.given |= self.parameters(effect, like, name)
             return self.graph.inputs(name, like, FIXED)
+        if name == "memory" and self.effect.memories > 1:
+            names = self.effect.memory_names
+            self.given |= {n: self.draw.uniform(*SIGNALS[name], self.count) for n in names}
+            return tuple(self.graph.input(n, CHANGING) for n in names)
         self.given[name] = self.draw.uniform(*SIGNALS[name], self.count)
         return self.graph.input(name, CHANGING)
 
@@ -95,8 +102,13 @@ class Case:
                 return tuple(map(number, value))
             return float(self.given[value.data][i]) if value.data in self.given else 1.0
 
-        found = self.law(*map(number, self.arguments))
-        return found if isinstance(found, tuple) else (found,)
+        return flat(self.law(*map(number, self.arguments)))
+
+
+def flat(found):
+    """What a law returns, as one list: a number, a pair, or pairs for several memories."""
+    parts = found if isinstance(found, tuple) else (found,)
+    return [number for part in parts for number in (part if isinstance(part, tuple) else (part,))]
 
 
 @pytest.fixture(scope="session", params=LAWS)

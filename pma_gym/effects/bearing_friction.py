@@ -1,0 +1,65 @@
+"""Dry friction in the bearing of the motor, before the load cell."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+
+class BearingFriction(NamedTuple):
+    """Parameters of `bearing_drag`."""
+
+    force: Annotated[
+        float,
+        Quantity("N", 0, 200, "assumption: 5 at the pulley, 0.13 N m at 25.4 mm", 0.0, usual=5),
+    ]
+    presliding: Annotated[
+        float, Quantity("deg", 0.01, 20, "assumption: 0.5 to 63 % of the force", usual=0.5)
+    ]
+
+
+def bearing_drag(memory):
+    """Load that friction takes from what arrives at the pulley.
+
+        L = -f
+
+    Args:
+        memory: friction f (N at the pulley's radius), positive against winding in.
+    Returns:
+        Load (N), added.
+    Source:
+        Dahl 1968.
+    """
+    return -memory
+
+
+def bearing_rate(spin, memory, p):
+    """Rate of the friction: f' = (force theta' - |theta'| f) / presliding.
+
+    It depends on the way alone and goes to the force in either direction. At a force of 0 it stays
+    exactly 0.
+
+    Args:
+        spin: rate of the pulley's angle theta' (rad/s).
+        memory: friction f (N).
+        p: BearingFriction: force (N), presliding (rad).
+    Returns:
+        (source, decay) with f' = source - decay * f (N/s).
+    """
+    share = 1.0 / p.presliding
+    return share * p.force * spin, share * abs(spin)
+
+
+BEARING_FRICTION = Effect(
+    name="bearing_friction",
+    port="drive_ripple",
+    parameters=BearingFriction,
+    law=bearing_drag,
+    rate=bearing_rate,
+    signature=(
+        "load cell reads less while the motor winds in than while it lets go, at the same voltage, "
+        "by the same force at every speed and load; friction at the slide shows in the position"
+    ),
+    memory_scale=10.0,
+    held=("presliding",),
+)

@@ -1,0 +1,128 @@
+"""Dead time of the commands: what comes out is what went in, a while ago."""
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.effects import CATALOGUE
+from pma_gym.effects.delay import ELEMENTS, delayed_load
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+
+DELAY_S = 0.02
+
+
+def multisine(time, mean, swing):
+    """A smooth command of up to 3 Hz."""
+    waves = [np.sin(2.0 * np.pi * f * time + p) for f, p in [(0.4, 0.0), (1.1, 1.0), (3.0, 2.0)]]
+    return mean + swing * sum(waves) / 3.0
+
+
+def test_the_ladder_is_bessels_filter():
+    first, second, third, fourth = ELEMENTS
+    # s^4 + 10 s^3 + 45 s^2 + 105 s + 105 over 105, by the determinant of the ladder.
+    product = first * second * third * fourth
+    assert 1.0 / product == pytest.approx(105.0)
+    assert second * third * fourth / product == pytest.approx(10.0)
+    assert (first * second + first * fourth + third * fourth) / product == pytest.approx(45.0)
+    assert (second + fourth) / product == pytest.approx(105.0)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_a_delayed_drive_asks_for_what_was_asked_before(station_with, share):
+    plant = station_with("drive_delay", share=share, delay_ms=1e3 * DELAY_S)
+    time = np.arange(0.0, 4.0, 0.002)
+    motor = multisine(time, 3.0, 1.5)
+    states, _ = plant.run(time, motor, np.full(len(time), plant.regulator_voltage(300e3)))
+    drive, p = (plant.model.parameters[name] for name in ("drive", "drive_delay"))
+    columns = [plant.states.index(name) for name in CATALOGUE["drive_delay"].memory_names]
+    asked = drive.gain * motor + drive.offset
+    found = np.array(
+        [delayed_load(a, tuple(m), p) for a, m in zip(asked, states[:, columns], strict=True)]
+    )
+    # The first while still knows the command at rest, which stood still.
+    late = np.interp(time - DELAY_S, time, asked)
+    expected = asked + share * (late - asked)
+    later = time > 0.2
+    error = np.abs(found - expected)[later].max() / np.ptp(asked)
+    # At 3 Hz, w = 0.38: amplitude 1 % low, a third of the swing.
+    assert error < 0.006
+    assert np.abs(found - asked)[later].max() / np.ptp(asked) > 0.1 * share
+
+
+def test_a_delayed_regulator_fills_a_while_later(station_with, station):
+    late = station_with("regulator_delay", delay_ms=1e3 * DELAY_S)
+    time = np.arange(0.0, 3.0, 0.002)
+
+    def pressures(plant):
+        line = plant.model.parameters["regulator_line"]
+        told = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
+        states, zero = plant.run(time, np.full(len(time), 1.0), told)
+        return plant.observe(states, zero)["pressure"]
+
+    plain, found = pressures(station), pressures(late)
+    expected = np.interp(time - DELAY_S, time, plain)
+    later = time > 0.5
+    assert np.abs(found - expected)[later].max() < 0.005 * np.ptp(plain)
+    assert np.abs(found - plain)[later].max() > 0.05 * np.ptp(plain)
+
+
+@pytest.mark.parametrize("name", ["drive_delay", "regulator_delay"])
+def test_a_step_arrives_late_and_never_the_wrong_way(station_with, name):
+    plant = station_with(name, delay_ms=1e3 * DELAY_S)
+    time = np.arange(0.0, 0.2, 0.0005)
+    low, high = (plant.regulator_voltage(p) for p in (300e3, 350e3))
+    ahead = time > 0.0
+    motor = np.where(ahead & (name == "drive_delay"), 3.0, 2.0)
+    regulator = np.where(ahead & (name == "regulator_delay"), high, low)
+    states, _ = plant.run(time, motor, regulator)
+    last = states[:, plant.states.index(CATALOGUE[name].memory_names[-1])]
+    share = (last - last[0]) / (last[-1] - last[0])
+    assert np.all(share > -1e-6) and share.max() < 1.01
+    assert time[np.argmax(share > 0.5)] == pytest.approx(DELAY_S, abs=0.001)
+    assert np.all(share[time < 0.2 * DELAY_S] < 0.01)
+
+
+def test_delays_begin_at_rest_and_change_no_rest(station_with, station):
+    for name in ("drive_delay", "regulator_delay"):
+        plant = station_with(name)
+        rest, plain = plant.settle(3.0, 300e3), station.settle(3.0, 300e3)
+        columns = [plant.states.index(state) for state in station.states]
+        np.testing.assert_allclose(rest.state[columns], plain.state, rtol=1e-10, atol=1e-12)
+
+
+def test_delays_are_part_of_the_linear_system(station_with, station):
+    late = station_with("drive_delay", delay_ms=1e3 * DELAY_S).linearize(300e3, 0.03)
+    plain = station.linearize(300e3, 0.03)
+    assert late.nstates == plain.nstates + 4
+    at = late.output_labels.index("extension"), late.input_labels.index("motor_voltage")
+    frequency = 2.0 * np.pi * 2.0
+    ratio = late(1j * frequency)[at] / plain(1j * frequency)[at]
+    assert np.angle(ratio) == pytest.approx(-frequency * DELAY_S, rel=1e-3)
+    assert abs(ratio) == pytest.approx(1.0, abs=0.006)
+
+
+def test_a_cascade_has_a_delayed_regulator_too():
+    plain = Plant("cascade")
+    late = Plant(
+        load_model("cascade").with_effects({"regulator_delay": {"share": 1.0, "delay_ms": 20}})
+    )
+    time = np.arange(0.0, 0.5, 0.001)
+    told = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
+
+    def half(plant):
+        states, zero = plant.run(time, np.full(len(time), 2.0), told)
+        return time[np.argmax(plant.observe(states, zero)["pressure"] > 325e3)]
+
+    assert half(late) - half(plain) == pytest.approx(0.02, abs=0.002)
+
+
+def test_a_delayed_station_is_simulated_as_a_trial(station_with):
+    plant = station_with("regulator_delay")
+    time = np.linspace(0.0, 1.0, 101)
+    commands = {
+        "motor_voltage": np.full(101, 1.0),
+        "regulator_voltage": np.where(time > 0.2, 6.0, 5.0),
+    }
+    logged = plant.simulate(Trial(time=time, commands=commands, measurements={}), noise=False)
+    assert np.ptp(logged.measurements["pressure"][time <= 0.2]) < 1.0
