@@ -48,6 +48,7 @@ NEED_PRESSURE = {
     "pressure_transducer_lag",
     "hose_resonance",
 }
+NEED_EARLY = {"warm_up"}
 """Effects that would hide from some draws of protocols, and so get some of their own."""
 
 WEAK = 0.3
@@ -172,6 +173,8 @@ def _draw_trials(
     names = [str(n) for n in g.permutation(list(PROTOCOLS)).tolist()]
     if hidden & NEED_PRESSURE:
         names.sort(key=lambda name: name != "pressure_steps")
+    if hidden & NEED_EARLY:
+        names.sort(key=lambda name: "pressure" not in name)
     names = [names[i % len(names)] for i in range(trials - 1)]
     drawn = []
     for i, name in enumerate(names):

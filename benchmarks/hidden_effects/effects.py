@@ -94,9 +94,12 @@ def _draw_friction(g: np.random.Generator, most: float) -> dict[str, float]:
 
 KINDS: dict[str, Kind] = {
     "nonlinear_stiffness": Kind(
-        lambda g, most: {"linear": _sign(g) * g.uniform(0.3, 1.0), "quadratic": g.uniform(-2, 2)},
-        ("linear", "quadratic"),
-        lambda p: muscle.BentSpring(p["linear"], p["quadratic"]),
+        lambda g, most: {
+            "curvature": _sign(g) * g.uniform(0.4, 2.0),
+            "growth": _sign(g) * g.uniform(1.0, 8.0),
+        },
+        ("curvature",),
+        lambda p: muscle.BentSpring(p["curvature"], one(p["growth"])),
         2.0,
     ),
     "passive_stretch": Kind(
@@ -175,9 +178,9 @@ KINDS: dict[str, Kind] = {
         1.2,
     ),
     "warm_up": Kind(
-        lambda g, most: {"softening_percent": _log(g, 1.0, 6.0), "trials": g.uniform(0.8, 3.0)},
-        ("softening_percent",),
-        lambda p: muscle.WarmUp(p["softening_percent"] * 1e-2, one(p["trials"])),
+        lambda g, most: {"force_at_200_kpa_n": _log(g, 5.0, 30.0), "half_life": g.uniform(0.5, 2)},
+        ("force_at_200_kpa_n",),
+        lambda p: muscle.WarmUp(p["force_at_200_kpa_n"], one(p["half_life"])),
         4.0,
     ),
     "cable_slack": Kind(

@@ -41,6 +41,8 @@ def draw_trial(
     """
     g, time = generator, np.arange(round(seconds * RATE)) / RATE
     pressure, load = PROTOCOLS[name](g, time, -7e-3 if deep else DEEPEST)
+    if deep and np.ptp(load) > 0.0:
+        load = np.maximum(load + loads_at(float(pressure.min()), -7e-3)[1] - load.max(), 70.0)
     if loose:
         # Only a pressure at which the muscle fits the rig with no load at all.
         pressure = np.minimum(pressure, 470e3)
@@ -55,15 +57,19 @@ def draw_trial(
 
 
 def _pressure(g: Generator, deep: bool = False) -> float:
-    return float(g.uniform(200e3, 320e3) if deep else g.uniform(200e3, 540e3))
+    return float(g.uniform(200e3, 245e3) if deep else g.uniform(200e3, 540e3))
 
 
 def _stairs(g: Generator, time: Array, low: float, high: float, gap: tuple[float, float]) -> Array:
-    """Random levels, each held for a while."""
-    values = np.full(time.shape, g.uniform(low, high))
+    """Random levels, a third of the range apart at least, each held for a while."""
+    level = g.uniform(low, high)
+    values = np.full(time.shape, level)
     at, end = START_S, time[-1] - HOLD_S
     while at < end:
-        values[time >= at] = g.uniform(low, high)
+        before = level
+        while abs(level - before) < (high - low) / 3.0:
+            level = g.uniform(low, high)
+        values[time >= at] = level
         at += g.uniform(*gap)
     return values
 

@@ -132,7 +132,7 @@ def scale_to(
     kind, found = ALL[name], dict(known)
     readings = ruler.base
     size = 1.0
-    for _ in range(4):
+    for _ in range(8):
         size = _interpolated(found, target, kind.most)
         lane = (rig, {name: kind.at(typical, size)})
         readings = simulate_variants(experiment.commands, [lane])[0]
@@ -145,7 +145,7 @@ def scale_to(
 def _interpolated(found: Mapping[float, float], target: float, most: float) -> float:
     """Where a ratio crosses the target, linear in the logarithms; a line beyond what is known."""
     sizes = np.array(sorted(found))
-    ratios = np.maximum.accumulate([max(found[size], 1e-9) for size in sizes])
+    ratios = np.maximum.accumulate([max(found[size], 0.02 * target) for size in sizes])
     above = np.flatnonzero(ratios >= target)
     if above.size == 0:
         return most if sizes[-1] >= 0.99 * most else min(most, sizes[-1] * target / ratios[-1])

@@ -4,26 +4,30 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from benchmarks.hidden_effects.physics.effect import Hidden, Moment
-from benchmarks.hidden_effects.physics.rig import Array, stiffness
+from benchmarks.hidden_effects.physics.rig import Array
 
 LENGTH = 0.25
 """Resting length (m)."""
 
 
 class BentSpring(Hidden):
-    """The spring stiffens or softens with contraction."""
+    """A spring that stiffens or softens exponentially as the muscle contracts.
+
+    F = -REFERENCE L0 curvature (exp(growth u) - 1 - growth u) / growth^2,   u = x / L0
+    """
 
     static = True
+    REFERENCE = 20e3
 
-    def __init__(self, first: Array, second: Array) -> None:
-        """Take relative change of the stiffness by share of length, and by its square."""
-        self.first, self.second = first, second
+    def __init__(self, curvature: Array, growth: float) -> None:
+        """Take curvatures of all lanes, and by how much they grow over a length."""
+        self.curvature, self.growth = curvature, growth
 
     def force(self, moment: Moment) -> Array:
         """Force beside the straight spring's."""
-        share = moment.contraction / LENGTH
-        straight = stiffness(moment.pressure, moment.rig) * moment.contraction
-        return -straight * share * (self.first + self.second * share)
+        grown = self.growth * moment.contraction / LENGTH
+        bent = (np.expm1(grown) - grown) / self.growth**2
+        return -self.REFERENCE * LENGTH * self.curvature * bent
 
 
 class Overstretch(Hidden):
@@ -79,15 +83,16 @@ class Dashpots(Hidden):
 
 
 class WarmUp(Hidden):
-    """A cold muscle is softer by a share, which fades with every trial."""
+    """A rested muscle pulls harder, the more the lower the pressure; it halves with the trials."""
 
     static = True
+    REFERENCE, POWER = 200e3, -3.0
 
-    def __init__(self, share: Array, trials: float) -> None:
-        """Take shares of all lanes, and trials after which 1/e is left."""
-        self.share, self.trials = share, trials
+    def __init__(self, force: Array, half_life: float) -> None:
+        """Take forces (N) at 200 kPa in the first trial of all lanes, and trials to half of it."""
+        self.first, self.half_life = force, half_life
 
     def force(self, moment: Moment) -> Array:
-        """What the spring lacks."""
-        left = self.share * np.exp(-moment.order / self.trials)
-        return left * stiffness(moment.pressure, moment.rig) * moment.contraction
+        """What is left of it."""
+        left = self.first * 0.5 ** (moment.order / self.half_life)
+        return left * (moment.pressure / self.REFERENCE) ** self.POWER
