@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from llvmlite import ir
 
+from pma_gym.effects.own import source_of
 from pma_gym.kernels.control import (
     DOUBLE,
     INTEGER,
@@ -81,7 +82,10 @@ def parameter_names(model: Model) -> list[str]:
 
 def structure(model: Model) -> list[str]:
     """What a model's compiled functions depend on, beside this package's text."""
-    return [model.plant, *(f"{name} {lengths}" for name, lengths in model.lengths().items())]
+    return [
+        model.plant,
+        *(f"{name} {lengths} {source_of(name)}" for name, lengths in model.lengths().items()),
+    ]
 
 
 class Program:

@@ -28,8 +28,8 @@ def muscle_force(model: Model) -> Callable[[np.ndarray, np.ndarray], np.ndarray]
             laws.append((lanes(effect.law), names, model.parameters[effect.name]))
 
     def force(pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
-        known = {"pressure": pressure, "contraction": contraction}
         total = np.zeros(np.broadcast(pressure, contraction).shape)
+        known = {"pressure": pressure, "contraction": contraction, "velocity": 0.0 * total}
         for law, names, parameters in laws:
             total = total + law(*(parameters if n == "p" else known[n] for n in names))
         return total
