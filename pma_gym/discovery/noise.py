@@ -31,6 +31,9 @@ LEAST_REST = 12
 ENOUGH = 120
 """Fewest readings at rest, over all trials, from which a noise level is taken."""
 
+SLOW_S = (0.06, 0.15)
+"""Lags (s) over which a residual still resembles itself only where the model is wrong."""
+
 MOST_ORDER = 6
 """Highest order of an autoregression."""
 
@@ -161,3 +164,20 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
     miss = np.abs(whole - np.round(whole))
     # Readings in files are rounded to some digits: a hundredth of a step may be lost.
     return step if len(gaps) and float(np.max(miss)) < 0.05 and span / step < 2e4 else 0.0
+
+
+def slow_part(parts: Sequence[Array], rate_hz: float) -> float:
+    """Mean square of what is slow in a residual (SI squared), whatever its noise.
+
+    The autocovariance over `SLOW_S`: sensors' noise has forgotten itself by then, and what a wrong
+    model leaves has not.
+    """
+    first, last = (max(1, round(lag * rate_hz)) for lag in SLOW_S)
+    sums, count = 0.0, 0
+    for part in parts:
+        for lag in range(first, last + 1):
+            if lag < len(part):
+                both = part[: len(part) - lag] * part[lag:]
+                sums += float(np.nansum(both))
+                count += int(np.isfinite(both).sum())
+    return max(0.0, sums / count) if count else 0.0

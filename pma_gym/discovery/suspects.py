@@ -37,10 +37,15 @@ STAND_INS = frozenset(
         "symmetric_damping",
         "repperger_damping",
         "operator",
+        "residual_force_of_contraction",
+        "residual_force_of_velocity",
+        "residual_force_of_pressure",
+        "residual_load",
     }
 )
 """Laws that stand in place of another, not beside it: a whole muscle's force or damping (compare
-such models as models), and the operator's hand, which no experiment without one has."""
+such models as models), the operator's hand, which no experiment without one has, and the laws
+without a shape of their own (`residual_law`)."""
 
 SCALES = (0.3, 1.0, 3.0)
 """How many times its usual value an amplitude is probed at."""
@@ -48,7 +53,7 @@ SCALES = (0.3, 1.0, 3.0)
 SHAPES = (0.4, 1.0, 2.5)
 """The same for what gives an effect its shape."""
 
-THRESHOLDS = tuple(1.12**k for k in range(-7, 8))
+THRESHOLDS = tuple(1.13**k for k in range(-16, 9))
 """The same for a limit, which does nothing until it is reached."""
 
 FAR = 20.0
@@ -57,7 +62,7 @@ FAR = 20.0
 DELAYS = (0.15, 0.4, 1.0, 2.5)
 """How many times its usual value a time is probed at, of an effect that has no other size."""
 
-PERIODS = tuple(range(2, 61, 2))
+PERIODS = tuple(range(3, 61, 3))
 """Periods a turn at which a ripple is looked for: a trial of a quarter turn tells no finer."""
 
 SLOWER = (0.5, 0.2, 0.08, 0.03)

@@ -35,6 +35,12 @@ from pma_gym.effects.regulator_asymmetry import REGULATOR_ASYMMETRY
 from pma_gym.effects.regulator_deadband import REGULATOR_DEADBAND
 from pma_gym.effects.regulator_rate_limit import REGULATOR_RATE_LIMIT
 from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
+from pma_gym.effects.residual_law import (
+    RESIDUAL_FORCE_OF_CONTRACTION,
+    RESIDUAL_FORCE_OF_PRESSURE,
+    RESIDUAL_FORCE_OF_VELOCITY,
+    RESIDUAL_LOAD,
+)
 from pma_gym.effects.rotor import ROTOR
 from pma_gym.effects.sarosi import SAROSI_FORCE
 from pma_gym.effects.sensor_errors import (
@@ -76,11 +82,15 @@ CATALOGUE: dict[str, Effect] = {
         HYSTERESIS,
         COULOMB_FRICTION,
         OPERATOR,
+        RESIDUAL_FORCE_OF_CONTRACTION,
+        RESIDUAL_FORCE_OF_VELOCITY,
+        RESIDUAL_FORCE_OF_PRESSURE,
         CABLE,
         DRIVE,
         DRIVE_DEAD_ZONE,
         DRIVE_SATURATION,
         DRIVE_DELAY,
+        RESIDUAL_LOAD,
         DRIVE_LAG,
         TORQUE_RIPPLE,
         BEARING_FRICTION,

@@ -1,0 +1,125 @@
+"""Curves and gaps of every trial, at the door of the report."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.diagnosis import Floor, Gap, TrialRecord
+from pma_gym.discovery.evidence import FREE_ZEROS
+from pma_gym.discovery.parameters import values
+from pma_gym.plant.logged import Logged
+from pma_gym.plant.plant import OUTPUTS
+from pma_gym.units import SI_FACTORS
+
+if TYPE_CHECKING:
+    from pma_gym.discovery.answer import Findings
+
+Array = NDArray[np.float64]
+
+
+def trial_records(found: "Findings") -> tuple[TrialRecord, ...]:
+    """Every trial as measured, and as three models have it."""
+    bench, selection = found.bench, found.selection
+    evidence = bench.evidence(found.given)
+    before = evidence.readings(values(found.given, bench.own.free))
+    refitted = evidence.readings(found.refitted.values)
+    unseen = found.unseen
+    after = (
+        unseen.readings
+        if unseen is not None
+        else selection.bench.evidence(selection.fit.model, selection.chosen).readings(
+            selection.fit.values
+        )
+    )
+    assert refitted is not None and after is not None
+    records = []
+    for i, (each, logged) in enumerate(zip(found.named, evidence.logged, strict=True)):
+        measured = np.where(_there(logged), logged.measured, np.nan)
+        # A model that cannot be simulated as it was given says nothing.
+        started = refitted[i] if before is None else before[i]
+        curves = [_zeroed(held, measured) for held in (started, refitted[i], after[i])]
+        gaps = {}
+        for channel, name in enumerate(OUTPUTS):
+            if not logged.measures[channel]:
+                continue
+            column = BY_QUANTITY[name]
+            factor = SI_FACTORS[column.unit]
+            off = [_rms(curve[channel] - measured[channel]) / factor for curve in curves]
+            floor = found.floors[channel].level / factor
+            gaps[column.name] = Gap(*off, floor, unseen is not None)
+        records.append(
+            TrialRecord(
+                each.name,
+                each.trial.time,
+                measured.T,
+                *(curve.T for curve in curves),
+                gaps,
+                unseen is not None,
+            )
+        )
+    return tuple(records)
+
+
+def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
+    """Gaps over all trials, by signal at the door."""
+    found: dict[str, Gap] = {}
+    for column in (BY_QUANTITY[name] for name in OUTPUTS):
+        parts = [
+            (record.gaps[column.name], len(record.time))
+            for record in records
+            if column.name in record.gaps
+        ]
+        if not parts:
+            continue
+        weights = np.array([rows for _, rows in parts], float)
+        squares = np.array([[g.before, g.parameters, g.after] for g, _ in parts]) ** 2
+        before, parameters, after = np.sqrt(weights @ squares / weights.sum())
+        found[column.name] = Gap(
+            float(before), float(parameters), float(after), parts[0][0].floor, parts[0][0].held_out
+        )
+    return found
+
+
+def floors_at_the_door(found: "Findings") -> dict[str, Floor]:
+    """Noise of the signals that were measured."""
+    floors = {}
+    for channel, name in enumerate(OUTPUTS):
+        if not any(each.measures[channel] for each in found.bench.evidence(found.given).logged):
+            continue
+        column, level = BY_QUANTITY[name], found.floors[channel]
+        factor = SI_FACTORS[column.unit]
+        learnt = found.selection.bench.noise[channel]
+        sources = {source: value / factor for source, value in level.by_source.items()}
+        sources["autoregression"] = learnt.innovation / factor
+        floors[column.name] = Floor(
+            level.level / factor,
+            level.source,
+            sources,
+            level.step / factor,
+            learnt.coefficients,
+        )
+    return floors
+
+
+def _there(logged: Logged) -> NDArray[np.bool_]:
+    there = np.ones(logged.measured.shape, bool)
+    for channel, missing in enumerate(logged.missing):
+        there[channel, missing] = False
+    return there
+
+
+def _zeroed(held: Array, measured: Array) -> Array:
+    """A curve with the zeros that are free put where they fit best."""
+    curve = held.copy()
+    for channel, name in enumerate(OUTPUTS):
+        off = measured[channel] - held[channel]
+        if name in FREE_ZEROS and np.isfinite(off).any():
+            curve[channel] += np.nanmean(off)
+    return curve
+
+
+def _rms(off: Array) -> float:
+    return float(np.sqrt(np.nanmean(off**2)))

@@ -1,0 +1,215 @@
+"""The diagnosis from trials to answer, step by step; each step is a module of its own."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.discovery.answer import Findings, answer
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.floors import initial_floors
+from pma_gym.discovery.held_out import unseen
+from pma_gym.discovery.journal import Journal
+from pma_gym.discovery.noise import white_noise
+from pma_gym.discovery.parameters import own_parameters
+from pma_gym.discovery.rivals import rivals
+from pma_gym.discovery.selection import Selection, relearnt, select
+from pma_gym.discovery.suspects import suspects
+from pma_gym.plant.logged import Logged
+from pma_gym.plant.model import Model, ModelError, load_model
+
+Progress = Callable[[str, int, int], None]
+
+DEFAULT_MODEL = "serres2008"
+
+
+def diagnose(
+    trials: Sequence[Trial] | Dataset,
+    model: Model | str | Path | None = None,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    journal: Path | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Find what a model misses in measured trials.
+
+    The same trials, model and seed give the same answer, whatever the number of jobs.
+
+    Args:
+        trials: measured trials, or a data set (`pma_gym.data.dataset.read_dataset`).
+        model: the model to compare with; what the data set names, else serres2008.
+        seed: of simulated chance.
+        jobs: how many threads simulate.
+        journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
+            on; None keeps nothing.
+        progress: called with a step's name, what is done of it and its total.
+    Returns:
+        The diagnosis; its amended model goes into `gym.make(..., model=...)`, into the benchmark,
+        and into another diagnosis.
+    Raises:
+        TrialError: trials that cannot be used.
+        ModelError: a model that cannot be used.
+
+    Example:
+        >>> from pma_gym import Plant, Trial
+        >>> import numpy as np
+        >>> time = np.arange(0.0, 4.0, 1 / 64)
+        >>> volts = 1.0 + np.clip(time - 0.5, 0.0, 2.0)
+        >>> asked = Trial(time, {"motor_voltage": volts, "regulator_voltage": 0 * time + 6.0})
+        >>> diagnose([Plant("serres2008").simulate(asked)], "serres2008").verdict
+        'agrees'
+    """
+    return _Work(trials, model, seed, jobs, journal, progress).run(search=True)
+
+
+def refit(
+    trials: Sequence[Trial] | Dataset,
+    model: Model | str | Path | None = None,
+    *,
+    seed: int = 0,
+    jobs: int = 1,
+    journal: Path | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Refit a model's own parameters to measured trials, without looking for what it misses.
+
+    Arguments and errors as `diagnose`; the verdict is `parameters` or `agrees`.
+    """
+    return _Work(trials, model, seed, jobs, journal, progress).run(search=False)
+
+
+@dataclass
+class _Work:
+    """One diagnosis on its way."""
+
+    asked: Sequence[Trial] | Dataset
+    wanted: Model | str | Path | None
+    seed: int
+    jobs: int
+    folder: Path | None
+    watcher: Progress | None
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    def run(self, search: bool) -> Diagnosis:
+        named, given = self._input()
+        trials = [each.trial for each in named]
+        journal = Journal(self.folder, trials, given, f"diagnosis 1 seed {self.seed}")
+        logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
+        floors = self._timed("noise", lambda: initial_floors(given, logged, named))
+        own = own_parameters(given)
+        _check_size(logged, own.free)
+        noise = tuple(white_noise(floor.level) for floor in floors)
+        bench = Bench(trials, given, own, noise, max(1, self.jobs))
+        self._tell("refitting parameters", 0, 1)
+        refitted = self._timed("parameters", lambda: self._refitted(bench, journal))
+        orders = [each.order for each in named]
+        known = None if None in orders else [float(order or 0.0) for order in orders]
+        every = suspects(given, known) if search else []
+        selection = self._timed(
+            "selection",
+            lambda: (
+                select(bench, refitted, every, self.seed, journal, self._tell)
+                if search
+                else _nothing(bench, refitted)
+            ),
+        )
+        found = Findings(
+            named=tuple(named),
+            given=given,
+            floors=floors,
+            bench=bench,
+            refitted=refitted,
+            selection=selection,
+            suspects=tuple(every),
+            searched=search,
+            seed=self.seed,
+        )
+        found = self._timed("confirmation", lambda: self._confirmed(found))
+        diagnosis = self._timed("report", lambda: answer(found, self._tell))
+        return replace(diagnosis, seconds=dict(self.seconds))
+
+    def _input(self) -> tuple[list[NamedTrial], Model]:
+        if isinstance(self.asked, Dataset):
+            named, source = list(self.asked.trials), self.asked.model
+        else:
+            named = [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(self.asked)]
+            source = None
+        if not named:
+            raise TrialError("a diagnosis needs at least one trial; give measured trials")
+        model = load_model(self.wanted or source or DEFAULT_MODEL)
+        if model.plant != "station":
+            raise ModelError(
+                f"model {model.name} is a {model.plant}; a diagnosis needs a station, the balance "
+                "of forces that effects act on; give serres2008, station or one made of them"
+            )
+        return named, model
+
+    def _refitted(self, bench: Bench, journal: Journal) -> Fitted:
+        found = bench.fit(bench.given)
+        if found is None:
+            raise ModelError(
+                f"model {bench.given.name} cannot be simulated on these trials: its muscle does "
+                "not balance the load where one begins, or it runs away; check the units of the "
+                "commands and the model's drive and force"
+            )
+        return found
+
+    def _confirmed(self, found: Findings) -> Findings:
+        """With rivals of each effect, and how it fares on trials that it was not fitted to."""
+        selection = found.selection
+        nearest = [
+            tuple(
+                rivals(
+                    selection.bench,
+                    selection.fit,
+                    selection.chosen,
+                    selection.stages[min(place, len(selection.stages) - 1)],
+                    place,
+                    found.suspects,
+                )
+            )
+            for place in range(len(selection.chosen))
+        ]
+        left_out = unseen(
+            selection.bench,
+            selection.fit,
+            selection.chosen,
+            lambda done, total: self._tell("trials left out", done, total),
+        )
+        without = (
+            unseen(selection.bench, found.refitted, ())
+            if selection.chosen and left_out is not None
+            else left_out
+        )
+        return replace(found, rivals=tuple(nearest), unseen=left_out, unseen_without=without)
+
+    def _timed(self, step: str, work: Callable):  # noqa: ANN202
+        begun = time.perf_counter()
+        done = work()
+        self.seconds[step] = time.perf_counter() - begun
+        return done
+
+    def _tell(self, step: str, done: int, total: int) -> None:
+        if self.watcher is not None:
+            self.watcher(step, done, total)
+
+
+def _nothing(bench: Bench, refitted: Fitted) -> Selection:
+    """A selection from no suspects."""
+    noise = relearnt(bench, refitted, ())
+    return Selection((), (), refitted, replace(bench, noise=noise))
+
+
+def _check_size(logged: Sequence[Logged], free: Sequence[str]) -> None:
+    count = sum(each.count for each in logged)
+    if count < 2 * len(free):
+        raise TrialError(
+            f"the trials have {count} readings for {len(free)} parameters of the model; measure "
+            "more, or faster: a diagnosis needs at least twice as many, and tells little below "
+            "some hundreds"
+        )

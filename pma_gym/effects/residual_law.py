@@ -1,0 +1,126 @@
+"""Laws without a shape of their own: straight lines between nine heights.
+
+No phenomenon, but what a diagnosis draws where none of the catalogue fits: how much force, or load,
+is missing by contraction, speed, pressure or load. A model may carry one, so that it can be
+simulated with what nobody has named yet.
+"""
+
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
+
+from pma_gym.effects.arithmetic import clip
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+HEIGHTS = 9
+"""Heights of a law, equally far from each other."""
+
+_HEIGHT = Quantity("N", -500, 500, "fitted, whatever it is", 0.0, usual=5.0)
+
+
+def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[float, float]) -> Any:  # noqa: ANN401
+    """A NamedTuple of two ends and the heights."""
+    ends = {
+        "first": Quantity(unit, least, most, "where the data begin", usual=usual[0]),
+        "last": Quantity(unit, least, most, "where the data end", usual=usual[1]),
+    }
+    fields = ends | {f"h{k}": _HEIGHT for k in range(HEIGHTS)}
+    return NamedTuple(name, [(stem, Annotated[float, each]) for stem, each in fields.items()])
+
+
+ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 60))
+ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -2000, 2000, (-50, 50))
+ForceOfPressure = _parameters("ForceOfPressure", "kPa", -100, 2000, (150, 575))
+LoadOfLoad = _parameters("LoadOfLoad", "N", -100, 5000, (0, 1000))
+
+
+def between_heights(value, p):
+    """Height at a value, on straight lines between heights; constant beyond the ends.
+
+    Args:
+        value: where, in the unit of the ends (SI).
+        p: first, last: ends; h0 ... h8: heights.
+    Returns:
+        Height, in the unit of the heights (SI).
+    """
+    place = (value - p.first) * (8.0 / (p.last - p.first))
+    heights = (p.h0, p.h1, p.h2, p.h3, p.h4, p.h5, p.h6, p.h7, p.h8)
+    height = heights[0]
+    for k in range(len(heights) - 1):
+        height = height + clip(place - k, 0.0, 1.0) * (heights[k + 1] - heights[k])
+    return height
+
+
+def force_of_contraction(contraction, p):
+    """Force on the slide by contraction (N), positive shortens the muscle.
+
+    Args:
+        contraction: shortening x from the resting length (m).
+        p: ForceOfContraction.
+    Returns:
+        Force (N).
+    Source:
+        None: fitted.
+    """
+    return between_heights(contraction, p)
+
+
+def force_of_velocity(velocity, p):
+    """Force on the slide by speed (N), positive shortens the muscle.
+
+    Args:
+        velocity: rate of contraction x' (m/s).
+        p: ForceOfVelocity.
+    Returns:
+        Force (N).
+    Source:
+        None: fitted.
+    """
+    return between_heights(velocity, p)
+
+
+def force_of_pressure(pressure, p):
+    """Force on the slide by pressure (N), positive shortens the muscle.
+
+    Args:
+        pressure: gauge pressure P (Pa).
+        p: ForceOfPressure.
+    Returns:
+        Force (N).
+    Source:
+        None: fitted.
+    """
+    return between_heights(pressure, p)
+
+
+def load_of_load(load, p):
+    """Load that the drive asks for, more or less by what is missing.
+
+    Args:
+        load: load that it would ask for (N).
+        p: LoadOfLoad.
+    Returns:
+        Load (N).
+    Source:
+        None: fitted.
+    """
+    return load + between_heights(load, p)
+
+
+_SIGNATURE = "none of its own; drawn by a diagnosis where no other effect fits"
+
+
+def _effect(name: str, port: str, parameters: type, law: Callable) -> Effect:
+    return Effect(name, port, parameters, law, signature=_SIGNATURE, held=("first", "last"))
+
+
+RESIDUAL_FORCE_OF_CONTRACTION = _effect(
+    "residual_force_of_contraction", "muscle_force", ForceOfContraction, force_of_contraction
+)
+RESIDUAL_FORCE_OF_VELOCITY = _effect(
+    "residual_force_of_velocity", "slide_force", ForceOfVelocity, force_of_velocity
+)
+RESIDUAL_FORCE_OF_PRESSURE = _effect(
+    "residual_force_of_pressure", "muscle_force", ForceOfPressure, force_of_pressure
+)
+RESIDUAL_LOAD = _effect("residual_load", "drive_shape", LoadOfLoad, load_of_load)
