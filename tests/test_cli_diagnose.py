@@ -101,8 +101,8 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
         "Misfit:     load 5 N as given, 0.6 refitted, 0.6 proposed (held out), noise 0.5; "
         "98 % of the gap closed",
         "Now:        Use the refitted model, model.toml; no new effect is needed.",
-        "Now:        Check on the rig why drive.gain_n_per_v differs.",
-        "Now:        Run next.csv on the rig (staircase; 1.5 min), save its log into the data set "
+        "            Check on the rig why drive.gain_n_per_v differs.",
+        "            Run next.csv on the rig (staircase; 90 s), save its log into the data set "
         "under a name of its own, and diagnose again.",
         "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, model.toml",
     ]

@@ -64,21 +64,22 @@ def diagnose(
     _check_apart(results, dataset)
     results.check(force, resume)
     trials, given = _inputs(dataset, model, effect)
-    results.open(resume)
     from pma_gym import discovery
     from pma_gym.discovery.report import report_page
 
-    arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
-    found = _run(discovery.diagnose, trials, given, results, arguments, "--resume")
-    origin = _origin(dataset, trials, seed)
-    files = {
-        "diagnosis.json": found.text().encode(),
-        "model.toml": dump_model(found.model).encode(),
-        "report.html": report_page(found, trials.title, origin).encode(),
-    }
-    if found.next_experiment:
-        files["next.csv"] = encode_trial(found.next_experiment.trial, "next.csv")
-    results.write(files)
+    with results.opened(resume):
+        arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
+        found = _run(discovery.diagnose, trials, given, results, arguments)
+        files = {
+            "diagnosis.json": found.text().encode(),
+            "model.toml": dump_model(found.model).encode(),
+            "report.html": report_page(
+                found, trials.title, _origin(dataset, trials, seed)
+            ).encode(),
+        }
+        if found.next_experiment:
+            files["next.csv"] = encode_trial(found.next_experiment.trial, "next.csv")
+        results.write(files)
     from pma_gym.discovery.summary import diagnosis_summary
 
     print(diagnosis_summary(found))
@@ -99,18 +100,18 @@ def fit(
     _check_apart(results, dataset)
     results.check(force)
     trials, given = _inputs(dataset, model, effect)
-    results.open()
     from pma_gym import discovery
 
-    found = _run(discovery.refit, trials, given, results, {"seed": seed, "jobs": jobs}, "")
-    document = found.document()
-    kept = {key: document[key] for key in _FITTED}
-    results.write(
-        {
-            "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
-            "model.toml": dump_model(found.model).encode(),
-        }
-    )
+    with results.opened():
+        found = _run(discovery.refit, trials, given, results, {"seed": seed, "jobs": jobs})
+        document = found.document()
+        kept = {key: document[key] for key in _FITTED}
+        results.write(
+            {
+                "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
+                "model.toml": dump_model(found.model).encode(),
+            }
+        )
     from pma_gym.discovery.summary import print_fit
 
     print_fit(found)
@@ -148,21 +149,16 @@ def _run(
     model: Model,
     results: Results,
     arguments: dict[str, Any],
-    resume: str,
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
         with StepProgress() as progress:
             return function(trials, model, progress=progress, **arguments)
     except KeyboardInterrupt:
-        kept = resume and results.journal.is_dir()
-        results.leave()
-        how = f"the same command with {resume} goes on" if kept else "nothing was finished yet"
+        kept = results.journal.is_dir()
+        how = "the same command with --resume goes on" if kept else "nothing was finished yet"
         say(f"interrupted; {how}")
         raise typer.Exit(INTERRUPTED) from None
-    except BaseException:
-        results.leave()
-        raise
 
 
 def _origin(folder: Path, trials: Dataset, seed: int) -> dict[str, str]:

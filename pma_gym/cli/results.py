@@ -1,6 +1,7 @@
 """The folder that a diagnosis or a fit writes: nothing older is lost, nothing is half there."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -55,9 +56,12 @@ class Results:
                 "anew"
             )
 
-    def open(self, resume: bool = False) -> None:
-        """Make the folder, if files can be written there; drop an old journal unless wanted.
+    @contextmanager
+    def opened(self, resume: bool = False) -> Iterator[None]:
+        """The folder, made and writable; if the run fails and nothing came into it, it goes.
 
+        Args:
+            resume: keep what an interrupted run left.
         Raises:
             OutputError: the folder cannot be made or written to.
         """
@@ -65,15 +69,16 @@ class Results:
             self.folder.mkdir(exist_ok=True)
         except OSError as error:
             raise OutputError(f"cannot make the folder {self.folder}: {error.strerror}") from None
-        for name in self.names:
-            check_output(self.folder / name)
-        if not resume:
-            self._drop_journal()
-
-    def leave(self) -> None:
-        """Remove the folder if nothing came into it."""
-        if self.folder.is_dir() and not any(self.folder.iterdir()):
-            self.folder.rmdir()
+        try:
+            for name in self.names:
+                check_output(self.folder / name)
+            if not resume:
+                self._drop_journal()
+            yield
+        except BaseException:
+            if not any(self.folder.iterdir()):
+                self.folder.rmdir()
+            raise
 
     def write(self, files: Mapping[str, bytes]) -> None:
         """Write all files, each whole; those of an older result that have no successor go."""

@@ -18,6 +18,9 @@ BEFORE, PARAMETERS, AFTER = "#D55E00", "#0072B2", "#009E73"
 MEASURED = {"color": "#666666", "linewidth": 2.6, "alpha": 0.6}
 FLOOR = {"color": "#000000", "linestyle": (0, (4, 2)), "linewidth": 1.2}
 _MOST_TRIALS = 30
+_MOST_TICKS = 6
+_LOGARITHMIC = 6.0
+"""Misfit before over misfit after from which bars need a logarithmic scale."""
 
 
 def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
@@ -27,6 +30,7 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
         gaps: by signal at the door.
         names: what to call the three.
     """
+    shares = [gap.before / max(gap.after, gap.floor, 1e-12) for gap in gaps.values()]
     with picture(2.6 * max(len(gaps), 2), 3.1) as drawn:
         panels = np.atleast_1d(np.array(drawn.subplots(1, len(gaps)), dtype=object))
         for panel, (signal, gap) in zip(panels, gaps.items(), strict=True):
@@ -36,7 +40,10 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
             panel.axhline(gap.floor, **FLOOR)
             panel.set_title(signal_name(signal))
             panel.set_ylabel(f"misfit, rms ({signal_unit(signal)})")
-            panel.set_ylim(0.0, 1.15 * max(*values, gap.floor))
+            if max(shares) > _LOGARITHMIC:
+                _logarithmic(panel, [*values, gap.floor])
+            else:
+                panel.set_ylim(0.0, 1.15 * max(*values, gap.floor))
             panel.grid(visible=False, axis="x")
         line = Line2D([], [], label="noise of the measurement", **FLOOR)  # type: ignore[arg-type]
         legend_below(drawn, [line], 1)
@@ -62,23 +69,33 @@ def trials_picture(diagnosis: Diagnosis) -> bytes:
             panel.set_xlabel("misfit / noise")
             low, high = panel.get_xlim()
             panel.set_xlim(min(low, 0.5), max(high, 4.0))
-            _plain_ticks(panel)
+            low, high = panel.get_xlim()
+            panel.set_xticks(*_plain_ticks(low, high))
+            panel.xaxis.set_minor_locator(NullLocator())
         panels[0].set_yticks(range(len(records)), [each.name for each in records])
         panels[0].set_ylim(-0.6, len(records) - 0.4)
         legend_below(drawn, _handles(diagnosis), 4)
         return png(drawn)
 
 
-def _plain_ticks(panel: Axes) -> None:
-    """1, 10, 100 on a logarithmic axis, and 2 and 5 between them where there is room."""
-    low, high = panel.get_xlim()
-    decades = 10.0 ** np.arange(-3, 6)
-    ticks = np.outer(decades, (1.0, 2.0, 5.0)).ravel()
-    ticks = ticks[(ticks >= low) & (ticks <= high)]
-    if ticks.size > 5:
-        ticks = decades[(decades >= low) & (decades <= high)]
-    panel.set_xticks(ticks, [f"{tick:g}" for tick in ticks])
-    panel.xaxis.set_minor_locator(NullLocator())
+def _logarithmic(panel: Axes, values: Sequence[float]) -> None:
+    """Bars whose lengths count factors, from half the smallest value on."""
+    smallest = min((value for value in values if value > 0.0), default=1.0)
+    low, high = 0.5 * smallest, 1.6 * max(*values, smallest)
+    panel.set_yscale("log")
+    panel.set_ylim(low, high)
+    panel.set_yticks(*_plain_ticks(low, high))
+    panel.yaxis.set_minor_locator(NullLocator())
+
+
+def _plain_ticks(low: float, high: float) -> tuple[list[float], list[str]]:
+    """1, 10, 100 for a logarithmic axis, and 2 and 5 between them where there is room."""
+    decades = 10.0 ** np.arange(-6, 7)
+    for each in (np.outer(decades, (1.0, 2.0, 5.0)).ravel(), decades):
+        ticks = [float(tick) for tick in each if low <= tick <= high]
+        if len(ticks) <= _MOST_TICKS:
+            break
+    return ticks, [f"{tick:g}" for tick in ticks]
 
 
 def _excess(gap: Gap) -> float:

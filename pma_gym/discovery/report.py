@@ -22,12 +22,16 @@ from pma_gym.discovery.report_tables import (
 )
 from pma_gym.discovery.words import (
     VERDICTS,
+    capitalised,
     chance,
+    duration,
     effect_equation,
     effect_name,
     effect_names,
     effect_summary,
+    effect_symbols,
     odds,
+    readable,
     what_to_do,
 )
 from pma_gym.effects import CATALOGUE
@@ -63,7 +67,10 @@ def report_blocks(diagnosis: Diagnosis, title: str, origin: Mapping[str, str]) -
     """The whole page."""
     heading = f"{VERDICTS[diagnosis.verdict]}{': ' if title else ''}{title}"
     tone = _TONES.get(diagnosis.verdict, "open")
-    blocks: list[Block] = [Heading(heading, 1), Callout(diagnosis.sentence, tone=tone)]
+    blocks: list[Block] = [
+        Heading(heading, 1),
+        Callout(readable(diagnosis.sentence, diagnosis), tone=tone),
+    ]
     blocks += [Paragraph(f"**Note:** {warning}") for warning in diagnosis.warnings]
     blocks += [Heading("What to do now"), Steps(what_to_do(diagnosis))]
     blocks += _where_blocks(diagnosis)
@@ -151,7 +158,8 @@ def _effect_blocks(effect: NamedEffect) -> list[Block]:
     blocks: list[Block] = [Heading(f"The effect: {name}"), Paragraph(" ".join(filter(None, words)))]
     equation = effect_equation(effect.name)
     if equation:
-        blocks.append(Formula(equation))
+        symbols = effect_symbols(effect.name)
+        blocks.append(Formula(f"{equation}\n\n{symbols}".strip()))
     if effect.parameters:
         blocks.append(effect_table(effect))
     return blocks
@@ -194,7 +202,7 @@ def _next_blocks(diagnosis: Diagnosis) -> list[Block]:
     following = diagnosis.next_experiment
     if following is None:
         return []
-    text = f"{following.protocol}."
+    text = f"{capitalised(following.protocol)}."
     if len(following.separates) > 1:
         text += (
             f" It tells {effect_names(following.separates)} apart: expected odds "
@@ -205,5 +213,5 @@ def _next_blocks(diagnosis: Diagnosis) -> list[Block]:
             f" It shows whether {effect_name(following.separates[0])} is there: expected odds "
             f"{odds(following.expected_odds)}."
         )
-    text += f" It takes {following.minutes:.2g} min; the commands are in `next.csv`."
+    text += f" It takes {duration(following.minutes)}; the commands are in `next.csv`."
     return [Heading("The next experiment"), Paragraph(text), Picture("next", "Its commands.")]

@@ -9,7 +9,7 @@ from pma_gym.discovery.report_tables import (
     moved_table,
     unknown_table,
 )
-from pma_gym.discovery.words import effect_names
+from pma_gym.discovery.words import effect_names, readable
 from pma_gym.pages.document import Block, Heading, Paragraph, Steps, TextTable
 
 _CANDIDATES = (
@@ -26,10 +26,10 @@ def decision_blocks(diagnosis: Diagnosis, origin: Mapping[str, str]) -> list[Blo
     """Steps, candidates, noise, parameters, blind spots, origin."""
     blocks: list[Block] = [Heading("How it was decided")]
     if diagnosis.steps:
-        blocks.append(Steps(diagnosis.steps))
+        blocks.append(Steps([readable(step, diagnosis) for step in diagnosis.steps]))
     if diagnosis.candidates:
         blocks += [Heading("Candidates", 3), Paragraph(_CANDIDATES)]
-        blocks.append(candidates_table(diagnosis.candidates))
+        blocks.append(candidates_table(diagnosis))
     blocks += _blind_blocks(diagnosis)
     blocks += _parameter_blocks(diagnosis)
     if diagnosis.floors:

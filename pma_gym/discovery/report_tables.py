@@ -2,15 +2,17 @@
 
 from collections.abc import Mapping
 
-from pma_gym.discovery.diagnosis import Candidate, Diagnosis, Floor, Gap, Moved, NamedEffect, Place
+from pma_gym.discovery.diagnosis import Diagnosis, Floor, Gap, Moved, NamedEffect, Place
 from pma_gym.discovery.words import (
     chance,
     effect_name,
     effect_names,
     estimate,
     figure,
+    gap_closed,
     interval,
     percent,
+    readable,
     signal_name,
     signal_unit,
 )
@@ -36,7 +38,7 @@ def gap_table(gaps: Mapping[str, Gap]) -> TextTable:
             figure(gap.parameters),
             figure(gap.after),
             figure(gap.floor),
-            percent(gap.closed) if gap.closed is not None else "no gap",
+            percent(gap_closed(gap)) if gap_closed(gap) is not None else "no gap",
             "yes" if gap.held_out else "no",
         ]
         for signal, gap in gaps.items()
@@ -78,19 +80,19 @@ def moved_table(parameters: Mapping[str, Moved], title: str = "Parameters refitt
     return TextTable(title, header, rows)
 
 
-def candidates_table(candidates: tuple[Candidate, ...]) -> TextTable:
+def candidates_table(diagnosis: Diagnosis) -> TextTable:
     """The whole catalogue with the evidence for and against each."""
     rows = [
         [
             effect_name(each.name),
-            each.why if each.fitted else f"{each.why} (screened only)",
+            readable(each.why, diagnosis) + ("" if each.fitted else " (screened only)"),
             figure(each.delta_log_likelihood),
             figure(each.held_out_gain) if each.held_out_gain is not None else "–",
             chance(each.p_value),
             figure(each.change, 2),
             percent(each.resolvable) if each.resolvable is not None else "never",
         ]
-        for each in candidates
+        for each in diagnosis.candidates
     ]
     header = [
         "Effect",

@@ -1,5 +1,6 @@
 """A diagnosis as a few lines that a person can read aloud, and a fit as a table."""
 
+import itertools
 import re
 from collections.abc import Iterator
 
@@ -16,8 +17,10 @@ from pma_gym.discovery.words import (
     estimate,
     estimate_words,
     figure,
+    gap_closed,
     interval,
     percent,
+    readable,
     signal_name,
     signal_unit,
     what_to_do,
@@ -28,7 +31,7 @@ _MOST_PLACES, _MOST_PARAMETERS = 3, 5
 
 def diagnosis_summary(diagnosis: Diagnosis) -> str:
     """What was found: verdict, where, which effect, how large, how much it closes, what next."""
-    lines = [f"{VERDICTS[diagnosis.verdict]}.", diagnosis.sentence, ""]
+    lines = [f"{VERDICTS[diagnosis.verdict]}.", readable(diagnosis.sentence, diagnosis), ""]
     lines += [f"Note: {warning}" for warning in diagnosis.warnings]
     for name, found in (
         ("Where", _places(diagnosis)),
@@ -37,7 +40,8 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Misfit", _gaps(diagnosis)),
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
-        lines += [f"{name + ':':<12}{text}" for text in found]
+        labels = itertools.chain([f"{name}:"], itertools.repeat(""))
+        lines += [f"{label:<12}{text}" for label, text in zip(labels, found, strict=False)]
     return "\n".join(lines)
 
 
@@ -77,7 +81,7 @@ def _gaps(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _gap(gap: Gap, unit: str) -> str:
     held = " (held out)" if gap.held_out else ""
-    closed = "" if gap.closed is None else f"; {percent(gap.closed)} of the gap closed"
+    closed = "" if gap_closed(gap) is None else f"; {percent(gap_closed(gap))} of the gap closed"
     return (
         f"{figure(gap.before)} {unit} as given, {figure(gap.parameters)} refitted, "
         f"{figure(gap.after)} proposed{held}, noise {figure(gap.floor)}{closed}"
@@ -96,14 +100,15 @@ def print_fit(diagnosis: Diagnosis) -> None:
         table.add_column(name, justify="right")
     table.add_column("unit")
     table.add_column("")
+    unknown = {path: f"not identifiable: {why}" for path, why in diagnosis.not_identifiable.items()}
     for path, moved in diagnosis.parameters.items():
         now = moved.now
         value = estimate(now.value, now.low, now.high)
-        note = "differs" if moved.significant else ""
+        note = unknown.pop(path, "differs" if moved.significant else "")
         cells = (path, figure(moved.start, 4), value, interval(now), now.unit, note)
         table.add_row(*map(escape, cells))
-    for path, why in diagnosis.not_identifiable.items():
-        table.add_row(escape(path), "", "", "", "", escape(f"not identifiable: {why}"))
+    for path, note in unknown.items():
+        table.add_row(escape(path), "", "", "", "", escape(note))
     console.print(table)
     gaps = Table("signal", title="Misfit (rms)", title_justify="left")
     for name in ("as given", "refitted", "noise"):

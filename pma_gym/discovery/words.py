@@ -1,11 +1,12 @@
 """What a diagnosis found, in words and figures that people read."""
 
+import inspect
 import math
 import re
 import sys
 
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
-from pma_gym.discovery.diagnosis import Diagnosis, Estimate
+from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap
 from pma_gym.effects import CATALOGUE
 
 VERDICTS = {
@@ -25,6 +26,7 @@ _SIGNALS = {
 }
 
 _NAMES = {"lvdt": "LVDT", "coulomb": "Coulomb"}
+_WHOLE = {"load_dependent_damping": "load-dependent damping"}
 _PEOPLE = ("sarosi", "schulte", "schulz", "chou", "hannaford", "caldwell", "tondu", "lopez")
 
 
@@ -34,10 +36,19 @@ def effect_name(name: str) -> str:
     >>> effect_name("coulomb_friction"), effect_name("lvdt_error")
     ('Coulomb friction', 'LVDT error')
     """
+    if name in _WHOLE:
+        return _WHOLE[name]
     words = [
         _NAMES.get(word, word.capitalize() if word in _PEOPLE else word) for word in name.split("_")
     ]
     return " ".join(words)
+
+
+def readable(text: str, diagnosis: Diagnosis) -> str:
+    """A text with the names of effects as people write them; parameters keep theirs."""
+    named = {*CATALOGUE, *(each.name for each in diagnosis.candidates)}
+    found = "|".join(sorted((name for name in named if "_" in name), key=len, reverse=True))
+    return re.sub(rf"(?<![\w.`])({found})(?![\w.`])", lambda hit: effect_name(hit[1]), text)
 
 
 def effect_names(names: tuple[str, ...] | list[str], joint: str = "and") -> str:
@@ -71,6 +82,17 @@ def effect_equation(name: str) -> str:
     text = (effect.law.__doc__ or "") if effect and effect.law else ""
     found = re.search(r"\n\n((?: {8}\S[^\n]*\n)+)", text)
     return "\n".join(line.strip() for line in found[1].splitlines()) if found else ""
+
+
+def effect_symbols(name: str) -> str:
+    """What stands in the law's equation: the arguments of its docstring, a line each."""
+    effect = CATALOGUE.get(name)
+    text = (inspect.getdoc(effect.law) or "") if effect and effect.law else ""
+    found = re.search(r"\nArgs:\n(.*?)(?=\n\S|\Z)", text, re.DOTALL)
+    if not found:
+        return ""
+    joined = re.sub(r"\n {5,}", " ", found[1])
+    return "\n".join(line.strip() for line in joined.splitlines() if line.strip())
 
 
 def signal_name(signal: str) -> str:
@@ -136,17 +158,42 @@ def chance(p_value: float) -> str:
 def percent(share: float | None) -> str:
     """A share: `71 %`.
 
-    >>> percent(0.714), percent(0.9991), percent(None)
-    ('71 %', '99.9 %', '–')
+    >>> percent(0.714), percent(0.9991), percent(0.001), percent(None)
+    ('71 %', '99.9 %', '< 1 %', '–')
     """
     if share is None:
         return "–"
+    if 0.0 < share < 0.005:
+        return "< 1 %"
     return f"{100 * share:.1f} %" if 0.99 < share < 1.0 else f"{100 * share:.0f} %"
+
+
+_WORTH_CLOSING = 1.1
+"""Misfit over noise from which there is a gap to speak of."""
+
+
+def gap_closed(gap: Gap) -> float | None:
+    """The share of a gap that was closed; None where noise hides what there was to close."""
+    return gap.closed if gap.before > _WORTH_CLOSING * gap.floor else None
 
 
 def odds(ratio: float) -> str:
     """Expected odds, which only their size says anything about."""
     return "over 1000 to 1" if ratio > 1000 else f"about {ratio:.2g} to 1"
+
+
+def duration(minutes: float) -> str:
+    """How long an experiment takes.
+
+    >>> duration(0.17), duration(2.5)
+    ('10 s', '2.5 min')
+    """
+    return f"{60 * minutes:.0f} s" if minutes < 2.0 else f"{minutes:.2g} min"
+
+
+def capitalised(text: str) -> str:
+    """With a large first letter; the others as they are."""
+    return text[:1].upper() + text[1:]
 
 
 def what_to_do(diagnosis: Diagnosis) -> list[str]:
@@ -222,6 +269,6 @@ def _run_next(diagnosis: Diagnosis) -> str:
     assert following is not None
     protocol = following.protocol[:1].lower() + following.protocol[1:]
     return (
-        f"Run `next.csv` on the rig ({protocol}; {figure(following.minutes, 2)} min), "
+        f"Run `next.csv` on the rig ({protocol}; {duration(following.minutes)}), "
         "save its log into the data set under a name of its own, and diagnose again."
     )
