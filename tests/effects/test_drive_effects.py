@@ -108,6 +108,7 @@ def test_ripple_repeats_after_a_period_and_has_no_mean():
 
 
 def test_one_effect_of_the_drive_takes_what_the_one_before_gives():
-    # In catalogue order: dead zone, limit, lag, ripple, whatever order a file has.
+    # In catalogue order: dead zone, limit, delay, lag, ripple, whatever order a file has.
     names = [name for name in CATALOGUE if name.startswith("drive_") or name == "torque_ripple"]
-    assert names == ["drive_dead_zone", "drive_saturation", "drive_lag", "torque_ripple"]
+    shape = ["drive_dead_zone", "drive_saturation"]
+    assert names == [*shape, "drive_delay", "drive_lag", "torque_ripple"]
