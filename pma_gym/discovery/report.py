@@ -131,12 +131,14 @@ def _gap_blocks(diagnosis: Diagnosis) -> list[Block]:
         if held
         else "No trial was held out: the figures are those of the fit itself."
     )
+    caption = (
+        "Misfit over all trials, on a logarithmic scale where it fell far. Dashed: the noise, "
+        f"below which no model gets. {seen}"
+    )
     worst = worst_trial(diagnosis)
     return [
         Heading("Before and after"),
-        Picture(
-            "gap", f"Misfit over all trials. The dashed line is the noise: less is luck. {seen}"
-        ),
+        Picture("gap", caption),
         gap_table(diagnosis.gap),
         Picture("trials", "Misfit of every trial in units of the noise, the worst on top."),
         Heading("The worst trial", 3),
