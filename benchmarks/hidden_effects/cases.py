@@ -210,7 +210,10 @@ def _hide(
     if not typical:
         clean = simulate_variants(experiment.commands, [(rig, {})])[0]
         return {"effects": [], "joint": {}, "parameters": {}}, clean
-    tried = {name: np.geomspace(1 / 64, min(ALL[name].most, 4.0), 6) for name in typical}
+    tried = {
+        name: np.geomspace(1 / 64, min(ALL[name].most, 4.0), 6) if ALL[name].sized else np.ones(1)
+        for name in typical
+    }
     variants = [(rig, {}), *((near, {}) for near in neighbours(rig))]
     base = len(variants)
     variants += [
@@ -263,14 +266,11 @@ def _measured(
         coloured, _ = lfilter([keep], [1.0, -memory], white[:, i], zi=start)
         out[:, i] = clean[:, i] / UNITS[i] + rigs.NOISE[i] * levels[i] * coloured
     out[:, 0] += zero
-    coarse = parameters.get("sensor_quantisation")
-    if coarse is not None:
-        signal, step = int(coarse["signal"]), coarse["step"]
-        out[:, signal] = np.round(out[:, signal] / step) * step
+    coarse = parameters.get("sensor_quantisation", {"signal": -1.0, "daq_steps": 1.0})
     for i, (gain, offset) in enumerate(rigs.VOLTS):
+        step = rigs.DAQ_STEP * (coarse["daq_steps"] if i == coarse["signal"] else 1.0)
         volts = np.clip(gain * out[:, i] + offset, -10.0, 10.0 - rigs.DAQ_STEP)
-        volts = np.floor(volts / rigs.DAQ_STEP + 0.5) * rigs.DAQ_STEP
-        out[:, i] = (volts - offset) / gain
+        out[:, i] = (np.floor(volts / step + 0.5) * step - offset) / gain
     # Rotation counts from where the trial begins.
     out[:, 1] -= out[0, 1]
     return out

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.physics import drive, friction, muscle, outside, sensing, valve
 from benchmarks.hidden_effects.physics.effect import Hidden
-from benchmarks.hidden_effects.physics.rig import SENSORS, UNITS, Array
+from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 
 Values = Mapping[str, float]
 Columns = Mapping[str, Array]
@@ -27,6 +27,7 @@ class Kind:
         build: the effect from parameters of every lane.
         most: size beyond which it would be absurd.
         inverse: parameters that shrink with its size.
+        sized: whether it can be of any size; else it is typical, and its ratio what it is.
     """
 
     draw: Callable[[np.random.Generator, float], dict[str, float]]
@@ -34,6 +35,7 @@ class Kind:
     build: Callable[[Columns], Hidden]
     most: float = 8.0
     inverse: tuple[str, ...] = ()
+    sized: bool = True
 
     def at(self, typical: Values, size: float) -> dict[str, float]:
         """Parameters at a size; 0 is no effect, 1 typical."""
@@ -178,10 +180,10 @@ KINDS: dict[str, Kind] = {
         1.2,
     ),
     "warm_up": Kind(
-        lambda g, most: {"force_at_200_kpa_n": _log(g, 5.0, 30.0), "half_life": g.uniform(0.5, 2)},
+        lambda g, most: {"force_at_200_kpa_n": _log(g, 5.0, 30.0), "half_life": g.uniform(1, 3)},
         ("force_at_200_kpa_n",),
         lambda p: muscle.WarmUp(p["force_at_200_kpa_n"], one(p["half_life"])),
-        4.0,
+        8.0,
     ),
     "cable_slack": Kind(
         lambda g, most: {"slack_mm": _log(g, 0.3, 2.0)},
@@ -234,17 +236,10 @@ KINDS: dict[str, Kind] = {
     "load_cell_lag": _slow(2, 5.0, 30.0),
     "pressure_transducer_lag": _slow(3, 10.0, 40.0),
     "sensor_quantisation": Kind(
-        lambda g, most: (
-            lambda signal: {
-                "signal": float(signal),
-                "step": _log(g, 1.5, 6.0) * (0.05, 0.34, 1.2, 0.48)[signal],
-            }
-        )(g.integers(4)),
-        ("step",),
-        lambda p: sensing.CoarseSensor(
-            int(one(p["signal"])), p["step"] * UNITS[int(one(p["signal"]))]
-        ),
-        10.0,
+        lambda g, most: {"signal": float(g.integers(4)), "daq_steps": float(g.integers(2, 9))},
+        ("daq_steps",),
+        lambda p: sensing.CoarseSensor(int(one(p["signal"])), p["daq_steps"]),
+        sized=False,
     ),
 }
 """Effects of the catalogue by name."""

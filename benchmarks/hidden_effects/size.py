@@ -133,11 +133,12 @@ def scale_to(
     readings = ruler.base
     size = 1.0
     for _ in range(8):
-        size = _interpolated(found, target, kind.most)
+        size = _interpolated(found, target, kind.most) if kind.sized else 1.0
         lane = (rig, {name: kind.at(typical, size)})
         readings = simulate_variants(experiment.commands, [lane])[0]
         found[size] = ruler.size(readings)
-        if abs(np.log(max(found[size], 1e-9) / target)) < 0.05 or size >= kind.most:
+        near = abs(np.log(max(found[size], 1e-9) / target)) < 0.05
+        if near or size >= kind.most or not kind.sized:
             break
     return size, readings
 
@@ -148,7 +149,9 @@ def _interpolated(found: Mapping[float, float], target: float, most: float) -> f
     ratios = np.maximum.accumulate([max(found[size], 0.02 * target) for size in sizes])
     above = np.flatnonzero(ratios >= target)
     if above.size == 0:
-        return most if sizes[-1] >= 0.99 * most else min(most, sizes[-1] * target / ratios[-1])
+        return (
+            most if sizes[-1] >= 0.99 * most else min(most, float(sizes[-1] * target / ratios[-1]))
+        )
     k = int(above[0])
     if k == 0:
         return float(sizes[0] * target / ratios[0])

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Callable, Mapping
 
-from benchmarks.hidden_effects.physics.rig import BANDWIDTH, SENSORS
+from benchmarks.hidden_effects.physics.rig import BANDWIDTH, SENSORS, daq_steps
 
 Values = Mapping[str, float]
+
+COLUMNS = ("contraction_mm", "rotation_deg", "load_n", "pressure_kpa")
 
 SAME: dict[str, tuple[str, ...]] = {
     "passive_stretch": ("factor",),
@@ -31,6 +33,9 @@ SAME: dict[str, tuple[str, ...]] = {
 CONVERTED: dict[str, Callable[[Values], dict[str, float]]] = {
     "regulator_asymmetry": lambda p: {"vent_ratio": math.exp(p["excess"])},
     "drive_saturation": lambda p: {"limit_n": p["most_n"] - p["cut_n"]},
+    "sensor_quantisation": lambda p: {
+        COLUMNS[int(p["signal"])] + "_step": p["daq_steps"] * daq_steps(int(p["signal"]))
+    },
 }
 """Those that the catalogue counts in another way."""
 

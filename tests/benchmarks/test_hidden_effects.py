@@ -53,7 +53,7 @@ TYPICAL = {
     "potentiometer_lag": {"longer_ms": 20.0},
     "load_cell_lag": {"longer_ms": 20.0},
     "pressure_transducer_lag": {"longer_ms": 20.0},
-    "sensor_quantisation": {"signal": 0.0, "step": 0.2},
+    "sensor_quantisation": {"signal": 0.0, "daq_steps": 4.0},
 }
 
 SHAPES = {

@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.hidden_effects.physics.effect import Hidden, Moment
-from benchmarks.hidden_effects.physics.rig import BANDWIDTH, Array
+from benchmarks.hidden_effects.physics.rig import BANDWIDTH, UNITS, Array, daq_steps
 
 
 class SlowSensor(Hidden):
@@ -22,16 +22,16 @@ class SlowSensor(Hidden):
 
 
 class CoarseSensor(Hidden):
-    """A sensor shows whole steps (SI) only."""
+    """A converter has lost its last bits: one sensor comes in whole multiples of the DAQ's step."""
 
-    def __init__(self, signal: int, size: Array) -> None:
-        """Take which signal, and steps of all lanes."""
-        self.signal, self.size = signal, size
+    def __init__(self, signal: int, steps: Array) -> None:
+        """Take which signal, and how many steps of all lanes; 0 leaves it alone."""
+        self.signal, self.steps = signal, steps
 
     def shown(self, readings: Array) -> Array:
         """Readings, one of them rounded."""
-        out, size = readings.copy(), self.size[:, None]
-        fine = np.maximum(size, 1e-12)
+        out, size = readings.copy(), self.steps[:, None] * daq_steps(self.signal)
+        fine = np.maximum(size * UNITS[self.signal], 1e-12)
         rounded = np.round(out[..., self.signal] / fine) * fine
         out[..., self.signal] = np.where(size > 0.0, rounded, out[..., self.signal])
         return out
