@@ -2,8 +2,9 @@
 
 The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
 two hundred data sets. What passes is fitted together with the model's parameters; the likeliest is
-taken; the noise is learnt anew from what it leaves; then the same again beside it. In the end each
-effect is left out once: one that is not missed goes.
+taken; then the same again beside it. Each effect is then left out once: one that is not missed
+goes. Noise is learnt anew only when all effects are found: before, an autoregression would take
+the next effect for noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -112,14 +113,14 @@ def select(
         if added is None:
             break
         chosen = (*chosen, next(s for s in suspects if s.name == added))
-        bench = replace(bench, noise=relearnt(bench, stage.fits[added], chosen))
-        best = _refit(bench, stage.fits[added], chosen, journal)
+        best = stage.fits[added]
         if len(chosen) > 1:
             chosen, best = _without_idle(bench, best, chosen, refitted, journal)
             if len(chosen) < len(stages):
-                # One was replaced by another: what it leaves is looked at once more, no further.
+                # One was replaced by another, and that is the end of it.
                 break
-    return Selection(tuple(stages), chosen, best, bench)
+    bench = replace(bench, noise=relearnt(bench, best, chosen))
+    return Selection(tuple(stages), chosen, _refit(bench, best, chosen, journal), bench)
 
 
 def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:
