@@ -1,0 +1,191 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.experiment import Contest, for_blind, left_over, next_experiment
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.noise import white_noise
+from pma_gym.discovery.parameters import Own, prior
+from pma_gym.discovery.protocols import is_safe, library
+from pma_gym.discovery.screening import Baseline, look
+from pma_gym.discovery.suspects import Suspect, suspects
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.plant import Plant
+
+FREE = (
+    "contractile_force.slope_n_per_kpa",
+    "contractile_force.intercept_n",
+    "damping.contracting_n_s_per_mm",
+    "drive.gain_n_per_v",
+)
+
+
+NOISY = {
+    "lvdt.noise_mm": 1.2,
+    "load_cell.noise_n": 30.0,
+    "potentiometer.noise_deg": 6.0,
+    "pressure_transducer.noise_kpa": 18.0,
+}
+"""So noisy that a question stays open until a proper experiment is run."""
+
+TRUTHS = {
+    "hysteresis": {"force_n": 20.0, "distance_mm": 1.5},
+    "creep": {"stiffness_n_per_mm": 1.5, "time_constant_s": 2.0},
+}
+
+
+def station() -> Model:
+    model = load_model("serres2008").replace(NOISY)
+    # Without dry friction: the integrator can stall where a stuck slide breaks loose.
+    smooth = {k: v for k, v in model.parameters.items() if k != "coulomb_friction"}
+    return Model(model.name, model.title, model.plant, smooth, model.notes)
+
+
+def nearly_constant(model: Model) -> list[Trial]:
+    """Two trials in which the load moves once, and little."""
+    time = np.arange(8 * 128 + 1) / 128
+    plant, found = Plant(model), []
+    for number, pressure in enumerate((280e3, 400e3)):
+        motor = 3.0 + 0.3 * np.clip(np.minimum(time - 1.0, 4.0 - time) / 0.5, 0.0, 1.0)
+        regulator = np.full(len(time), plant.regulator_voltage(pressure))
+        trial = Trial(time, {"motor_voltage": motor, "regulator_voltage": regulator})
+        found.append(plant.simulate(trial, seed=number))
+    return found
+
+
+def bench(trials: list[Trial]) -> Bench:
+    model = station()
+    own = Own(FREE, np.array([prior(model, path) for path in FREE]))
+    noise = tuple(white_noise(float(each)) for each in sensors.noise_levels(model))
+    return Bench(trials, model, own, noise)
+
+
+@cache
+def every() -> dict[str, Suspect]:
+    return {each.name: each for each in suspects(station())}
+
+
+def fitted(on: Bench, name: str) -> Fitted:
+    suspect = every()[name]
+    usual = suspect.probes[len(suspect.probes) // 2]
+    found = on.fit(station(), [suspect], {name: usual})
+    assert found is not None
+    return found
+
+
+@cache
+def case(true: str):
+    truth = station().with_effects({true: TRUTHS[true]})
+    on = bench(nearly_constant(truth))
+    rivals = [(fitted(on, name), (every()[name],)) for name in TRUTHS]
+    return truth, on, rivals, next_experiment(on, rivals, 0)
+
+
+def lead(on: Bench, name: str) -> float:
+    """Log-likelihood of the true one beyond the other's, both fitted to all trials."""
+    other = next(each for each in TRUTHS if each != name)
+    return 0.5 * (fitted(on, other).chi_square - fitted(on, name).chi_square)
+
+
+@pytest.mark.parametrize("true", TRUTHS)
+def test_proposed_trial_tells_what_was_promised(true):
+    truth, on, rivals, found = case(true)
+    assert found is not None and found.separates == tuple(TRUTHS)
+    measured = Plant(truth).simulate(found.trial, seed=7)
+    before, after = lead(on, true), lead(replace(on, trials=[*on.trials, measured]), true)
+    assert after - before >= 0.5 * np.log(found.expected_odds)
+    assert found.minutes == pytest.approx(found.trial.duration / 60.0)
+
+
+def test_it_tells_more_a_minute_than_most_of_the_library():
+    _, on, rivals, found = case("hysteresis")
+    contest = Contest.of(on, rivals, 0)
+    hopes = {
+        each.name: float(np.min(contest.odds(each, contest.pairs()))) / each.minutes
+        for each in library([*contest.models, on.given], 0)
+    }
+    assert found is not None
+    others = [rate for name, rate in hopes.items() if name != found.protocol]
+    assert hopes[found.protocol] > np.median(others)
+
+
+def test_the_same_seed_proposes_the_same_trial():
+    _, on, rivals, found = case("hysteresis")
+    again = next_experiment(on, rivals, 0)
+    assert found is not None and again is not None
+    assert (again.protocol, again.expected_odds) == (found.protocol, found.expected_odds)
+    for name, volts in again.trial.commands.items():
+        np.testing.assert_array_equal(volts, found.trial.commands[name])
+
+
+def test_a_proposal_is_commands_and_nothing_else():
+    _, _, _, found = case("hysteresis")
+    assert found is not None
+    assert set(found.trial.commands) == {"motor_voltage", "regulator_voltage"}
+    assert not found.trial.measurements and not found.trial.truth
+
+
+def test_one_rival_needs_no_experiment():
+    _, on, rivals, _ = case("hysteresis")
+    assert next_experiment(on, rivals[:1], 0) is None
+
+
+def test_every_protocol_is_safe_and_as_long_as_a_test_may_be():
+    model = station()
+    found = list(library([model]))
+    assert len(found) == 27 and len({each.name for each in found}) == 27
+    for each in found:
+        again = Plant(model).simulate(each.trial, noise=False)
+        assert is_safe(model, again), each.name
+        assert 10.0 <= each.trial.duration <= 60.0
+        np.testing.assert_allclose(np.diff(each.trial.time), 1.0 / 128.0)
+
+
+def test_a_rig_of_narrow_limits_gets_smaller_loads():
+    narrow = station().replace({"limits.tension_n": 700.0, "limits.contraction_mm": 50.0})
+    wide, few = list(library([station()])), list(library([narrow]))
+    assert 0 < len(few) < len(wide)
+    for each in few:
+        assert np.max(each.simulated[0].truth["load"]) <= 0.9 * 700.0
+        assert np.max(each.simulated[0].truth["contraction"]) <= 0.9 * 50e-3
+
+
+def test_parameters_absorb_what_a_least_squares_fit_with_their_prior_does():
+    generator = np.random.default_rng(1)
+    by, apart = generator.standard_normal((2, 40)), generator.standard_normal((3, 40))
+    covariance = np.array([[4.0, 1.0], [1.0, 0.5]])
+    fit = Fitted(station(), (), FREE[:2], np.ones(2), covariance, 0.0, np.ones(2), True)
+    weights = np.linalg.cholesky(np.linalg.inv(covariance)).T
+    stacked = np.concatenate([by.T, weights])
+    for row, found in zip(apart, left_over(apart, by, fit), strict=True):
+        right = np.concatenate([-row, np.zeros(2)])
+        rest = right - stacked @ np.linalg.lstsq(stacked, right, rcond=None)[0]
+        assert found == pytest.approx(rest @ rest)
+
+
+def test_what_no_trial_told_is_absorbed_whole():
+    by = np.ones((1, 30))
+    fit = Fitted(
+        *(station(), (), FREE[:1], np.ones(1), np.array([[np.inf]]), 0.0, np.ones(1), True)
+    )
+    assert left_over(7.0 * by, by, fit)[0] == pytest.approx(0.0, abs=1e-4)
+
+
+def test_effects_that_were_hidden_are_made_to_show():
+    _, on, _, _ = case("hysteresis")
+    fit = on.fit(station())
+    assert fit is not None
+    wanted = [every()[name] for name in ("hysteresis", "creep", "drive_saturation")]
+    baseline = Baseline.at(on.evidence(fit.model), fit.values, fit.steps)
+    looks = look(baseline, wanted, 0, lambda suspect: on.probed(fit.model, suspect))
+    hidden = [each.suspect.name for each in looks if (each.resolvable or np.inf) > 1.0]
+    assert "creep" in hidden
+    found = for_blind(on, fit, wanted, looks)
+    assert found is not None and "creep" in found.separates
+    assert set(found.separates) <= set(hidden)
+    assert found.expected_odds >= np.exp(12.5)
+    assert for_blind(on, fit, wanted, []) is None
