@@ -62,9 +62,12 @@ class Effect:
 
     @property
     def neutral(self) -> Parameters | None:
-        """Parameters at which the law is exactly absent, or None if there are none such."""
+        """Parameters at which the law is exactly absent, or None if there are none such.
+
+        Those that have no neutral value are at their usual one.
+        """
         known = {n: q.to_si(q.neutral) for n, q in self.quantities.items() if q.neutral is not None}
-        return self.start._replace(**known) if known else None
+        return self.start._replace(**(self._usual | known)) if known else None
 
     @property
     def usual(self) -> Parameters:
@@ -74,8 +77,12 @@ class Effect:
         >>> CATALOGUE["hysteresis"].usual
         Hysteresis(force=25.0, distance=0.0015)
         """
-        known = {n: q.to_si(q.usual) for n, q in self.quantities.items() if q.usual is not None}
-        return (self.neutral or self.start)._replace(**known)
+        return (self.neutral or self.start)._replace(**self._usual)
+
+    @property
+    def _usual(self) -> dict[str, float]:
+        given = self.quantities.items()
+        return {name: q.to_si(q.usual) for name, q in given if q.usual is not None}
 
     @property
     def start(self) -> Parameters:
