@@ -210,6 +210,15 @@ def test_fit_prints_and_writes_the_parameters(run, engine, tmp_path):
     assert [cell for cell in ("5", "0.6", "0.5") if cell in row] == ["5", "0.6", "0.5"]
 
 
+def test_fit_says_when_parameters_do_not_explain_it_all(run, engine):
+    engine.answer = replace(FOUND, gap={"load_n": Gap(5.0, 4.0, 4.0, 0.5, True)})
+    code, out, _ = run("fit", "lab")
+    assert code == 0
+    assert "More is left than noise: 8 times as much in load." in out
+    engine.answer = FOUND
+    assert "More is left" not in run("fit", "lab", "--force")[1]
+
+
 def test_warnings_of_the_data_set_are_said(run, engine, tmp_path):
     path = tmp_path / "lab" / "ramp.csv"
     path.write_text(path.read_text().replace("load_n", "load_n,Temp", 1).replace("\n", ",1\n"))

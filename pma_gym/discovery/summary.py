@@ -27,6 +27,8 @@ from pma_gym.discovery.words import (
 )
 
 _MOST_PLACES, _MOST_PARAMETERS = 3, 5
+_LEFT_OVER = 1.5
+"""Misfit over noise after a fit from which parameters alone do not explain the trials."""
 
 
 def diagnosis_summary(diagnosis: Diagnosis) -> str:
@@ -117,3 +119,17 @@ def print_fit(diagnosis: Diagnosis) -> None:
         figures = map(figure, (gap.before, gap.after, gap.floor))
         gaps.add_row(f"{signal_name(signal)} ({signal_unit(signal)})", *figures)
     console.print(gaps)
+    left = {
+        signal: gap.after / gap.floor
+        for signal, gap in diagnosis.gap.items()
+        if gap.floor and gap.after > _LEFT_OVER * gap.floor
+    }
+    if left:
+        worst = max(left, key=lambda signal: left[signal])
+        times = figure(left[worst], 2)
+        console.print(
+            f"More is left than noise: {times} times as much in {signal_name(worst)}. Parameters "
+            "alone do not explain these trials; pma-gym diagnose looks for what is missing.",
+            highlight=False,
+            markup=False,
+        )
