@@ -217,11 +217,17 @@ def _switched(
     slope = rate * length
     bend = end - start - slope
     inside = slope * slope - 4.0 * bend * start
-    share = 2.0 * start / (square_root(where(inside > 0.0, inside, 0.0)) - slope)
+    root = square_root(where(inside > 0.0, inside, 0.0))
+    # The form of the solution that adds what has one sign: where a switch first moves off, from as
+    # good as zero, the difference of root and slope has no digit that is right, and may be zero.
+    off = slope > 0.0
+    share = where(off, root + slope, 2.0 * start) / where(off, -2.0 * bend, root - slope)
     # What lies in the last bit of the step has been aimed at: no step aims twice.
-    missed = (missed & ~(share >= AIMED)) | twice
-    # From rest the way back may begin at once: 0 / 0, which is no share above 0.05.
-    share = where(end < 0.0, where(share > 0.05, BEYOND * share, 0.05), 0.5)
+    aimed = share >= AIMED
+    missed = (missed & ~aimed) | twice
+    # From rest the way back may begin at once: 0 / 0, which is no share above 0.05. Whatever is
+    # not taken is tried again shorter, or it would be tried for ever.
+    share = where((end < 0.0) & ~aimed, where(share > 0.05, BEYOND * share, 0.05), 0.5)
     return share, missed
 
 
