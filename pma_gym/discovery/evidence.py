@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 FREE_ZEROS = ("contraction", "rotation")
 """Outputs whose zero is free in every trial."""
 
+FARTHEST = 6.0
+"""Standard deviations of what is assumed beforehand that a parameter may go away from it."""
+
 PIECE_S = 1.0
 """How long a piece is (s); longer than the memory of noise and plant."""
 
@@ -90,6 +93,9 @@ class Evidence(Residuals):
         super().__init__(model, trials, free, tolerance, joined, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
+        # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
+        self.lower = np.maximum(self.lower, self.centre - FARTHEST * self.prior)
+        self.upper = np.minimum(self.upper, self.centre + FARTHEST * self.prior)
         self._own = self._places(own or {})
 
     @property

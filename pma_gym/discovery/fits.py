@@ -1,7 +1,7 @@
 """Fits of a model, alone or with suspects in it, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,9 @@ from pma_gym.plant.least_squares import inverse
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
+
+LARGER = (30.0, 5.0)
+"""How many times as large the noise is taken for on the way to a first fit."""
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,23 @@ class Bench:
             own=suspect.own,
             threads=self.threads,
         )
+
+    def first_fit(self) -> Fitted | None:
+        """Fit the given model, whose parameters may be far off.
+
+        A cable that slackens makes chi-square rugged, and a search that begins far away can end in
+        a hollow. With the noise taken for larger, what parameters may be holds them on their way.
+        """
+        begun = self.given
+        for larger in LARGER:
+            noise = tuple(
+                Whitening(n.coefficients, larger * n.innovation, larger * n.level)
+                for n in self.noise
+            )
+            found = replace(self, noise=noise).fit(begun)
+            begun = begun if found is None else found.model
+        fits = [fit for fit in (self.fit(begun), self.fit(self.given)) if fit is not None]
+        return min(fits, key=lambda fit: fit.chi_square, default=None)
 
     def fit(
         self,

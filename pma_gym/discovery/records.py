@@ -25,8 +25,8 @@ def trial_records(found: "Findings") -> tuple[TrialRecord, ...]:
     bench, selection = found.bench, found.selection
     evidence = bench.evidence(found.given)
     before = evidence.readings(values(found.given, bench.own.free))
-    refitted = evidence.readings(found.refitted.values)
-    unseen = found.unseen
+    unseen, without = found.unseen, found.unseen_without
+    refitted = without.readings if without is not None else evidence.readings(found.refitted.values)
     after = (
         unseen.readings
         if unseen is not None

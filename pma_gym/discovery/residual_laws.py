@@ -65,8 +65,8 @@ def residual_law(drawn: Drawn) -> ResidualLaw:
     """A law as the report shows it, less what is a straight line or a constant of the model's."""
     quantity, variable, _ = LAWS[drawn.name]
     table = drawn.fit.model.at_the_door(drawn.name)
-    ends = [float(v) for k, v in table.items() if k.startswith(("first", "last"))]  # type: ignore[arg-type]
-    at = np.linspace(ends[0], ends[1], len(drawn.suspect.fitted_paths))
+    first, reach = (float(value) for value in list(table.values())[:2])  # type: ignore[arg-type]
+    at = np.linspace(first, first + reach, len(drawn.suspect.fitted_paths))
     places = [drawn.fit.paths.index(path) for path in drawn.suspect.fitted_paths]
     law = drawn.fit.values[places]
     errors = np.sqrt(np.diag(drawn.fit.covariance))[places]
@@ -140,7 +140,7 @@ def _suspect(bench: Bench, name: str, ends: tuple[float, float]) -> Suspect:
     effect = CATALOGUE[name]
     doors = list(effect.names_at_the_door())
     heights = doors[2:]
-    table = dict(zip(doors, (*ends, *([0.0] * len(heights))), strict=True))
+    table = dict(zip(doors, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
     zero = np.zeros(len(heights))
     return Suspect(
         name,

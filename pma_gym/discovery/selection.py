@@ -30,7 +30,7 @@ LEAST_CHANGE = 0.15
 """Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
 
-SECOND_SHARE = 0.08
+SECOND_SHARE = 0.12
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order."""
 
@@ -205,7 +205,17 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
     """The suspect to add, or None."""
     if not stage.gate or not stage.fits:
         return None
-    name = min(stage.fits, key=lambda each: cost(stage.fits[each]))
+    passed = {each.suspect.name for each in stage.gate}
+    most = stage.gate[0].gain
+    # What did not pass may still explain more than what did: a look is linear, a fit is not.
+    worth = {
+        name: fit
+        for name, fit in stage.fits.items()
+        if name in passed or stage.before.chi_square - fit.chi_square > most
+    }
+    if not worth:
+        return None
+    name = min(worth, key=lambda each: cost(worth[each]))
     gain = stage.before.chi_square - stage.fits[name].chi_square
     if gain < 30.0:
         return None

@@ -123,6 +123,11 @@ class Suspect:
         origin = self.absent if self.fitted.all() else np.zeros_like(self.absent)
         scaled = origin + factor * (chosen - origin)
         chosen[self.amplitudes] = scaled[self.amplitudes]
+        for at, path in enumerate(self.paths):
+            if factor < 0.0 and path.endswith(".phase_deg"):
+                # The opposite of a wave is the wave half a period later.
+                chosen[at] += 180.0 if chosen[at] <= 0.0 else -180.0
+                chosen[self.amplitudes] = -scaled[self.amplitudes]
         lower, upper = bounds(self.paths)
         return np.clip(chosen, lower, upper)
 

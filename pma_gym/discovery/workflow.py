@@ -150,7 +150,7 @@ class _Work:
         return named, model
 
     def _refitted(self, bench: Bench, journal: Journal) -> Fitted:
-        found = bench.fit(bench.given)
+        found = bench.first_fit()
         if found is None:
             raise ModelError(
                 f"model {bench.given.name} cannot be simulated on these trials: its muscle does "

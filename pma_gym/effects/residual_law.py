@@ -19,18 +19,18 @@ _HEIGHT = Quantity("N", -500, 500, "fitted, whatever it is", 0.0, usual=5.0)
 
 
 def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[float, float]) -> Any:  # noqa: ANN401
-    """A NamedTuple of two ends and the heights."""
+    """A NamedTuple of where heights begin, how far they reach, and the heights."""
     ends = {
         "first": Quantity(unit, least, most, "where the data begin", usual=usual[0]),
-        "last": Quantity(unit, least, most, "where the data end", usual=usual[1]),
+        "reach": Quantity(unit, 1.0, most - least, "how far they go from there", usual=usual[1]),
     }
     fields = ends | {f"h{k}": _HEIGHT for k in range(HEIGHTS)}
     return NamedTuple(name, [(stem, Annotated[float, each]) for stem, each in fields.items()])
 
 
-ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 60))
-ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -2000, 2000, (-50, 50))
-ForceOfPressure = _parameters("ForceOfPressure", "kPa", -100, 2000, (150, 575))
+ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 70))
+ForceOfVelocity = _parameters("ForceOfVelocity", "mm/s", -2000, 2000, (-50, 100))
+ForceOfPressure = _parameters("ForceOfPressure", "kPa", -100, 2000, (150, 425))
 LoadOfLoad = _parameters("LoadOfLoad", "N", -100, 5000, (0, 1000))
 
 
@@ -38,12 +38,12 @@ def between_heights(value, p):
     """Height at a value, on straight lines between heights; constant beyond the ends.
 
     Args:
-        value: where, in the unit of the ends (SI).
-        p: first, last: ends; h0 ... h8: heights.
+        value: where (SI).
+        p: first, reach: where heights lie; h0 ... h8: heights.
     Returns:
         Height, in the unit of the heights (SI).
     """
-    place = (value - p.first) * (8.0 / (p.last - p.first))
+    place = (value - p.first) * (8.0 / p.reach)
     heights = (p.h0, p.h1, p.h2, p.h3, p.h4, p.h5, p.h6, p.h7, p.h8)
     height = heights[0]
     for k in range(len(heights) - 1):
@@ -111,7 +111,7 @@ _SIGNATURE = "none of its own; drawn by a diagnosis where no other effect fits"
 
 
 def _effect(name: str, port: str, parameters: type, law: Callable) -> Effect:
-    return Effect(name, port, parameters, law, signature=_SIGNATURE, held=("first", "last"))
+    return Effect(name, port, parameters, law, signature=_SIGNATURE, held=("first", "reach"))
 
 
 RESIDUAL_FORCE_OF_CONTRACTION = _effect(
