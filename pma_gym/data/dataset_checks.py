@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 _DRIVERS = {
     "contraction": ("motor_voltage", "load_command", "regulator_voltage", "pressure_command"),
     "rotation": ("motor_voltage", "load_command"),
-    "load": ("motor_voltage", "load_command", "regulator_voltage", "pressure_command"),
+    # The drive holds the load, so pressure hardly moves it: less than a coarse load cell shows.
+    "load": ("motor_voltage", "load_command"),
     "pressure": ("regulator_voltage", "pressure_command"),
 }
 """Commands that move a measurement."""

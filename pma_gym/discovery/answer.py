@@ -323,7 +323,7 @@ def _why(found: Findings, look: Look, chosen: bool) -> str:
                 )
     if look.resolvable is None:
         return "these data could not show it at any size"
-    if not passes(look):
+    if not passes(found.bench, look):
         if look.resolvable > 1.0:
             return f"would show from {look.resolvable:.2g} times its usual size on only"
         return "explains no more than chance would"

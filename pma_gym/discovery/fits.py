@@ -61,6 +61,7 @@ class Bench:
         own: its own parameters and what they may be off by.
         noise: whitening of each output.
         threads: how many threads simulate.
+        coarse: whether a sensor keeps to coarser steps than its DAQ gives.
     """
 
     trials: Sequence[Trial]
@@ -68,6 +69,7 @@ class Bench:
     own: Own
     noise: tuple[Whitening, ...]
     threads: int = 1
+    coarse: bool = False
 
     def evidence(
         self, model: Model, extra: Sequence[Suspect] = (), trials: Sequence[int] | None = None

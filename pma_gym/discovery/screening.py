@@ -7,7 +7,7 @@ p-value holds for the largest of all.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ SHOWN_GAIN = 25.0
 FACTORS = (0.1, 8.0)
 """By what a probe may be multiplied to start a fit from."""
 
+PROBES, BEGUN = 3, 2
+"""How many probes of a suspect are looked at again, and how many fits are begun."""
+
 LEAST_PART = 1e-6
 """Share of a probe's change that parameters must leave, or it is one of theirs."""
 
@@ -43,7 +46,7 @@ class Look:
         change: rms of what it then changes beyond what parameters could, over the noise, in the
             signal where that is most.
         resolvable: factor on the usual size from which on it would be seen; None if it never is.
-        starts: probes and factors to begin fits from, the best first.
+        starts: probes that explain most, with their factors, the best first.
     """
 
     suspect: Suspect
@@ -126,7 +129,7 @@ class _Probed:
     changes: Array
 
 
-def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed | None:
+def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed:
     tried = np.concatenate([suspect.absent[None], suspect.probes])
     columns = evidence.columns(tried)
     if columns is None:
@@ -171,18 +174,17 @@ def _changes(baseline: Baseline, columns: Sequence[Array], weights: Array, size:
     return np.sqrt(np.max(squares / np.maximum(counts, 1.0), axis=1))
 
 
-def _judged(found: Sequence[_Probed | None], suspects: Sequence[Suspect], seed: int) -> list[Look]:
+def _judged(found: Sequence[_Probed], suspects: Sequence[Suspect], seed: int) -> list[Look]:
     generator = np.random.Generator(np.random.Philox(seed))
-    pieces = next(each.slopes.shape[1] for each in found if each is not None)
+    pieces = found[0].slopes.shape[1]
     flips = generator.choice([-1.0, 1.0], size=(RESAMPLES, pieces))
     largest = np.zeros(RESAMPLES)
     for each, suspect in zip(found, suspects, strict=True):
-        if each is not None:
-            drawn = _gains(flips @ each.slopes.T, each.strengths, suspect.signs)
-            largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
+        drawn = _gains(flips @ each.slopes.T, each.strengths, suspect.signs)
+        largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
     looks = []
     for each, suspect in zip(found, suspects, strict=True):
-        if each is None or not each.strengths.any():
+        if not each.strengths.any():
             looks.append(Look(suspect, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
             continue
         sums = each.slopes.sum(axis=1)
@@ -215,14 +217,28 @@ def _gains(slopes: Array, strengths: Array, signs: NDArray[np.bool_]) -> Array:
 
 
 def _starts(gains: Array, factors: Array) -> tuple[tuple[int, float], ...]:
-    """The best probe, and another that explains nearly as much and is not next to it."""
-    order = np.argsort(-gains, kind="stable")
-    best = [int(order[0])]
-    for other in order[1:]:
-        if gains[other] > 0.5 * gains[best[0]] and abs(int(other) - best[0]) > 1:
-            best.append(int(other))
-            break
+    """The probes that explain most, with their factors."""
     low, high = FACTORS
     return tuple(
-        (k, float(np.copysign(np.clip(abs(factors[k]), low, high), factors[k]))) for k in best
+        (int(k), float(np.copysign(np.clip(abs(factors[k]), low, high), factors[k])))
+        for k in np.argsort(-gains, kind="stable")[:PROBES]
+        if gains[k] > 0.0
     )
+
+
+def beginnings(baseline: Baseline, evidence: Evidence, found: Look) -> list[Array]:
+    """Where to begin fits of a suspect: values that explain most as they are, the best first.
+
+    A look takes what a probe changes times a factor; here each is simulated, for a dead zone twice
+    as wide does not change twice as much.
+    """
+    suspect, tried = found.suspect, []
+    for probe, factor in found.starts:
+        for each in (factor, np.sign(factor) * np.sqrt(abs(factor)), 1.0, 0.4 * factor):
+            values = suspect.grown(probe, float(each))
+            if not any(np.array_equal(values, other) for other in tried):
+                tried.append(values)
+    size = len(baseline.columns[0])
+    probed = _probe(baseline, evidence, replace(suspect, probes=np.array(tried)), size)
+    gains = -2.0 * probed.slopes.sum(axis=1) - probed.strengths
+    return [tried[k] for k in np.argsort(-gains, kind="stable")[:BEGUN]]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.noise import Whitening, autoregression
-from pma_gym.discovery.screening import Baseline, Look, look
+from pma_gym.discovery.screening import Baseline, Look, beginnings, look
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import OUTPUTS
@@ -29,6 +29,10 @@ ALARM = 0.005
 LEAST_CHANGE = 0.15
 """Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
 most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
+
+COARSE_CHANGE = 0.5
+"""The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
+noise, and follows the motion."""
 
 SECOND_SHARE = 0.12
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
@@ -179,21 +183,22 @@ def _stage(
         lambda done: progress(step, done, len(rest)),
     )
     looks.sort(key=lambda each: -each.gain)
-    gate = tuple(each for each in looks if passes(each))
+    gate = tuple(each for each in looks if passes(bench, each))
     fits: dict[str, Fitted] = {}
     if gate:
         worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
             progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-            found = _fit(bench, before, chosen, each, journal)
+            found = _fit(bench, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.suspect.name] = found
     return Stage(bench, before, baseline, tuple(looks), fits, gate)
 
 
-def passes(each: Look) -> bool:
+def passes(bench: Bench, each: Look) -> bool:
     """Whether chance, or arithmetic, would not show as much."""
-    return each.p_value <= ALARM and each.change >= LEAST_CHANGE
+    least = COARSE_CHANGE if bench.coarse else LEAST_CHANGE
+    return each.p_value <= ALARM and each.change >= least
 
 
 def cost(fit: Fitted) -> float:
@@ -234,6 +239,7 @@ def _plain(bench: Bench, before: Fitted) -> Model:
 
 def _fit(
     bench: Bench,
+    baseline: Baseline,
     before: Fitted,
     chosen: tuple[Suspect, ...],
     each: Look,
@@ -246,9 +252,9 @@ def _fit(
     if kept is not None:
         return restored(kept, bench, before, extra)
     best: Fitted | None = None
-    for probe, factor in each.starts:
-        start = {each.suspect.name: each.suspect.grown(probe, factor)}
-        found = bench.fit(before.model, extra, start)
+    evidence = bench.probed(_plain(bench, before), each.suspect)
+    for begun in beginnings(baseline, evidence, each):
+        found = bench.fit(before.model, extra, {each.suspect.name: begun})
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
     if best is not None:

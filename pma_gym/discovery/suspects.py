@@ -47,7 +47,7 @@ STAND_INS = frozenset(
 such models as models), the operator's hand, which no experiment without one has, and the laws
 without a shape of their own (`residual_law`)."""
 
-SCALES = (0.3, 1.0, 3.0)
+SCALES = (0.1, 0.3, 1.0, 3.0)
 """How many times its usual value an amplitude is probed at."""
 
 SHAPES = (0.4, 1.0, 2.5)

@@ -16,6 +16,7 @@ from pma_gym.discovery.held_out import unseen
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
+from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.discovery.rivals import rivals
 from pma_gym.discovery.selection import Selection, relearnt, select
 from pma_gym.discovery.suspects import suspects
@@ -104,7 +105,7 @@ class _Work:
         own = own_parameters(given)
         _check_size(logged, own.free)
         noise = tuple(white_noise(floor.level) for floor in floors)
-        bench = Bench(trials, given, own, noise, max(1, self.jobs))
+        bench = Bench(trials, given, own, noise, max(1, self.jobs), bool(coarse_sensors(floors)))
         self._tell("refitting parameters", 0, 1)
         refitted = self._timed("parameters", lambda: self._refitted(bench, journal))
         orders = [each.order for each in named]
