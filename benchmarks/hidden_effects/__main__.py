@@ -10,6 +10,7 @@ import typer
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 from benchmarks.hidden_effects import drawing, judging, scoring  # noqa: E402
+from benchmarks.hidden_effects import speed as timing  # noqa: E402
 from benchmarks.hidden_effects.cases import BLOCKS  # noqa: E402
 from benchmarks.hidden_effects.effects import ALL  # noqa: E402
 
@@ -59,6 +60,18 @@ def judge(
 def score(folder: Folder) -> None:
     """Count what was named right; writes FOLDER/score.json."""
     typer.echo(scoring.score(folder))
+
+
+@app.command()
+def speed(jobs: Annotated[int, typer.Option(min=1, help="Threads.")] = 2) -> None:
+    """Time diagnoses of three sizes against what they may take on two cores."""
+    for size in timing.SIZES:
+        first, again, verdict, effects = timing.measure(size, jobs)
+        typer.echo(
+            f"{size.trials} trials of {size.seconds:g} s at {size.rate_hz:g} Hz: {again:.1f} s "
+            f"(first time, with kernels to compile: {first:.1f} s); target {size.target_s:g} s; "
+            f"{verdict} {', '.join(effects)}"
+        )
 
 
 if __name__ == "__main__":

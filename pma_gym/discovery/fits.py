@@ -17,6 +17,9 @@ from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 
+ROUNDS = 25
+"""Most rounds of one fit."""
+
 LARGER = (30.0, 5.0)
 """How many times as large the noise is taken for on the way to a first fit."""
 
@@ -153,7 +156,7 @@ class Bench:
             search = Search(evidence, False, 1.0)
         except ValueError:
             return None
-        converged = search.run(None)
+        converged = search.run(None, ROUNDS)
         found = dict(zip(search.named(search.values), search.values, strict=True))
         return Fitted(
             model.replace({path: float(value) for path, value in found.items()}),

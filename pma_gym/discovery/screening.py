@@ -130,23 +130,30 @@ class _Probed:
 
 
 def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed:
+    """Scores of a suspect's probes beside the refitted model, which has `size - 1` parameters."""
     tried = np.concatenate([suspect.absent[None], suspect.probes])
     columns = evidence.columns(tried)
     if columns is None:
         columns = _one_by_one(evidence, tried)
-    joined = [
-        np.concatenate([ours, theirs[1:]])
-        for ours, theirs in zip(baseline.columns, columns, strict=True)
-    ]
-    pieces = baseline.evidence.products(joined)
-    total = pieces.total()
-    across = total[1:size, size:]
+    changes = [part[1:] for part in columns]
+    across = np.zeros((size - 1, len(suspect.probes)))
+    whole = np.zeros(len(suspect.probes))
+    along, own = [], []
+    for logged, ours, theirs in zip(
+        baseline.evidence.logged, baseline.columns, changes, strict=True
+    ):
+        flat = theirs.reshape(len(theirs), -1)
+        across += ours[1:].reshape(size - 1, -1) @ flat.T
+        whole += np.einsum("ij,ij->i", flat, flat, dtype=np.float64)
+        edges = baseline.evidence.edges(logged)[:-1]
+        for found, part in ((along, theirs), (own, ours[1:])):
+            slopes = np.einsum("kcr,cr->kr", part, ours[0], dtype=np.float64)
+            found.append(np.add.reduceat(slopes, edges, axis=1))
     weights = baseline.inverse @ across
-    strengths = np.diag(total)[size:] - np.sum(across * weights, axis=0)
-    whole = np.diag(total)[size:]
+    strengths = whole - np.sum(across * weights, axis=0)
     strengths = np.where(strengths > LEAST_PART * np.maximum(whole, 1e-12), strengths, 0.0)
-    slopes = pieces.products[:, size:, 0] - pieces.products[:, 1:size, 0] @ weights
-    return _Probed(slopes.T, strengths, _changes(baseline, joined, weights, size))
+    slopes = np.concatenate(along, axis=1) - weights.T @ np.concatenate(own, axis=1)
+    return _Probed(slopes, strengths, _changes(baseline, changes, weights))
 
 
 def _one_by_one(evidence: Evidence, tried: Array) -> list[Array]:
@@ -163,13 +170,16 @@ def _one_by_one(evidence: Evidence, tried: Array) -> list[Array]:
     ]
 
 
-def _changes(baseline: Baseline, columns: Sequence[Array], weights: Array, size: int) -> Array:
+def _changes(baseline: Baseline, changes: Sequence[Array], weights: Array) -> Array:
     """Rms of what each probe changes beyond parameters, over the noise, where that is most."""
     squares = np.zeros((weights.shape[1], 4))
     counts = np.zeros(4)
-    for logged, part in zip(baseline.evidence.logged, columns, strict=True):
-        rest = part[size:] - np.tensordot(weights.T.astype(np.float32), part[1:size], axes=1)
-        squares += np.sum(rest**2, axis=2)
+    reduced = weights.T.astype(np.float32)
+    for logged, ours, theirs in zip(
+        baseline.evidence.logged, baseline.columns, changes, strict=True
+    ):
+        rest = theirs - np.tensordot(reduced, ours[1:], axes=1)
+        squares += np.einsum("kcr,kcr->kc", rest, rest, dtype=np.float64)
         counts += [len(logged.time) * measured for measured in logged.measures]
     return np.sqrt(np.max(squares / np.maximum(counts, 1.0), axis=1))
 

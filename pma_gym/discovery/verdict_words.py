@@ -7,9 +7,21 @@ import numpy as np
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
+from pma_gym.discovery.words import (
+    effect_name,
+    effect_names,
+    figure,
+    percent,
+    signal_name,
+    signal_unit,
+)
+from pma_gym.units import suffix
 
 if TYPE_CHECKING:
     from pma_gym.discovery.answer import Findings
+
+MUCH = 1.3
+"""Misfit over the noise that is more than parameters leave where the structure is right."""
 
 ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""
@@ -22,24 +34,32 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
         return f"In these {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}."
+    rest = _unexplained(diagnosis)
     if diagnosis.verdict == "parameters":
         off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
         shown = ", ".join(map(_change_of(diagnosis), off[:3]))
         more = f" and {len(off) - 3} more" if len(off) > 3 else ""
+        if rest:
+            return (
+                f"Refitted to these {trials}, the parameters of model {name} change ({shown}{more})"
+                f", but {rest}."
+            )
         return (
             f"Model {name} has the right structure for these {trials}, but its parameters are off: "
             f"{shown}{more}{_closed(diagnosis)}."
         )
     if diagnosis.verdict == "agrees":
+        if rest:
+            return f"No parameter of model {name} is off by much in these {trials}, but {rest}."
         return f"Model {name} agrees with these {trials}: what is left is the noise of the sensors."
     if diagnosis.verdict == "unknown":
         return (
             f"Something is missing in model {name} that no effect of the catalogue carries: of "
-            f"what is slow in the residual of these {trials}, the best leaves {left:.0%}."
+            f"what is slow in the residual of these {trials}, the best leaves {percent(left)}."
         )
     if diagnosis.candidates and diagnosis.candidates[0].why == "added to the model":
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
-        rivals = ", ".join([diagnosis.candidates[0].name, *equal])
+        rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
         return (
             f"Model {name} misses something, but these {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
@@ -54,15 +74,39 @@ def _propose(diagnosis: Diagnosis) -> str:
     return f"; measure next: {following.protocol}." if following else "."
 
 
+def _unexplained(diagnosis: Diagnosis) -> str:
+    """What refitted parameters leave, where effects were not looked for; nothing where little."""
+    if diagnosis.candidates:
+        return ""
+    over = {signal: gap.after / gap.floor for signal, gap in diagnosis.gap.items() if gap.floor}
+    worst = max(over, key=lambda signal: over[signal], default="")
+    if not worst or over[worst] < MUCH:
+        return ""
+    gap = diagnosis.gap[worst]
+    return (
+        f"{signal_name(worst)} stays {figure(gap.after)} {signal_unit(worst)} off where the noise "
+        f"is {figure(gap.floor)} {signal_unit(worst)}: parameters alone do not explain that"
+    )
+
+
 def _effects(diagnosis: Diagnosis) -> str:
     named = []
     for effect in diagnosis.effects:
         sizes = ", ".join(
-            f"{parameter} {estimate.value:.3g}" for parameter, estimate in effect.parameters.items()
+            f"{_stem(parameter, each.unit)} {figure(each.value)} {each.unit}".removesuffix(" 1")
+            for parameter, each in effect.parameters.items()
         )
-        doubt = f", or {' or '.join(effect.confused_with)}" if effect.confused_with else ""
-        named.append(f"{effect.name.replace('_', ' ')} ({sizes}){doubt}")
+        others = effect_names(list(effect.confused_with), "or")
+        doubt = f", or {others}" if others else ""
+        named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
     return " and ".join(named)
+
+
+def _stem(parameter: str, unit_: str) -> str:
+    """A parameter's name without its unit: `force` of `force_n`."""
+    ending = suffix(unit_)
+    stem = parameter.removesuffix(f"_{ending}") if ending else parameter
+    return stem.replace("_", " ")
 
 
 def _closed(diagnosis: Diagnosis) -> str:
@@ -73,14 +117,21 @@ def _closed(diagnosis: Diagnosis) -> str:
     }
     if not gaps:
         return ""
+    effect, found = diagnosis.verdict == "effect", diagnosis.gap
     widest = max(
-        gaps, key=lambda signal: diagnosis.gap[signal].before / diagnosis.gap[signal].floor
+        gaps,
+        key=lambda signal: (
+            (found[signal].parameters if effect else found[signal].before) / found[signal].floor
+        ),
     )
-    gap = diagnosis.gap[widest]
+    gap = found[widest]
+    refitted = f" ({figure(gap.parameters)} with its parameters refitted)" if effect else ""
     unseen = " of trials that it was not fitted to" if gap.held_out else ""
     return (
-        f"; the amended model brings {widest} from {gap.before:.3g} to {gap.after:.3g} "
-        f"(noise {gap.floor:.3g}), {max(gap.closed or 0.0, 0.0):.0%} of the gap{unseen}"
+        f"; the amended model brings the misfit of {signal_name(widest)} from "
+        f"{figure(gap.before)}{refitted} to {figure(gap.after)} {signal_unit(widest)} (noise "
+        f"{figure(gap.floor)}), "
+        f"{percent(max(gap.closed or 0.0, 0.0))} of the gap{unseen}"
     )
 
 
@@ -134,8 +185,8 @@ def steps(found: "Findings", diagnosis: Diagnosis, left: float) -> tuple[str, ..
         )
     if selection.chosen:
         said.append(
-            f"Of what was slow in the residual, {left:.0%} is left by "
-            f"{' and '.join(suspect.name for suspect in selection.chosen)}."
+            f"Of what was slow in the residual, {percent(left)} is left by "
+            f"{effect_names([suspect.name for suspect in selection.chosen])}."
         )
     if found.unseen is not None:
         said.append(

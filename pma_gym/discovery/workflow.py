@@ -25,7 +25,7 @@ from pma_gym.plant.model import Model, ModelError, load_model
 
 Progress = Callable[[str, int, int], None]
 
-DEFAULT_MODEL = "serres2008"
+DEFAULT_MODEL = "station"
 
 
 def diagnose(
@@ -43,7 +43,7 @@ def diagnose(
 
     Args:
         trials: measured trials, or a data set (`pma_gym.data.dataset.read_dataset`).
-        model: the model to compare with; what the data set names, else serres2008.
+        model: the model to compare with; what the data set names, else station.
         seed: of simulated chance.
         jobs: how many threads simulate.
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes

@@ -159,9 +159,9 @@ class Search:
         """What chi-square has beyond noise."""
         return self.best.chi_square - self.residuals.count
 
-    def run(self, progress: Callable[[Round], None] | None) -> bool:
-        """Search; whether it converged."""
-        while self.rounds < MOST_ROUNDS and self.damping < _MOST_DAMPING:
+    def run(self, progress: Callable[[Round], None] | None, most: int = MOST_ROUNDS) -> bool:
+        """Search for so many rounds at most; whether it converged."""
+        while self.rounds < most and self.damping < _MOST_DAMPING:
             if progress is not None:
                 trials, best = self.residuals.trials, self.best.chi_square
                 progress(Round(self.rounds, trials, best, self.named(self.values)))
