@@ -112,21 +112,22 @@ class Bench:
             threads=self.threads,
         )
 
-    def first_fit(self) -> Fitted | None:
-        """Fit the given model, whose parameters may be far off.
+    def careful_fit(self, model: Model, extra: Sequence[Suspect] = ()) -> Fitted | None:
+        """Fit a model with suspects in it, whose parameters may be far off.
 
         A cable that slackens makes chi-square rugged, and a search that begins far away can end in
         a hollow. With the noise taken for larger, what parameters may be holds them on their way.
+        The better of this fit and a plain one is returned.
         """
-        begun = self.given
+        begun = model
         for larger in LARGER:
             noise = tuple(
                 Whitening(n.coefficients, larger * n.innovation, larger * n.level)
                 for n in self.noise
             )
-            found = replace(self, noise=noise).fit(begun)
+            found = replace(self, noise=noise).fit(begun, extra)
             begun = begun if found is None else found.model
-        fits = [fit for fit in (self.fit(begun), self.fit(self.given)) if fit is not None]
+        fits = [fit for fit in (self.fit(begun, extra), self.fit(model, extra)) if fit is not None]
         return min(fits, key=lambda fit: fit.chi_square, default=None)
 
     def fit(

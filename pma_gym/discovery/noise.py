@@ -160,6 +160,8 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
     span = float(distinct[-1] - distinct[0])
     gaps = gaps[gaps > 1e-6 * span]
     step = float(np.min(gaps))
+    # The smallest gap is off by what a file rounds; over many steps that would add up.
+    step = float(gaps.sum() / np.round(gaps / step).sum())
     whole = (distinct - distinct[0]) / step
     miss = np.abs(whole - np.round(whole))
     # Readings in files are rounded to some digits: a hundredth of a step may be lost.

@@ -27,8 +27,12 @@ LAWS = {
 }
 """What each law is, of what, and the unit of that."""
 
-RANGE = (0.5, 99.5)
+RANGE = (2.0, 98.0)
 """Percentiles of the data between which heights are laid."""
+
+UNDETERMINED = 3.0
+"""Times the median standard error from which on a height is none that the data know, and is not
+drawn."""
 
 
 @dataclass(frozen=True)
@@ -69,12 +73,15 @@ def residual_law(drawn: Drawn) -> ResidualLaw:
     at = np.linspace(first, first + reach, len(drawn.suspect.fitted_paths))
     places = [drawn.fit.paths.index(path) for path in drawn.suspect.fitted_paths]
     law = drawn.fit.values[places]
-    errors = np.sqrt(np.diag(drawn.fit.covariance))[places]
-    errors = np.where(np.isfinite(errors), errors, 0.0)
-    # The model's own parameters make any line of it, so a line says nothing about what is missing.
-    weights = 1.0 / np.maximum(errors, 1e-6 + errors.min())
-    line = np.polyval(np.polyfit(at, law, 1, w=weights), at)
-    law = law - line
+    covariance = drawn.fit.covariance[np.ix_(places, places)]
+    spread = np.sqrt(np.diag(covariance))
+    known = spread < UNDETERMINED * np.median(spread)
+    at, law, covariance = at[known], law[known], covariance[np.ix_(known, known)]
+    # The model's own parameters make any line of it, so a line says nothing about what is missing,
+    # and what only a line is uncertain by is no error of the rest.
+    lines = np.vander(at, 2)
+    rest = np.eye(len(at)) - lines @ np.linalg.pinv(lines)
+    law, errors = rest @ law, np.sqrt(np.diag(rest @ covariance @ rest))
     return ResidualLaw(
         quantity,
         variable,

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.noise import Whitening, autoregression
+from pma_gym.discovery.parameters import values
 from pma_gym.discovery.screening import Baseline, Look, beginnings, look
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.plant.model import Model
@@ -117,11 +118,11 @@ def select(
         if added is None:
             break
         chosen = (*chosen, next(s for s in suspects if s.name == added))
-        best = stage.fits[added]
+        best = _better(bench, stage.fits[added], chosen, journal)
         if len(chosen) > 1:
             chosen, best = _without_idle(bench, best, chosen, refitted, journal)
             if len(chosen) < len(stages):
-                # One was replaced by another, and that is the end of it.
+                # One is not missed beside the other, and that is the end of it.
                 break
     bench = replace(bench, noise=relearnt(bench, best, chosen))
     return Selection(tuple(stages), chosen, _refit(bench, best, chosen, journal), bench)
@@ -262,6 +263,19 @@ def _fit(
     return best
 
 
+def _better(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
+    """A fit, or a better one from a careful search: what it misses would look like an effect."""
+    key = f"better {bench.noise} {fit.names} {fit.values.tolist()}"
+    kept = journal.found(key)
+    if kept is not None:
+        return restored(kept, bench, fit, chosen)
+    given = dict(zip(bench.own.free, values(bench.given, bench.own.free).tolist(), strict=True))
+    found = bench.careful_fit(fit.model.replace(given), chosen)
+    best = fit if found is None or found.chi_square >= fit.chi_square else found
+    journal.keep(key, kept_form(best))
+    return best
+
+
 def _refit(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
     key = f"again {bench.noise} {fit.names} {fit.values.tolist()}"
     kept = journal.found(key)
@@ -281,7 +295,7 @@ def _without_idle(
 ) -> tuple[tuple[Suspect, ...], Fitted]:
     """The effects less those that nobody misses, and the fit of those that stay."""
     worst = refitted.chi_square
-    for suspect in chosen[:-1]:
+    for suspect in chosen:
         others = tuple(each for each in chosen if each is not suspect)
         begun = _plain(bench, best)
         starts = {

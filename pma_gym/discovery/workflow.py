@@ -151,7 +151,7 @@ class _Work:
         return named, model
 
     def _refitted(self, bench: Bench, journal: Journal) -> Fitted:
-        found = bench.first_fit()
+        found = bench.careful_fit(bench.given)
         if found is None:
             raise ModelError(
                 f"model {bench.given.name} cannot be simulated on these trials: its muscle does "
