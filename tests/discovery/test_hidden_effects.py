@@ -1,0 +1,74 @@
+"""Data of the independent generator, frozen: every effect hidden once, nothing, parameters off.
+
+`hidden/` was drawn by `python -m benchmarks.hidden_effects draw` and holds what a lab would have:
+trials, the model that it believes. `truth.json` beside it is read here alone. Seeds: 7 (three trials
+of 5 s, r = 2), 11 (passive_stretch and warm_up: four of 6 s), 12 (nothing and parameters).
+"""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+from benchmarks.hidden_effects.groups import group
+from pma_gym.data.dataset import read_dataset
+from pma_gym.discovery import diagnose
+
+HIDDEN = Path(__file__).parent / "hidden"
+TRUTH = json.loads((HIDDEN / "truth.json").read_text(encoding="utf-8"))
+EFFECTS = [name for name, truth in TRUTH.items() if truth["effects"]]
+QUIET = [name for name, truth in TRUTH.items() if not truth["effects"]]
+
+
+@cache
+def diagnosed(name):
+    return diagnose(read_dataset(HIDDEN / name))
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_hidden_effect_is_named(name):
+    found = diagnosed(name)
+    assert found.verdict == "effect", found.sentence
+    assert [effect.name for effect in found.effects if effect.name in group(name)], found.sentence
+    assert len(found.effects) == 1, found.sentence
+
+
+@pytest.mark.parametrize("name", QUIET)
+def test_where_nothing_is_hidden_nothing_is_claimed(name):
+    found = diagnosed(name)
+    assert found.verdict in ("parameters", "agrees") and not found.effects, found.sentence
+
+
+MOVED = {
+    "force_slope": "contractile_force.slope_n_per_kpa",
+    "damping_contracting": "damping.contracting_n_s_per_mm",
+    "damping_relaxing": "damping.relaxing_n_s_per_mm",
+    "regulator_time": "regulator_lag.time_constant_s",
+    "drive_gain": "drive.gain_n_per_v",
+    "radius": "rotor.radius_mm",
+}
+
+
+@pytest.mark.parametrize("name", [name for name in QUIET if TRUTH[name]["block"] == "parameters"])
+def test_parameters_that_were_off_are_named(name):
+    found = diagnosed(name)
+    assert found.verdict == "parameters"
+    off = {
+        path: TRUTH[name]["base_factors"][factor]
+        for factor, path in MOVED.items()
+        if abs(TRUTH[name]["base_factors"].get(factor, 1.0) - 1.0) > 0.05
+    }
+    told = {path for path in off if path not in found.not_identifiable}
+    assert told
+    for path in told:
+        moved = found.parameters[path]
+        assert moved.significant
+        assert moved.now.value / moved.start == pytest.approx(off[path], rel=0.02)
+
+
+def test_what_a_diagnosis_reads_does_not_hold_the_truth():
+    for name in TRUTH:
+        files = {path.name for path in (HIDDEN / name).iterdir()}
+        assert not any("truth" in each for each in files)
+        assert name not in (HIDDEN / name / "dataset.toml").read_text(encoding="utf-8")
