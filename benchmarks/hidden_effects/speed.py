@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery import diagnose
+from pma_gym.discovery import Diagnosis, diagnose
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 
@@ -58,12 +58,15 @@ def data_set(size: Size, seed: int = 0) -> list[Trial]:
 def measure(size: Size, jobs: int) -> tuple[float, float, str, list[str]]:
     """Seconds of a first and a second diagnosis, the verdict, and the effects named."""
     trials = data_set(size)
-    spent = []
-    for _ in range(2):
-        begun = time.perf_counter()
-        found = diagnose(trials, lab_model(), jobs=jobs)
-        spent.append(time.perf_counter() - begun)
-    return spent[0], spent[1], found.verdict, [effect.name for effect in found.effects]
+    first, _ = _timed(trials, jobs)
+    again, found = _timed(trials, jobs)
+    return first, again, found.verdict, [effect.name for effect in found.effects]
+
+
+def _timed(trials: list[Trial], jobs: int) -> tuple[float, Diagnosis]:
+    begun = time.perf_counter()
+    found = diagnose(trials, lab_model(), jobs=jobs)
+    return time.perf_counter() - begun, found
 
 
 def _asked(size: Size, number: int, generator: np.random.Generator) -> Trial:

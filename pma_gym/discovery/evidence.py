@@ -9,6 +9,7 @@ another simulation.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,13 +133,13 @@ class Evidence(Residuals):
 
         return self.gathered(self._each(tried, work))
 
-    def columns(self, tried: Array) -> list[Array] | None:
+    def columns(self, tried: Array) -> list[Any] | None:
         """Whitened residual at the first of some parameters, and what the others change.
 
         Shape (tried, 4, rows) for each trial, single precision; None where it cannot be simulated.
         """
 
-        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
             found = self._differences(logged, states, zeros, vectors, central=False)
             return self.whitened(logged, found[:, :, : len(logged.time)]).astype(np.float32)
 

@@ -55,7 +55,8 @@ class Whitening:
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""
         order = len(self.coefficients)
-        found = lfilter([1.0, *(-a for a in self.coefficients)], [1.0], series, axis=-1)
+        filtered = lfilter([1.0, *(-a for a in self.coefficients)], [1.0], series, axis=-1)
+        found = np.asarray(filtered)
         found /= self.innovation
         if order:
             # The first readings have no past: by the level alone.

@@ -47,15 +47,20 @@ def trial_records(found: "Findings") -> tuple[TrialRecord, ...]:
                 continue
             column = BY_QUANTITY[name]
             factor = SI_FACTORS[column.unit]
-            off = [_rms(curve[channel] - measured[channel]) / factor for curve in curves]
+            started_off, refitted_off, after_off = (
+                _rms(curve[channel] - measured[channel]) / factor for curve in curves
+            )
             floor = found.floors[channel].level / factor
-            gaps[column.name] = Gap(*off, floor, unseen is not None)
+            gaps[column.name] = Gap(started_off, refitted_off, after_off, floor, unseen is not None)
+        first, second, third = curves
         records.append(
             TrialRecord(
                 each.name,
                 each.trial.time,
                 measured.T,
-                *(curve.T for curve in curves),
+                first.T,
+                second.T,
+                third.T,
                 gaps,
                 unseen is not None,
             )

@@ -8,6 +8,7 @@ p-value holds for the largest of all.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +73,7 @@ class Baseline:
 
     evidence: Evidence
     values: Array
-    columns: list[Array]
+    columns: list[Any]
     inverse: Array
 
     @classmethod
@@ -156,7 +157,7 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
     return _Probed(slopes, strengths, _changes(baseline, changes, weights))
 
 
-def _one_by_one(evidence: Evidence, tried: Array) -> list[Array]:
+def _one_by_one(evidence: Evidence, tried: Array) -> list[Any]:
     """As `Evidence.columns`; a probe that cannot be simulated changes nothing."""
     rows = [evidence.columns(np.stack([tried[0], row])) for row in tried[1:]]
     first = evidence.columns(tried[:1])
@@ -170,7 +171,7 @@ def _one_by_one(evidence: Evidence, tried: Array) -> list[Array]:
     ]
 
 
-def _changes(baseline: Baseline, changes: Sequence[Array], weights: Array) -> Array:
+def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Array:
     """Rms of what each probe changes beyond parameters, over the noise, where that is most."""
     squares = np.zeros((weights.shape[1], 4))
     counts = np.zeros(4)

@@ -5,8 +5,9 @@ is missing by contraction, speed, pressure or load. A model may carry one, so th
 simulated with what nobody has named yet.
 """
 
+from collections import namedtuple
 from collections.abc import Callable
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 from pma_gym.effects.arithmetic import clip
 from pma_gym.effects.effect import Effect
@@ -25,7 +26,9 @@ def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[fl
         "reach": Quantity(unit, 1.0, most - least, "how far they go from there", usual=usual[1]),
     }
     fields = ends | {f"h{k}": _HEIGHT for k in range(HEIGHTS)}
-    return NamedTuple(name, [(stem, Annotated[float, each]) for stem, each in fields.items()])
+    found = namedtuple(name, fields)
+    found.__annotations__ = {stem: Annotated[float, each] for stem, each in fields.items()}
+    return found
 
 
 ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 70))
