@@ -1,0 +1,174 @@
+"""Verdicts: each where it belongs, with what it must bring along."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.workflow import diagnose
+from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import (
+    LEVELS,
+    OFF,
+    STATION,
+    commanded,
+    diagnosed,
+    laboratory,
+    measured,
+)
+
+
+@cache
+def standing(number=2):
+    """The diagnosis of trials whose commands never change."""
+    plant = Plant(STATION.replace(OFF))
+    found = []
+    for k, trial in enumerate(commanded(number)):
+        held = {name: np.full(len(trial), row[0]) for name, row in trial.commands.items()}
+        found.append(plant.simulate(Trial(trial.time, held), seed=k))
+    return diagnose(found, STATION)
+
+
+def test_the_true_model_agrees():
+    found = diagnosed("nothing")
+    assert found.verdict == "agrees"
+    assert found.effects == () and found.law is None
+    assert found.model == found.given
+    assert "agrees" in found.sentence
+
+
+@pytest.mark.parametrize("seed", [5, 6, 7])
+def test_the_true_model_agrees_whatever_the_noise(seed):
+    found = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION)
+    assert found.verdict == "agrees"
+    assert not found.where or min(place.p_value for place in found.where) > 1e-4
+
+
+def test_parameters_that_are_off_are_named():
+    found = diagnosed("parameters")
+    assert found.verdict == "parameters"
+    assert found.effects == ()
+    for path, truth in OFF.items():
+        moved = found.parameters[path]
+        assert moved.significant
+        assert moved.start == pytest.approx(_given(path))
+        half = 0.5 * (moved.now.high - moved.now.low)
+        assert abs(moved.now.value - truth) < 2.0 * half
+        assert path in found.sentence
+    assert found.model.at_the_door("drive")["gain_n_per_v"] == pytest.approx(101.0, rel=2e-3)
+
+
+def test_only_what_moved_is_significant():
+    found = diagnosed("parameters")
+    significant = {path for path, moved in found.parameters.items() if moved.significant}
+    assert set(OFF) <= significant
+    assert len(significant) <= len(OFF) + 1
+
+
+def test_intervals_cover_the_truth():
+    """Of all the parameters that moved, over several data sets, some 95 %."""
+    covered = []
+    for seed in (11, 12, 13, 14):
+        found = diagnose(measured(STATION.replace(OFF), 4, rate=32.0, seed=seed), STATION)
+        for path, truth in OFF.items():
+            now = found.parameters[path].now
+            covered.append(now.low <= truth <= now.high)
+    assert sum(covered) >= 6
+
+
+def test_hysteresis_is_named_with_its_size():
+    found = diagnosed("hysteresis")
+    assert found.verdict == "effect"
+    effect = found.effects[0]
+    assert effect.name == "hysteresis"
+    assert len(found.effects) == 1
+    assert effect.p_value <= 0.005
+    for name, truth in (("force_n", 6.0), ("distance_mm", 1.0)):
+        estimate = effect.parameters[name]
+        assert estimate.low < estimate.value < estimate.high
+        error = (estimate.high - estimate.low) / 3.92
+        assert abs(estimate.value - truth) < 3.0 * error
+    assert "hysteresis" in found.sentence
+    assert found.candidates[0].name == "hysteresis"
+    assert found.candidates[0].why == "added to the model"
+    assert found.candidates[0].held_out_gain > 0.0
+
+
+def test_an_effect_closes_the_gap_on_trials_it_has_not_seen():
+    found = diagnosed("hysteresis")
+    for gap in found.gap.values():
+        assert gap.held_out
+    for signal in ("contraction_mm", "rotation_deg"):
+        gap = found.gap[signal]
+        assert gap.after < 0.5 * gap.parameters
+    load = found.gap["load_n"]
+    assert load.before > 5 * load.after
+    assert load.after == pytest.approx(load.floor, rel=0.1)
+
+
+def test_two_effects_are_both_named():
+    found = diagnosed("pair")
+    assert found.verdict == "effect"
+    assert {effect.name for effect in found.effects} == {"hysteresis", "regulator_delay"}
+    delay = next(each for each in found.effects if each.name == "regulator_delay")
+    assert delay.parameters["delay_ms"].value == pytest.approx(20.0, abs=2.0)
+
+
+def test_what_never_moves_decides_nothing():
+    found = standing()
+    assert found.verdict == "undecidable"
+    assert found.next_experiment is not None
+    assert found.next_experiment.protocol in found.sentence
+    assert found.next_experiment.separates
+    moves = found.next_experiment.trial.commands
+    assert any(np.ptp(row) > 0.0 for row in moves.values())
+    assert len(found.blind) > 10
+
+
+def test_what_stands_still_does_not_identify_what_moves():
+    found = standing()
+    assert "damping.contracting_n_s_per_mm" in found.not_identifiable
+    assert all(found.not_identifiable.values())
+
+
+def test_floors_are_the_sensors_noise():
+    found = diagnosed("nothing", 4, 128.0)
+    factors = (1e-3, np.pi / 180.0, 1.0, 1e3)
+    for floor, level, factor in zip(found.floors.values(), LEVELS, factors, strict=True):
+        assert floor.value * factor == pytest.approx(level, rel=0.25)
+
+
+def test_an_amended_model_carries_its_intervals():
+    found = diagnosed("hysteresis")
+    note = found.model.notes["hysteresis.force_n"]
+    estimate = found.effects[0].parameters["force_n"]
+    assert (note.low, note.high) == pytest.approx((estimate.low, estimate.high))
+
+
+def test_nothing_is_held_out_of_a_single_trial():
+    found = diagnosed("nothing", 1)
+    assert all(not record.held_out for record in found.trials)
+
+
+def test_every_trial_has_its_curves():
+    trials = laboratory("hysteresis")[0]
+    found = diagnosed("hysteresis")
+    assert len(found.trials) == len(trials)
+    for record, trial in zip(found.trials, trials, strict=True):
+        shape = (len(trial), 4)
+        assert record.measured.shape == record.before.shape == record.after.shape == shape
+        assert np.array_equal(record.measured[:, 2], trial.measurements["load"])
+
+
+def test_every_suspect_is_accounted_for():
+    found = diagnosed("hysteresis")
+    assert len(found.candidates) > 25
+    assert len({each.name for each in found.candidates}) == len(found.candidates)
+    assert all(each.why for each in found.candidates)
+    assert set(found.blind) <= {each.name for each in found.candidates}
+
+
+def _given(path):
+    effect, _, door = path.partition(".")
+    return STATION.at_the_door(effect)[door]

@@ -1,0 +1,167 @@
+"""From trials to answer: the same bytes, in every circumstance that a laboratory offers."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import pma_gym.envs  # noqa: F401
+from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.discovery.workflow import diagnose, refit
+from pma_gym.plant.model import dump_model, load_model
+from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import STATION, diagnosed, laboratory, measured, only
+
+EVERY = ("contraction", "rotation", "load", "pressure")
+
+
+@pytest.fixture(scope="module")
+def amended(tmp_path_factory):
+    path = tmp_path_factory.mktemp("amended") / "model.toml"
+    path.write_text(dump_model(diagnosed("hysteresis").model), encoding="utf-8")
+    return path
+
+
+def test_jobs_change_no_byte():
+    trials = laboratory("hysteresis")[0]
+    assert diagnose(trials, STATION, jobs=2).text() == diagnosed("hysteresis").text()
+
+
+def test_the_seed_changes_chance_alone():
+    trials = laboratory("parameters")[0]
+    one, other = diagnose(trials, STATION), diagnose(trials, STATION, seed=1)
+    assert one.text() == diagnosed("parameters").text()
+    assert one.verdict == other.verdict
+    assert one.parameters == other.parameters
+    drawn = [[each.p_value for each in found.candidates] for found in (one, other)]
+    assert drawn[0] != drawn[1]
+
+
+def test_the_text_is_json_with_all_parts():
+    found = json.loads(diagnosed("hysteresis").text())
+    assert found["schema"] == 1
+    assert {"verdict", "where", "effects", "parameters", "gap", "candidates"} <= set(found)
+    assert found["effects"][0]["name"] == "hysteresis"
+    assert set(found["gap"]) == {"contraction_mm", "rotation_deg", "load_n", "pressure_kpa"}
+
+
+def test_the_amended_model_drives_an_environment(amended):
+    env = gym.make("pma_gym/IsokineticDisplacement-v0", model=str(amended))
+    observation, _ = env.reset(seed=0)
+    assert np.all(np.isfinite(observation))
+    observation, *_ = env.step(env.action_space.sample())
+    assert np.all(np.isfinite(observation))
+    env.close()
+
+
+def test_the_amended_model_is_a_plant_that_repeats_the_trials(amended):
+    trials, _ = laboratory("hysteresis")
+    plant, given = Plant(load_model(amended)), Plant(STATION)
+    for trial in trials:
+        read = trial.measurements["load"]
+        load, before = (
+            _rms(each.simulate(trial, noise=False).measurements["load"] - read)
+            for each in (plant, given)
+        )
+        assert load < 0.8
+        assert before > 3 * load
+
+
+def _rms(gap):
+    return float(np.sqrt(np.mean(gap**2)))
+
+
+def test_a_second_diagnosis_finds_nothing_more(amended):
+    found = diagnose(laboratory("hysteresis", 3)[0], amended)
+    assert found.verdict in ("agrees", "parameters")
+    assert not found.effects
+
+
+def test_other_trials_agree_with_the_amended_model(amended):
+    truth = laboratory("hysteresis")[1]
+    found = diagnose(measured(truth, 3, seed=8), amended)
+    assert found.verdict in ("agrees", "parameters")
+    assert not found.effects
+
+
+def test_one_trial_works_and_says_so():
+    found = diagnosed("nothing", 1)
+    assert found.verdict in ("agrees", "undecidable")
+    assert any("one trial" in warning for warning in found.warnings)
+    assert not any(gap.held_out for gap in found.gap.values())
+
+
+@pytest.mark.parametrize("kept", [("contraction",), EVERY[1:]])
+def test_some_sensors_are_enough(kept):
+    trials = [only(trial, *kept) for trial in laboratory("hysteresis", 3)[0]]
+    found = diagnose(trials, STATION)
+    assert [effect.name for effect in found.effects] == ["hysteresis"]
+    assert {signal.rpartition("_")[0] for signal in found.gap} == set(kept)
+    assert set(found.floors) == set(found.gap)
+
+
+def test_trials_may_have_different_sensors():
+    trials = laboratory("hysteresis", 3)[0]
+    mixed = [only(trial, *EVERY[k % 2 : 3 + k % 2]) for k, trial in enumerate(trials)]
+    found = diagnose(mixed, STATION)
+    assert [effect.name for effect in found.effects] == ["hysteresis"]
+
+
+def test_gaps_do_no_harm():
+    generator = np.random.default_rng(2)
+    trials = []
+    for trial in laboratory("hysteresis", 3)[0]:
+        rows = {
+            name: np.where(generator.random(len(row)) < 0.1, np.nan, row)
+            for name, row in trial.measurements.items()
+        }
+        rows["load"][40:90] = np.nan
+        trials.append(Trial(trial.time, trial.commands, rows))
+    found = diagnose(trials, STATION)
+    assert [effect.name for effect in found.effects] == ["hysteresis"]
+    force = found.effects[0].parameters["force_n"]
+    assert force.low is not None and force.high is not None
+    assert force.value == pytest.approx(6.0, abs=3 * (force.high - force.low) / 3.92)
+    assert np.isfinite([gap.after for gap in found.gap.values()]).all()
+
+
+def test_names_of_a_data_set_are_kept():
+    trials = laboratory("nothing", 2)[0]
+    named = tuple(NamedTrial(f"run_{k}.csv", trial) for k, trial in enumerate(trials))
+    found = refit(Dataset("", None, named), STATION)
+    assert [trial.name for trial in found.trials] == ["run_0.csv", "run_1.csv"]
+
+
+def test_a_refit_looks_for_nothing():
+    found = refit(laboratory("hysteresis")[0], STATION)
+    assert found.verdict in ("parameters", "agrees")
+    assert found.candidates == () and found.effects == ()
+    assert found.parameters["drive.gain_n_per_v"].significant
+
+
+def test_progress_is_told():
+    told = []
+    diagnose(laboratory("parameters")[0], STATION, progress=lambda *each: told.append(each))
+    steps = [step for step, _, _ in told]
+    assert steps[0] == "refitting parameters"
+    assert steps[-1] == "putting the answer together"
+    assert all(0 <= done <= total for _, done, total in told)
+
+
+def test_nothing_cannot_be_diagnosed():
+    with pytest.raises(TrialError, match="at least one trial"):
+        diagnose([], STATION)
+
+
+def test_too_few_readings_are_refused_with_their_number():
+    trial = laboratory("nothing", 1)[0][0]
+    few = Trial(
+        trial.time[:8],
+        {name: row[:8] for name, row in trial.commands.items()},
+        {"load": trial.measurements["load"][:8]},
+    )
+    with pytest.raises(TrialError, match="8 readings for"):
+        diagnose([few], STATION)
