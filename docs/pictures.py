@@ -1,5 +1,8 @@
 """Draws the pictures of README and documentation: `python docs/pictures.py`."""
 
+import os
+import re
+import tempfile
 from pathlib import Path
 
 import gymnasium as gym
@@ -7,6 +10,10 @@ import matplotlib.image
 
 import pma_gym  # noqa: F401 - registers the environments
 from controllers import SerresReplay
+from pma_gym.data.dataset import read_dataset
+from pma_gym.discovery import diagnose
+from pma_gym.discovery.curves import curves_picture, worst_trial
+from pma_gym.discovery.pictures import gap_picture, map_picture
 
 IMAGES = Path(__file__).parent / "images"
 STOP_S = 4.0
@@ -26,5 +33,29 @@ def draw_station() -> None:
     matplotlib.image.imsave(IMAGES / "station.png", env.render())
 
 
+def draw_diagnosis() -> None:
+    """What the tutorial's diagnosis shows: where, how much each step closes, the worst trial."""
+    page = (Path(__file__).parent / "diagnosis.md").read_text(encoding="utf-8")
+    block = re.search(r"```python\n(.*?)```", page, flags=re.DOTALL)
+    assert block is not None
+    here = Path.cwd()
+    with tempfile.TemporaryDirectory() as folder:
+        os.chdir(folder)
+        try:
+            exec(block[1], {})
+            found = diagnose(read_dataset("lab"), "serres2008", jobs=2)
+        finally:
+            os.chdir(here)
+    worst = worst_trial(found)
+    assert worst is not None
+    for name, picture in (
+        ("where", map_picture(found.maps[:1])),
+        ("gap", gap_picture(dict(found.gap), ["as given", "refitted", "effect added"])),
+        ("worst", curves_picture(worst, found)),
+    ):
+        (IMAGES / f"diagnosis-{name}.png").write_bytes(picture)
+
+
 if __name__ == "__main__":
     draw_station()
+    draw_diagnosis()

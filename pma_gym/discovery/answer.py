@@ -25,7 +25,7 @@ from pma_gym.discovery.records import floors_at_the_door, gaps, trial_records
 from pma_gym.discovery.residual_laws import Drawn, drawn_laws, residual_law
 from pma_gym.discovery.rivals import Rival
 from pma_gym.discovery.screening import Look
-from pma_gym.discovery.selection import Selection, passes
+from pma_gym.discovery.selection import LEAST_CHANGE, Selection, passes
 from pma_gym.discovery.slowness import leftover_share
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.discovery.verdict_words import sentence, steps, unidentified
@@ -49,6 +49,10 @@ MOST_SPREAD = 0.4
 
 MOST_RIVALS = 2
 """Most others that an effect may be confused with and still be named: groups of three."""
+
+MUCH_EXPLAINED = 0.1
+"""Share of chi-square that an effect could explain, from which on its not passing the gate means
+that there are too few data, not that the structure is right."""
 
 BLIND_SHARE = 0.6
 """Share of the catalogue that would not have shown, from which on silence says nothing."""
@@ -183,6 +187,14 @@ def _outdone(found: Findings, laws: Sequence[Drawn]) -> bool:
     return laws[0].gain > max(BETTER * gain, gain + BETTER_BY)
 
 
+def _suspicious(found: Findings) -> bool:
+    """Whether an effect could explain much, in too few data to rule chance out."""
+    if _gate(found) or not found.looks:
+        return False
+    best = found.looks[0]
+    return best.change >= LEAST_CHANGE and best.gain > MUCH_EXPLAINED * found.refitted.chi_square
+
+
 def _verdict(
     found: Findings, left: float, laws: Sequence[Drawn], blind: Sequence[str], coarse: bool
 ) -> Verdict:
@@ -199,6 +211,8 @@ def _verdict(
         return "undecidable" if undecided or not _confirmed(found) else "effect"
     if coarse:
         return "effect"
+    if _suspicious(found):
+        return "undecidable"
     if found.searched and len(blind) > BLIND_SHARE * max(len(found.suspects), 1):
         return "undecidable"
     moved = any(each.significant for each in _moved(found, found.selection.fit).values())
@@ -381,6 +395,8 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
     if verdict == "undecidable" and found.looks:
         dim = [look.suspect for look in found.looks if look.suspect.name in blind]
+        if _suspicious(found):
+            dim = [look.suspect for look in found.looks[:3]]
         return for_blind(found.bench, found.refitted, dim, found.looks)
     return None
 

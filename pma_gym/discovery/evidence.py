@@ -1,9 +1,9 @@
 """Measured trials beside a model: whitened residuals, and sums of them that are small.
 
 Residuals are simulated less measured, made white by each signal's noise; the zeros of contraction
-and rotation are free in every trial and projected out. Sums are kept for pieces of about a second,
-so that trials can be left out, and chance be simulated by turning the signs of pieces, without
-another simulation.
+and rotation are free in every trial and projected out. Sums are kept for pieces of a quarter of a
+second, so that trials can be left out, and chance be simulated by turning the signs of pieces,
+without another simulation.
 """
 
 import math
@@ -29,8 +29,9 @@ FREE_ZEROS = ("contraction", "rotation")
 FARTHEST = 6.0
 """Standard deviations of what is assumed beforehand that a parameter may go away from it."""
 
-PIECE_S = 1.0
-"""How long a piece is (s); longer than the memory of noise and plant."""
+PIECE_S = 0.25
+"""How long a piece is (s): longer than what whitening leaves of the noise's memory, and so short
+that what shows for a second or two still makes more than a handful of pieces."""
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 What a probe changes in the signals is made white, and what the model's own parameters could do of
 it is projected out. The rest, times a free factor, is set against the residual. Chance is simulated
-by turning the signs of pieces of a second of the residual, for the whole catalogue at once, so the
-p-value holds for the largest of all.
+by turning the signs of pieces of a quarter of a second of the residual, for the whole catalogue at
+once, so the p-value holds for the largest of all.
 """
 
 from collections.abc import Callable, Sequence

@@ -63,6 +63,12 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
         return (
             f"Model {name} misses something, but these {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
+    best = diagnosis.candidates[0] if diagnosis.candidates else None
+    if best is not None and len(diagnosis.blind) < 0.5 * len(diagnosis.candidates):
+        return (
+            f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
+            f"in too little of these {trials} to rule chance out"
+        ) + _propose(diagnosis)
     return (
         f"These {trials} cannot tell whether model {name} misses anything: "
         f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
