@@ -80,7 +80,7 @@ def test_pieces_sum_to_sums(trials, noise):
     np.testing.assert_allclose(parts, total, rtol=1e-9)
     assert pieces.readings() == found.count
     assert sum(pieces.readings([k]) for k in range(3)) == found.count
-    assert [int((pieces.trial == k).sum()) for k in range(3)] == [5, 5, 5]
+    assert [int((pieces.trial == k).sum()) for k in range(3)] == [20, 20, 20]
 
 
 def test_each_trial_counts_for_itself(trials):
