@@ -90,7 +90,9 @@ class Baseline:
             part[1:] /= steps[:, None, None].astype(np.float32)
         total = evidence.products(columns).total()
         curvature = total[1:, 1:] + np.diag(evidence.prior**-2.0)
-        scale = 1.0 / np.sqrt(np.diag(curvature))
+        # A parameter of an effect may change nothing here, and nothing is assumed of it.
+        diagonal = np.diag(curvature)
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         inner = np.linalg.pinv(curvature * np.outer(scale, scale), hermitian=True)
         return cls(evidence, values, columns, inner * np.outer(scale, scale))
 

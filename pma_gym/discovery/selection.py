@@ -39,6 +39,9 @@ SECOND_SHARE = 0.12
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
 misses of its real likeness is of that order."""
 
+BEGINNINGS = 3
+"""How often the selection begins anew from a better refitted model."""
+
 MOST_EFFECTS = 3
 """Most effects that are added."""
 
@@ -81,12 +84,15 @@ class Selection:
         chosen: the suspects in the model, in the order in which they came.
         fit: the model with them.
         bench: with the noise that it leaves.
+        refitted: the model with its own parameters refitted alone; better than what the selection
+            began with, where it had been caught.
     """
 
     stages: tuple[Stage, ...]
     chosen: tuple[Suspect, ...]
     fit: Fitted
     bench: Bench
+    refitted: Fitted
 
 
 def select(
@@ -109,6 +115,7 @@ def select(
     """
     chosen: tuple[Suspect, ...] = ()
     stages: list[Stage] = []
+    begun: list[str] = []
     best = refitted
     while len(chosen) < MOST_EFFECTS:
         rest = [suspect for suspect in suspects if suspect not in chosen]
@@ -119,13 +126,17 @@ def select(
             break
         chosen = (*chosen, next(s for s in suspects if s.name == added))
         best = _better(bench, stage.fits[added], chosen, journal)
-        if len(chosen) > 1:
-            chosen, best = _without_idle(bench, best, chosen, refitted, journal)
-            if len(chosen) < len(stages):
-                # One is not missed beside the other, and that is the end of it.
-                break
+        chosen, best = _without_idle(bench, best, chosen, refitted, journal)
+        if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
+            # The refitted model had been caught in a hollow that any effect led out of.
+            refitted, stages = best, []
+            begun.append(added)
+        elif len(chosen) < len(stages):
+            # One is not missed beside the other, and that is the end of it.
+            break
     bench = replace(bench, noise=relearnt(bench, best, chosen))
-    return Selection(tuple(stages), chosen, _refit(bench, best, chosen, journal), bench)
+    fit = _refit(bench, best, chosen, journal)
+    return Selection(tuple(stages), chosen, fit, bench, refitted)
 
 
 def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:

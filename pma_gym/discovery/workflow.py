@@ -124,7 +124,7 @@ class _Work:
             given=given,
             floors=floors,
             bench=bench,
-            refitted=refitted,
+            refitted=selection.refitted,
             selection=selection,
             suspects=tuple(every),
             searched=search,
@@ -203,7 +203,7 @@ class _Work:
 def _nothing(bench: Bench, refitted: Fitted) -> Selection:
     """A selection from no suspects."""
     noise = relearnt(bench, refitted, ())
-    return Selection((), (), refitted, replace(bench, noise=noise))
+    return Selection((), (), refitted, replace(bench, noise=noise), refitted)
 
 
 def _check_size(logged: Sequence[Logged], free: Sequence[str]) -> None:
