@@ -7,7 +7,7 @@ without another simulation.
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 
 FREE_ZEROS = ("contraction", "rotation")
 """Outputs whose zero is free in every trial."""
+
+ROWS = 256
+"""Rows in one product of matrices: few enough that no BLAS shares it between threads."""
 
 FARTHEST = 6.0
 """Standard deviations of what is assumed beforehand that a parameter may go away from it."""
@@ -107,11 +110,12 @@ class Evidence(Residuals):
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums over whitened residuals, with what the prior adds."""
-        found = self.pieces(values, steps, central)
-        if found is None:
+        found = self._moved_products(values, steps, central, self._product)
+        total = np.sum(found, axis=0) if found else np.full((1, 1), np.nan)
+        if not np.isfinite(total).all():
             size = len(steps)
             return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
-        total, away = found.total(), (values - self.centre) / self.prior
+        away = (values - self.centre) / self.prior
         chi_square = float(total[0, 0] + away @ away)
         if not steps.size:
             return Sums(chi_square, np.empty(0), np.empty((0, 0)))
@@ -123,6 +127,16 @@ class Evidence(Residuals):
 
         None where the model cannot be simulated.
         """
+        return self.gathered(self._moved_products(values, steps, central, self._products))
+
+    def _moved_products(
+        self,
+        values: Array,
+        steps: Array,
+        central: bool,
+        products: Callable[[Logged, Array], Array],
+    ) -> list[Array]:
+        """What `products` makes of each trial's whitened residual and its derivatives."""
         moves = np.diag(steps) if steps.size else np.empty((0, len(values)))
         tried = np.concatenate([values[None], values + moves, *([values - moves] * central)])
         widths = np.concatenate([[1.0], steps])
@@ -130,9 +144,9 @@ class Evidence(Residuals):
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             found = self._differences(logged, states, zeros, vectors, central)
             white = self.whitened(logged, found[:, :, : len(logged.time)])
-            return self._products(logged, white / widths[:, None, None])
+            return products(logged, white / widths[:, None, None])
 
-        return self.gathered(self._each(tried, work))
+        return self._each(tried, work)
 
     def columns(self, tried: Array) -> list[Any] | None:
         """Whitened residual at the first of some parameters, and what the others change.
@@ -206,6 +220,14 @@ class Evidence(Residuals):
             part = white[:, :, start:stop].reshape(len(white), -1)
             found[k] = part @ part.T
         return found
+
+    def _product(self, logged: Logged, white: Array) -> Array:
+        """The sum of `_products`, shape (columns, columns), in fewer and larger steps."""
+        total = np.zeros((len(white), len(white)))
+        for start in range(0, len(logged.time), ROWS):
+            part = white[:, :, start : start + ROWS].reshape(len(white), -1)
+            total += part @ part.T
+        return total
 
     def _counts(self, logged: Logged) -> NDArray[np.int64]:
         there = np.zeros((len(OUTPUTS), len(logged.time)), bool)
