@@ -269,6 +269,9 @@ def _fit(
         found = bench.fit(before.model, extra, {each.suspect.name: begun})
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
+        if best is not None and before.chi_square - best.chi_square >= each.gain:
+            # As much as the look promised: no other beginning is needed.
+            break
     if best is None or best.chi_square > before.chi_square:
         # Caught in a hollow: where the effect is absent it explains more.
         return None
