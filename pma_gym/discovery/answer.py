@@ -1,12 +1,10 @@
-"""The verdict, and everything that a diagnosis says, from what its steps found."""
+"""Everything that a diagnosis says, from what its steps found."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.data.dataset import NamedTrial
-from pma_gym.discovery.constancy import spread
 from pma_gym.discovery.diagnosis import (
     Candidate,
     Diagnosis,
@@ -16,95 +14,28 @@ from pma_gym.discovery.diagnosis import (
     Verdict,
 )
 from pma_gym.discovery.experiment import for_blind, next_experiment
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.floors import Level
-from pma_gym.discovery.held_out import Unseen
+from pma_gym.discovery.findings import Findings
+from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import unit, values
 from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.discovery.records import floors_at_the_door, gaps, trial_records
-from pma_gym.discovery.residual_laws import Drawn, drawn_laws, residual_law
-from pma_gym.discovery.rivals import Rival
+from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
-from pma_gym.discovery.selection import LEAST_CHANGE, Selection, passes
+from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover_share
-from pma_gym.discovery.suspects import Suspect
+from pma_gym.discovery.verdict import shapeless_laws, suspicious, verdict_of
 from pma_gym.discovery.verdict_words import sentence, steps, unidentified
 from pma_gym.discovery.where import localise
 from pma_gym.plant.model import Model, Note
 
 Progress = Callable[[str, int, int], None]
 
-MOST_LEFT = 0.35
-"""Share of what was slow in the residual that may be left by effects that explain it."""
-
-DOUBTFUL = 0.08
-"""The same, from which on laws without a shape of their own are set against the effects."""
-
-BETTER, BETTER_BY = 1.15, 60.0
-"""By how much such a law must explain more than the effects to say that they are not it: a factor
-on their gain in chi-square, and chi-square."""
-
-MOST_SPREAD = 0.4
-"""Most that an effect's size may scatter from trial to trial, as a share of it."""
-
-MOST_RIVALS = 2
-"""Most others that an effect may be confused with and still be named: groups of three."""
-
-MUCH_EXPLAINED = 0.1
-"""Share of chi-square that an effect could explain, from which on its not passing the gate means
-that there are too few data, not that the structure is right."""
-
-BLIND_SHARE = 0.6
-"""Share of the catalogue that would not have shown, from which on silence says nothing."""
-
 MOVED = 3.0
 """Standard errors by which a parameter must move to be said to have been off."""
-
-MOVED_CHANGE = 0.1
-"""Least rms change of the signals, over the noise, by which refitted parameters differ from those
-that were given: below, they agree."""
 
 DETERMINED = 0.7
 """A parameter whose standard error is a larger share of what was assumed of it beforehand is not
 determined by the data."""
-
-
-@dataclass(frozen=True)
-class Findings:
-    """What the steps of a diagnosis found.
-
-    Attributes:
-        named: the trials.
-        given: the model.
-        floors: noise of the four outputs.
-        bench: with the noise as seen at rest.
-        refitted: the model's own parameters refitted.
-        selection: the effects.
-        suspects: the catalogue.
-        searched: whether effects were looked for.
-        seed: of simulated chance.
-        rivals: of each effect.
-        unseen: what the amended model says of trials that it was not fitted to.
-        unseen_without: the same without the effects.
-    """
-
-    named: tuple[NamedTrial, ...]
-    given: Model
-    floors: Sequence[Level]
-    bench: Bench
-    refitted: Fitted
-    selection: Selection
-    suspects: tuple[Suspect, ...]
-    searched: bool
-    seed: int
-    rivals: tuple[tuple[Rival, ...], ...] = ()
-    unseen: Unseen | None = None
-    unseen_without: Unseen | None = None
-
-    @property
-    def looks(self) -> tuple[Look, ...]:
-        """The first looks at the whole catalogue, the most promising first."""
-        return self.selection.stages[0].looks if self.selection.stages else ()
 
 
 def answer(found: Findings, tell: Progress) -> Diagnosis:
@@ -112,14 +43,16 @@ def answer(found: Findings, tell: Progress) -> Diagnosis:
     tell("putting the answer together", 0, 3)
     coarse = coarse_sensors(found.floors)
     left = leftover_share(found)
-    laws = _laws(found, left)
+    laws = shapeless_laws(found, left)
     blind = tuple(
         look.suspect.name
         for look in found.looks
         if look.resolvable is None or look.resolvable > 1.0
     )
-    verdict = _verdict(found, left, laws, blind, bool(coarse))
     fit = found.selection.fit
+    parameters = _moved(found, fit)
+    off = any(moved.significant for moved in parameters.values())
+    verdict = verdict_of(found, left, laws, blind, bool(coarse), off)
     effects = (*_effects(found), *coarse) if verdict == "effect" else ()
     model = _amended(found, verdict)
     tell("putting the answer together", 1, 3)
@@ -136,7 +69,7 @@ def answer(found: Findings, tell: Progress) -> Diagnosis:
         sentence="",
         where=where,
         effects=effects,
-        parameters=_moved(found, fit),
+        parameters=parameters,
         gap=gaps(records),
         candidates=_candidates(found),
         next_experiment=_following(found, verdict, blind),
@@ -153,91 +86,6 @@ def answer(found: Findings, tell: Progress) -> Diagnosis:
     return replace(
         diagnosis, sentence=sentence(diagnosis, left), steps=steps(found, diagnosis, left)
     )
-
-
-def _gate(found: Findings) -> bool:
-    """Whether anything passed the gate."""
-    return bool(found.selection.stages and found.selection.stages[0].gate)
-
-
-def _laws(found: Findings, left: float) -> list[Drawn]:
-    """Laws without a shape of their own, where the effects leave room for one."""
-    if not _gate(found) or (left < DOUBTFUL and not _scatters(found)):
-        return []
-    return drawn_laws(found.selection.bench, found.refitted)
-
-
-def _scatters(found: Findings) -> bool:
-    """Whether an effect that was selected is of another size in each trial."""
-    selection = found.selection
-    return any(
-        spread(selection.bench, selection.fit, selection.chosen, place) > MOST_SPREAD
-        for place in range(len(selection.chosen))
-    )
-
-
-def _outdone(found: Findings, laws: Sequence[Drawn]) -> bool:
-    """Whether a law without a shape of its own explains more than the effects do."""
-    if not laws:
-        return False
-    selection = found.selection
-    evidence = selection.bench.evidence(found.refitted.model)
-    before = evidence.sums(found.refitted.values, np.empty(0)).chi_square
-    gain = before - selection.fit.chi_square
-    return laws[0].gain > max(BETTER * gain, gain + BETTER_BY)
-
-
-def _suspicious(found: Findings) -> bool:
-    """Whether an effect could explain much, in too few data to rule chance out."""
-    if _gate(found) or not found.looks:
-        return False
-    best = found.looks[0]
-    return best.change >= LEAST_CHANGE and best.gain > MUCH_EXPLAINED * found.refitted.chi_square
-
-
-def _verdict(
-    found: Findings, left: float, laws: Sequence[Drawn], blind: Sequence[str], coarse: bool
-) -> Verdict:
-    chosen = found.selection.chosen
-    gate = _gate(found)
-    if gate and (left > MOST_LEFT or _scatters(found) or _outdone(found, laws)):
-        return "unknown"
-    if gate and not chosen:
-        return "undecidable"
-    if chosen:
-        undecided = any(
-            sum(rival.equal for rival in rivals) > MOST_RIVALS for rivals in found.rivals
-        )
-        return "undecidable" if undecided or not _confirmed(found) else "effect"
-    if coarse:
-        return "effect"
-    if _suspicious(found):
-        return "undecidable"
-    if found.searched and len(blind) > BLIND_SHARE * max(len(found.suspects), 1):
-        return "undecidable"
-    moved = any(each.significant for each in _moved(found, found.selection.fit).values())
-    return "parameters" if moved and _change(found) > MOVED_CHANGE else "agrees"
-
-
-def _confirmed(found: Findings) -> bool:
-    """Whether the effects help on trials that the fits had not seen."""
-    if found.unseen is None or found.unseen_without is None:
-        return True
-    with_it, without = found.unseen.chi_square, found.unseen_without.chi_square
-    # By the number of trials too: one trial beyond what the others reach may weigh more than all.
-    return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
-
-
-def _change(found: Findings) -> float:
-    """Rms change of the signals by refitted parameters, over the noise, where that is most."""
-    evidence = found.bench.evidence(found.given)
-    both = np.stack([values(found.given, found.bench.own.free), found.refitted.values])
-    columns = evidence.columns(both)
-    if columns is None:
-        return np.inf
-    squares = sum(np.sum(part[1].astype(float) ** 2, axis=1) for part in columns)
-    counts = sum(np.array(logged.measures) * float(len(logged.time)) for logged in evidence.logged)
-    return float(np.sqrt(np.max(squares / np.maximum(counts, 1.0))))
 
 
 def _effects(found: Findings) -> tuple[NamedEffect, ...]:
@@ -395,7 +243,7 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
     if verdict == "undecidable" and found.looks:
         dim = [look.suspect for look in found.looks if look.suspect.name in blind]
-        if _suspicious(found):
+        if suspicious(found):
             dim = [look.suspect for look in found.looks[:3]]
         return for_blind(found.bench, found.refitted, dim, found.looks)
     return None

@@ -1,7 +1,6 @@
 """Curves and gaps of every trial, at the door of the report."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,18 +8,16 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Floor, Gap, TrialRecord
 from pma_gym.discovery.evidence import FREE_ZEROS
+from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.parameters import values
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.plant import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
-if TYPE_CHECKING:
-    from pma_gym.discovery.answer import Findings
-
 Array = NDArray[np.float64]
 
 
-def trial_records(found: "Findings") -> tuple[TrialRecord, ...]:
+def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
     """Every trial as measured, and as three models have it."""
     bench, selection = found.bench, found.selection
     evidence = bench.evidence(found.given)
@@ -88,7 +85,7 @@ def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
     return found
 
 
-def floors_at_the_door(found: "Findings") -> dict[str, Floor]:
+def floors_at_the_door(found: Findings) -> dict[str, Floor]:
     """Noise of the signals that were measured."""
     floors = {}
     for channel, name in enumerate(OUTPUTS):

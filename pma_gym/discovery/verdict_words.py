@@ -1,10 +1,9 @@
 """A diagnosis in sentences: its verdict, what was done, and why a parameter is not determined."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
 from pma_gym.discovery.words import (
@@ -16,9 +15,6 @@ from pma_gym.discovery.words import (
     signal_unit,
 )
 from pma_gym.units import suffix
-
-if TYPE_CHECKING:
-    from pma_gym.discovery.answer import Findings
 
 MUCH = 1.3
 """Misfit over the noise that is more than parameters leave where the structure is right."""
@@ -168,7 +164,7 @@ def unidentified(path: str, fit: Fitted, own: Own) -> str:
     )
 
 
-def steps(found: "Findings", diagnosis: Diagnosis, left: float) -> tuple[str, ...]:
+def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]:
     """What was done, a sentence each."""
     bench, selection = found.bench, found.selection
     said = [

@@ -8,8 +8,9 @@ from pathlib import Path
 from pma_gym.data.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.discovery.answer import Findings, answer
+from pma_gym.discovery.answer import answer
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.held_out import unseen

@@ -1,0 +1,52 @@
+"""What the steps of a diagnosis found, for those that make an answer of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from pma_gym.data.dataset import NamedTrial
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.floors import Level
+from pma_gym.discovery.held_out import Unseen
+from pma_gym.discovery.rivals import Rival
+from pma_gym.discovery.screening import Look
+from pma_gym.discovery.selection import Selection
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.plant.model import Model
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What the steps of a diagnosis found.
+
+    Attributes:
+        named: the trials.
+        given: the model.
+        floors: noise of the four outputs.
+        bench: with the noise as seen at rest.
+        refitted: the model's own parameters refitted.
+        selection: the effects.
+        suspects: the catalogue.
+        searched: whether effects were looked for.
+        seed: of simulated chance.
+        rivals: of each effect.
+        unseen: what the amended model says of trials that it was not fitted to.
+        unseen_without: the same without the effects.
+    """
+
+    named: tuple[NamedTrial, ...]
+    given: Model
+    floors: Sequence[Level]
+    bench: Bench
+    refitted: Fitted
+    selection: Selection
+    suspects: tuple[Suspect, ...]
+    searched: bool
+    seed: int
+    rivals: tuple[tuple[Rival, ...], ...] = ()
+    unseen: Unseen | None = None
+    unseen_without: Unseen | None = None
+
+    @property
+    def looks(self) -> tuple[Look, ...]:
+        """The first looks at the whole catalogue, the most promising first."""
+        return self.selection.stages[0].looks if self.selection.stages else ()
