@@ -25,7 +25,7 @@ FROZEN = {
 }
 """Version and digest of every suite's numbers. Who changes a number gives it a new version."""
 
-STATIONS = "eb62e11c55b35c00"
+STATIONS = "e6acfc26a5054baa"
 """Digest of the first drawn stations of `robust`, and so of `hard` and `pressure`."""
 
 SPY = """
@@ -48,8 +48,22 @@ def test_no_number_moves_without_a_new_version():
         )
 
 
+def acting(model):
+    """The effects that are there; one at its neutral values has a shape that nothing sees."""
+    for name, effect in model.effects.items():
+        values = model.parameters[name]
+        neutral = {
+            stem: quantity.to_si(quantity.neutral)
+            for stem, quantity in effect.quantities.items()
+            if quantity.neutral is not None
+        }
+        if not neutral or any(getattr(values, stem) != zero for stem, zero in neutral.items()):
+            yield name, model.at_the_door(name)
+
+
 def test_no_drawn_station_moves_without_a_new_version():
-    texts = [dump_model(frozen_suite("robust").station(number).model) for number in range(8)]
+    robust = frozen_suite("robust")
+    texts = [repr(list(acting(robust.station(number).model))) for number in range(8)]
     assert hashlib.sha256("".join(texts).encode()).hexdigest()[:16] == STATIONS
 
 
