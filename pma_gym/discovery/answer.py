@@ -212,7 +212,7 @@ def _amended(found: Findings, verdict: Verdict) -> Model:
         value, error = fit.estimate(path)
         known = bool(np.isfinite(error))
         notes[path] = Note(
-            f"fitted to {len(found.named)} trials by pma-gym diagnose",
+            f"fitted to {len(found.named)} trials by pma_gym.discovery",
             value - 1.96 * error if known else None,
             value + 1.96 * error if known else None,
         )

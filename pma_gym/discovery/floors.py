@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.dataset import NamedTrial
-from pma_gym.discovery.noise import at_rest, level_at_rest, step_between
+from pma_gym.discovery.noise import at_rest, distinct_readings, level_at_rest, step_between
 from pma_gym.plant import sensors
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model
@@ -25,6 +25,7 @@ class Level:
         by_source: what each source says.
         step: smallest step between readings; 0 if none shows.
         expected_step: the step that the DAQ should have.
+        distinct: how many readings differ from each other.
     """
 
     level: float
@@ -32,6 +33,7 @@ class Level:
     by_source: dict[str, float]
     step: float
     expected_step: float
+    distinct: int
 
 
 def initial_floors(
@@ -51,7 +53,8 @@ def initial_floors(
             sources["repeats"] = repeats
         source = next(name for name in ("rest segments", "the model's sensor") if name in sources)
         level = max(sources[source], float(rounding))
-        found.append(Level(level, source, sources, step, line.resolution))
+        distinct = len(distinct_readings(logged, channel))
+        found.append(Level(level, source, sources, step, line.resolution, distinct))
     return found
 
 

@@ -145,16 +145,19 @@ def autoregression(parts: Sequence[Array], level: float) -> Whitening:
     return best
 
 
-def step_between(trials: Sequence[Logged], channel: int) -> float:
-    """Smallest step between readings (SI), where they keep to whole steps; else 0."""
+def distinct_readings(trials: Sequence[Logged], channel: int) -> Array:
+    """Readings of a signal (SI) that differ from each other, in order."""
     values = [
         np.delete(logged.measured[channel], logged.missing[channel])
         for logged in trials
         if logged.measures[channel]
     ]
-    if not values:
-        return 0.0
-    distinct = np.unique(np.concatenate(values))
+    return np.unique(np.concatenate(values)) if values else np.empty(0)
+
+
+def step_between(trials: Sequence[Logged], channel: int) -> float:
+    """Smallest step between readings (SI), where they keep to whole steps; else 0."""
+    distinct = distinct_readings(trials, channel)
     if len(distinct) < 4:
         return 0.0
     gaps = np.diff(distinct)

@@ -12,17 +12,18 @@ COARSER = 1.5
 """How many of the DAQ's steps make a step coarse."""
 
 NAME = "sensor_quantisation"
-P_VALUE = 1e-6
-"""Of readings that all keep to coarse steps by chance, at most: each of four or more distinct ones
-lies within a twentieth of a step, one chance in ten, and some dozen are distinct in any trial."""
+CHANCE = 0.1
+"""Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make
+the step; every other that differs from them has to keep to it."""
 
 
 def coarse_sensors(floors: Sequence[Level]) -> tuple[NamedEffect, ...]:
     """One effect with the steps of all coarse sensors; none where there are none."""
-    steps = {}
+    steps, others = {}, 0
     for name, floor in zip(OUTPUTS, floors, strict=True):
         if floor.step > COARSER * floor.expected_step:
             column = BY_QUANTITY[name]
+            others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]
             steps[f"{column.name}_step"] = Estimate(size, size, size, column.unit)
-    return (NamedEffect(NAME, (), P_VALUE, steps),) if steps else ()
+    return (NamedEffect(NAME, (), max(CHANCE**others, 1e-300), steps),) if steps else ()

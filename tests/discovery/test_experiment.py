@@ -40,7 +40,7 @@ TRUTHS = {
 
 def station() -> Model:
     model = load_model("serres2008").replace(NOISY)
-    # Without dry friction: the integrator can stall where a stuck slide breaks loose.
+    # Without dry friction, whose fits take several times as long.
     smooth = {k: v for k, v in model.parameters.items() if k != "coulomb_friction"}
     return Model(model.name, model.title, model.plant, smooth, model.notes)
 
