@@ -341,6 +341,41 @@ def speed(
     raise typer.Exit(code)
 
 
+@app.command("hidden-effects")
+def hidden_effects(
+    block: Annotated[
+        str,
+        typer.Option(help="single, faint, nothing, parameters, pair, unknown, or all."),
+    ],
+    n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same cases.")] = 0,
+    jobs: Jobs = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder; results/hidden_effects/BLOCK-SEED if not given."),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
+) -> None:
+    """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
+    from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
+
+    _writable_json(json_file)
+    try:
+        blocks, orders = ordered(block), []
+        for each in blocks:
+            usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
+            folder = usual if out is None or len(blocks) > 1 else out
+            orders.append(Order(each, n, seed, folder, jobs, keep, again))
+        code = run_hidden_effects(orders, json_file)
+    except JobError as error:
+        _refuse(error)
+    raise typer.Exit(code)
+
+
 def _listed(text: str) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 
@@ -352,6 +387,17 @@ def _pressures(text: str) -> list[float]:
         return [float(part) for part in _listed(text)]
     except ValueError:
         raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}") from None
+
+
+def _writable_json(path: Path | None) -> None:
+    """Refuse a file of figures that cannot be written before anything is computed for it."""
+    from pma_gym.files import OutputError, check_output
+
+    try:
+        if path is not None:
+            check_output(path)
+    except OutputError as error:
+        _refuse(ValueError(f"--json: {error}"))
 
 
 def _refuse(error: Exception) -> NoReturn:

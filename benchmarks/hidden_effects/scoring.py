@@ -1,4 +1,4 @@
-"""Counts over all cases that have an answer: rates with Wilson's interval, gaps, sizes."""
+"""Counts over cases: rates with Wilson's interval and their targets, gaps, sizes, confusions."""
 
 import json
 import math
@@ -9,34 +9,55 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects.verdicts import Outcome, compare
+from benchmarks.hidden_effects.records import Record
+from benchmarks.hidden_effects.tables import table
+from benchmarks.hidden_effects.targets import (
+    COVERAGE,
+    GAP_BLOCKS,
+    GAP_MEDIAN,
+    GAP_TENTH,
+    RATES,
+    SIZE_ERROR,
+    Target,
+)
+from benchmarks.hidden_effects.verdicts import Outcome, compare, unanswered
 
 Z = 1.959964
 """Of a 95 % interval."""
 
 
 def score(folder: Path) -> str:
-    """Tables as text; the same as JSON in `folder/score.json`."""
-    outcomes, unanswered = read(folder)
-    document = {"unanswered": unanswered, **count(outcomes)}
+    """Tables of what `draw` and `judge` left in a folder; as JSON in `folder/score.json`."""
+    document = count(read(folder))
     (folder / "score.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
     return table(document)
 
 
-def read(folder: Path) -> tuple[list[Outcome], list[str]]:
-    """Outcomes of all cases, and names of those without an answer."""
-    outcomes, unanswered = [], []
+def read(folder: Path) -> list[Outcome]:
+    """Outcomes of all cases that `draw` wrote to a folder."""
+    outcomes = []
     for case in sorted((folder / "cases").glob("case_*")):
         answer = folder / "answers" / case.name
-        if not (answer / "diagnosis.json").is_file():
-            unanswered.append(case.name)
-            continue
         truth = json.loads((folder / "truth" / f"{case.name}.json").read_text("utf-8"))
+        if not (answer / "diagnosis.json").is_file():
+            outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
+            continue
         outcome = compare(truth, json.loads((answer / "diagnosis.json").read_text("utf-8")))
         if (answer / "seconds.txt").is_file():
             outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
         outcomes.append(outcome)
-    return outcomes, unanswered
+    return outcomes
+
+
+def outcome_of(record: Record) -> Outcome:
+    """The outcome of a case that the job kept."""
+    if record.answer is None:
+        outcome = unanswered(record.truth, record.message)
+    else:
+        outcome = compare(record.truth, record.answer)
+    outcome.number = record.number
+    outcome.seconds = record.seconds.get("diagnose")
+    return outcome
 
 
 def wilson(hits: int, n: int) -> tuple[float, float]:
@@ -53,133 +74,129 @@ def wilson(hits: int, n: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def rate(hits: Iterable[bool | None]) -> dict[str, Any]:
-    """How many of those that count hit; None does not count."""
+def rate(hits: Iterable[bool | None], target: Target | None = None) -> dict[str, Any]:
+    """How many of those that count hit, and whether that meets a target; None does not count."""
     counted = [hit for hit in hits if hit is not None]
     low, high = wilson(sum(counted), len(counted))
     share = sum(counted) / len(counted) if counted else None
-    return {"rate": share, "low": low, "high": high, "hits": sum(counted), "n": len(counted)}
+    figure = {"rate": share, "low": low, "high": high, "hits": sum(counted), "n": len(counted)}
+    return figure | _beside(share, target)
 
 
 def count(outcomes: Sequence[Outcome]) -> dict[str, Any]:
     """All figures by block."""
-    blocks: dict[str, Any] = {}
-    for block in dict.fromkeys(outcome.block for outcome in outcomes):
-        some = [outcome for outcome in outcomes if outcome.block == block]
-        rates = {name: rate(hits) for name, hits in _rates(block, some).items()}
-        verdicts = dict(Counter(outcome.verdict for outcome in some))
-        blocks[block] = {"rates": rates, "verdicts": verdicts} | _amounts(some)
-    return {"blocks": blocks, "effects": _effects(outcomes), "sizes": _sizes(outcomes)}
+    names = dict.fromkeys(outcome.block for outcome in outcomes)
+    return {"blocks": {name: _block(name, outcomes) for name in names}}
 
 
-def _rates(block: str, some: Sequence[Outcome]) -> dict[str, list[bool | None]]:
-    if block == "single":
-        return {
-            "named right": [o.right for o in some],
-            "right or in its group": [o.near for o in some],
-            "confidently wrong": [o.wrong for o in some],
-            "detected": [o.detected for o in some],
-            "a spurious second": [o.spurious for o in some],
-        }
-    if block == "pair":
-        return {
-            "both named": [o.hits == 2 for o in some],
-            "at least one": [o.hits >= 1 for o in some],
-            "at least one, or its group": [o.near for o in some],
-            "a spurious third": [o.spurious for o in some],
-            "detected": [o.detected for o in some],
-        }
-    if block == "unknown":
-        return {
-            "unknown": [o.verdict == "unknown" for o in some],
-            "a false name": [o.verdict == "effect" for o in some],
-            "detected": [o.detected for o in some],
-        }
+def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    some = [outcome for outcome in outcomes if outcome.block == name]
+    rates = RATES[name]
     return {
-        "false alarm": [o.detected for o in some],
-        "right parameters": [o.parameters for o in some],
+        "n": len(some),
+        "rates": {each.name: rate(map(each.hit, some), each.target) for each in rates},
+        "verdicts": dict(Counter(outcome.verdict for outcome in some).most_common()),
+        "confusion": _confusion(some),
+        "by_effect": _by_effect(some),
+        "gap_closed": _gap_closed(name, some),
+        "sizes": _sizes(some),
+        "seconds": _seconds(some),
+        "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
+        "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
     }
 
 
-def _amounts(some: Sequence[Outcome]) -> dict[str, Any]:
-    closed = [share for outcome in some for share in outcome.closed]
-    seconds = [outcome.seconds for outcome in some if outcome.seconds is not None]
-    return {
-        "gap_closed": {
-            "median": float(np.median(closed)) if closed else None,
-            "tenth_percentile": float(np.percentile(closed, 10)) if closed else None,
-            "n": len(closed),
-        },
-        "seconds": {
-            "median": float(np.median(seconds)) if seconds else None,
-            "most": max(seconds, default=None),
-        },
-    }
+def _beside(value: float | None, target: Target | None) -> dict[str, Any]:
+    """A target and whether it is met; nothing where there is none."""
+    if target is None:
+        return {}
+    return {"target": target.words(), "met": None if value is None else target.met(value)}
 
 
-def _effects(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """By hidden effect of single and unknown cases: what they were taken for."""
+def _amount(value: float | None, target: Target | None) -> dict[str, Any]:
+    return {"value": value} | _beside(value, target)
+
+
+def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
+    """How often each hidden thing was said to be what, verdicts that name nothing among it."""
     found: dict[str, Counter[str]] = {}
-    for outcome in outcomes:
-        if len(outcome.truth) == 1:
-            said = "+".join(outcome.named) or outcome.verdict
-            found.setdefault(outcome.truth[0], Counter())[said] += 1
+    for outcome in some:
+        found.setdefault(outcome.hidden, Counter())[outcome.said] += 1
     return {name: dict(said.most_common()) for name, said in sorted(found.items())}
 
 
-def _sizes(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How often each hidden effect was named, and named or its group."""
+    names = sorted({name for outcome in some for name in outcome.truth})
+    return {
+        name: {
+            "named": rate(name in o.named for o in some if name in o.truth),
+            "named or its group": rate(o.near or name in o.named for o in some if name in o.truth),
+            "detected": rate(o.detected for o in some if name in o.truth),
+        }
+        for name in names
+    }
+
+
+def _gap_closed(name: str, some: Sequence[Outcome]) -> dict[str, Any]:
+    closed = [share for outcome in some for share in outcome.closed]
+    wanted = name in GAP_BLOCKS
+    middle = float(np.median(closed)) if closed else None
+    tenth = float(np.percentile(closed, 10)) if closed else None
+    return {
+        "median": _amount(middle, GAP_MEDIAN if wanted else None),
+        "tenth_percentile": _amount(tenth, GAP_TENTH if wanted else None),
+        "n": len(closed),
+    }
+
+
+def _seconds(some: Sequence[Outcome]) -> dict[str, Any]:
+    seconds = [outcome.seconds for outcome in some if outcome.seconds is not None]
+    return {
+        "median": float(np.median(seconds)) if seconds else None,
+        "most": max(seconds, default=None),
+        "sum": sum(seconds),
+    }
+
+
+def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
+    """Errors and intervals of the sizes of those hidden effects that were named."""
     errors: dict[str, list[float]] = {}
     covered: dict[str, list[bool]] = {}
-    for outcome in outcomes:
+    for outcome in some:
         for path, error in outcome.size_errors.items():
             errors.setdefault(path, []).append(error)
             covered.setdefault(path, []).append(outcome.covered[path])
-    every = [error for some in errors.values() for error in some]
-    inside = [held for some in covered.values() for held in some]
+    every = [error for each in errors.values() for error in each]
+    inside = [held for each in covered.values() for held in each]
     return {
-        "median_error": float(np.median(every)) if every else None,
-        "covered": rate(inside),
+        "median_error": _amount(float(np.median(every)) if every else None, SIZE_ERROR),
+        "covered": rate(inside, COVERAGE),
         "by_parameter": {
-            path: {"median_error": float(np.median(some)), "covered": rate(covered[path])}
-            for path, some in sorted(errors.items())
+            path: {"median_error": float(np.median(each)), "covered": rate(covered[path])}
+            for path, each in sorted(errors.items())
         },
     }
 
 
-def table(document: dict[str, Any]) -> str:
-    """The figures as text."""
-    lines = [f"without an answer: {len(document['unanswered'])}"]
-    for block, figures in document["blocks"].items():
-        lines += ["", block]
-        lines += [f"  {name:28s}{_shown(figure)}" for name, figure in figures["rates"].items()]
-        lines.append(f"  verdicts: {_listed(figures['verdicts'])}")
-        gap, seconds = figures["gap_closed"], figures["seconds"]
-        if gap["n"]:
-            lines.append(
-                f"  gap closed: median {gap['median']:.3f}, tenth percentile "
-                f"{gap['tenth_percentile']:.3f} (n {gap['n']})"
-            )
-        if seconds["median"] is not None:
-            lines.append(f"  seconds: median {seconds['median']:.0f}, most {seconds['most']:.0f}")
-    lines += ["", "what each was taken for"]
-    lines += [f"  {name:26s}{_listed(said)}" for name, said in document["effects"].items()]
-    sizes = document["sizes"]
-    if sizes["median_error"] is not None:
-        lines += ["", f"fitted sizes: median error {100 * sizes['median_error']:.1f} %"]
-        lines.append(f"  95 % intervals cover {_shown(sizes['covered'])}")
-        for path, figure in sizes["by_parameter"].items():
-            error = f"{100 * figure['median_error']:.1f} %"
-            lines.append(f"  {path:44s}{error:>9s}   covered {_shown(figure['covered'])}")
-    return "\n".join(lines)
+def _missed(outcome: Outcome) -> bool:
+    """Whether a case is one that the block's target speaks against."""
+    if not outcome.answered:
+        return True
+    if outcome.block in ("single", "faint", "pair"):
+        return not outcome.right
+    if outcome.block == "unknown":
+        return outcome.verdict != "unknown"
+    if outcome.block == "parameters":
+        return outcome.detected or outcome.parameters is False
+    return outcome.detected
 
 
-def _shown(figure: dict[str, Any]) -> str:
-    if not figure["n"]:
-        return "no case"
-    low, high = 100 * figure["low"], 100 * figure["high"]
-    share = 100 * figure["rate"]
-    return f"{share:5.1f} % ({low:.1f}-{high:.1f}), {figure['hits']} of {figure['n']}"
-
-
-def _listed(counts: dict[str, int]) -> str:
-    return ", ".join(f"{name} {n}" for name, n in counts.items())
+def _miss(outcome: Outcome) -> dict[str, Any]:
+    return {
+        "number": outcome.number,
+        "hidden": " ".join([outcome.hidden, *outcome.off]),
+        "r": outcome.ratio,
+        "said": outcome.said,
+        "sentence": outcome.sentence,
+    }

@@ -28,6 +28,12 @@ PATHS: dict[str, tuple[str, ...]] = {
 VISIBLE = 0.2
 """A signal's gap counts where it is larger than the floor by this share."""
 
+LEAST_RATIO = {"faint": 0.3}
+"""r that a block promises of its effects, at least; 0.5 in the others."""
+
+NEAR_RATIO = 0.95
+"""Share of it that is near enough."""
+
 
 @dataclass
 class Outcome:
@@ -45,10 +51,18 @@ class Outcome:
         hits: how many hidden effects it names.
         spurious: whether it names more effects than there are.
         parameters: whether each base parameter that was off is named, None without such.
+        parameters_told: the same, where it also counts to say that the data do not tell it.
+        parameters_spurious: whether one is named that was right, None outside such a block.
         closed: shares of the gap closed on held-out trials.
         size_errors: by `effect.parameter`, relative error of a fitted size.
         covered: by `effect.parameter`, whether the interval holds the truth.
-        seconds: how long it took.
+        seconds: how long the diagnosis took.
+        number: of the case in its set.
+        ratio: the smallest r of what is hidden, None where nothing is.
+        strong: whether each hidden effect is as large as its block promises.
+        answered: whether there was an answer; without one it hits nothing and claims nothing.
+        off: base parameters that were off by a tenth, where nothing else is hidden.
+        sentence: the answer as a person would say it, or what was raised instead.
     """
 
     block: str
@@ -61,11 +75,31 @@ class Outcome:
     detected: bool
     hits: int
     spurious: bool
-    parameters: bool | None
+    parameters: bool | None = None
+    parameters_told: bool | None = None
+    parameters_spurious: bool | None = None
     closed: list[float] = field(default_factory=list)
     size_errors: dict[str, float] = field(default_factory=dict)
     covered: dict[str, bool] = field(default_factory=dict)
     seconds: float | None = None
+    number: int = 0
+    ratio: float | None = None
+    strong: bool = True
+    answered: bool = True
+    off: tuple[str, ...] = ()
+    sentence: str = ""
+
+    @property
+    def hidden(self) -> str:
+        """What was hidden, in words."""
+        if self.truth:
+            return " + ".join(sorted(self.truth))
+        return "parameters alone" if self.off else "nothing"
+
+    @property
+    def said(self) -> str:
+        """What was named, or the verdict that names nothing."""
+        return " + ".join(sorted(self.named)) or self.verdict
 
 
 def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
@@ -76,9 +110,8 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     named = tuple(effect["name"] for effect in effects)
     near = any(_near(effect, hidden) for effect in effects[:1])
     right = bool(hidden) and sorted(named) == sorted(hidden)
-    outcome = Outcome(
-        block=truth["block"],
-        truth=hidden,
+    outcome = _of(
+        truth,
         verdict=verdict,
         named=named,
         right=right,
@@ -87,8 +120,9 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         detected=verdict in STRUCTURAL,
         hits=len(set(named) & set(hidden)),
         spurious=len(named) > len(hidden),
-        parameters=_parameters(truth, answer),
+        sentence=answer.get("sentence", ""),
     )
+    _parameters(outcome, truth, answer)
     for gap in answer["gap"].values():
         if gap["held_out"] and gap["before"] > (1.0 + VISIBLE) * gap["floor"]:
             outcome.closed.append(gap["closed"])
@@ -96,20 +130,63 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     return outcome
 
 
+def unanswered(truth: Mapping[str, Any], message: str) -> Outcome:
+    """The outcome of a case whose diagnosis raised an error: no hit, and no claim."""
+    off = truth["block"] == "parameters" and bool(_off(truth))
+    return _of(
+        truth,
+        verdict="no answer",
+        named=(),
+        right=False,
+        near=False,
+        wrong=False,
+        detected=False,
+        hits=0,
+        spurious=False,
+        parameters=False if off else None,
+        parameters_told=False if off else None,
+        answered=False,
+        sentence=message,
+    )
+
+
+def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
+    """An outcome with what the truth alone tells."""
+    block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
+    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
+    return Outcome(
+        block=block,
+        truth=tuple(effect["name"] for effect in truth["effects"]),
+        number=truth.get("number", 0),
+        ratio=min(ratios, default=None),
+        off=tuple(_off(truth)) if block == "parameters" else (),
+        strong=all(ratio >= least for ratio in ratios),
+        **said,
+    )
+
+
 def _near(effect: Mapping[str, Any], hidden: tuple[str, ...]) -> bool:
     named = {effect["name"], *effect["confused_with"][:2]}
     return any(name in named or effect["name"] in group(name) for name in hidden)
 
 
-def _parameters(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> bool | None:
-    """Whether every base parameter that was off by a tenth is named, or said not to be told."""
-    off = [n for n, factor in truth["base_factors"].items() if abs(factor - 1.0) >= 0.1]
-    off = [name for name in off if name in PATHS]
+def _off(truth: Mapping[str, Any]) -> list[str]:
+    """Base parameters that were off by a tenth at least."""
+    off = [n for n, factor in truth["base_factors"].items() if abs(factor - 1.0) >= 0.0999]
+    return [name for name in off if name in PATHS]
+
+
+def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> None:
+    """Whether every base parameter that was off is named, or said not to be told."""
+    off = _off(truth)
     if truth["block"] != "parameters" or not off:
-        return None
-    said = [p for p, moved in answer["parameters"].items() if moved["significant"]]
-    said += list(answer.get("not_identifiable", {}))
-    return all(any(path.startswith(PATHS[name]) for path in said) for name in off)
+        return
+    moved = [path for path, each in answer["parameters"].items() if each["significant"]]
+    told = [*moved, *answer.get("not_identifiable", {})]
+    outcome.parameters = all(any(p.startswith(PATHS[name]) for p in moved) for name in off)
+    outcome.parameters_told = all(any(p.startswith(PATHS[name]) for p in told) for name in off)
+    known = tuple(start for name in off for start in PATHS[name])
+    outcome.parameters_spurious = any(not path.startswith(known) for path in moved)
 
 
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:

@@ -291,9 +291,9 @@ def test_answers_are_counted(drawn):
     assert single["right or in its group"]["hits"] == 2
     assert single["confidently wrong"]["hits"] == 0
     assert document["blocks"]["nothing"]["rates"]["false alarm"]["rate"] == 1.0
-    assert document["blocks"]["single"]["gap_closed"]["median"] == pytest.approx(0.9444)
-    assert document["effects"] == {"drive_dead_zone": {"cable_slack": 2}}
-    assert "named right" in text and not document["unanswered"]
+    assert document["blocks"]["single"]["gap_closed"]["median"]["value"] == pytest.approx(0.9444)
+    assert document["blocks"]["single"]["confusion"] == {"drive_dead_zone": {"cable_slack": 2}}
+    assert "named right" in text and not document["blocks"]["single"]["unanswered"]
 
 
 def test_an_answer_is_compared_with_its_truth():

@@ -1,0 +1,247 @@
+"""`python -m benchmarks hidden-effects`: draw and diagnose a block, case by case; count."""
+
+import hashlib
+import json
+import sys
+import time
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.comparison.fingerprint import code_digest
+from benchmarks.files import write_text
+from benchmarks.hidden_effects import records, scoring
+from benchmarks.hidden_effects.blocks import BLOCKS, Block
+from benchmarks.hidden_effects.one_case import Judge, Work, diagnosed
+from benchmarks.hidden_effects.records import Record
+from benchmarks.hidden_effects.tables import percent, table
+from benchmarks.hidden_effects.targets import RATES
+from benchmarks.hidden_effects.verdicts import Outcome
+from benchmarks.processes import run_all
+
+FAILED, INTERRUPTED = 1, 130
+"""Exit codes."""
+
+ALL = "all"
+"""Name of all blocks together."""
+
+SET, SCORE = "set.json", "score.json"
+"""What a folder holds, and its figures."""
+
+
+class JobError(ValueError):
+    """An order that cannot be carried out; the message names what, the rule and the mend."""
+
+
+@dataclass(frozen=True)
+class Order:
+    """What is asked for.
+
+    Attributes:
+        block: the block.
+        count: how many cases.
+        seed: of the set.
+        folder: of its records.
+        jobs: processes.
+        keep: keep the trials too.
+        again: anew what other code made.
+        judge: makes the answers.
+    """
+
+    block: Block
+    count: int
+    seed: int
+    folder: Path
+    jobs: int = 1
+    keep: bool = False
+    again: bool = False
+    judge: Judge = diagnosed
+
+
+def ordered(block: str) -> list[Block]:
+    """Blocks of a name, all of them of `all`.
+
+    Raises:
+        JobError: there is no such block.
+    """
+    if block == ALL:
+        return list(BLOCKS.values())
+    if block not in BLOCKS:
+        raise JobError(f"--block {block}: no such block; choose {', '.join([*BLOCKS, ALL])}")
+    return [BLOCKS[block]]
+
+
+def run_block(order: Order) -> dict[str, Any] | None:
+    """Draw and diagnose the cases that are missing; the figures of all, None if interrupted.
+
+    Each finished case is kept at once, so the same order goes on after Ctrl-C or a kill, and a
+    larger count extends the set. The figures are also written to the folder.
+
+    Raises:
+        JobError: the folder holds another set.
+    """
+    _claim(order)
+    code = fingerprint()
+    done = {
+        record.number: record
+        for record in records.read(order.folder, order.count)
+        if record.code == code or not order.again
+    }
+    _tell(_greeting(order, done, code))
+    missing = [number for number in range(1, order.count + 1) if number not in done]
+    works = [
+        Work(order.block, order.seed, number, order.folder, order.keep, code, order.judge)
+        for number in missing
+    ]
+    progress = Progress(order, [scoring.outcome_of(record) for record in done.values()])
+    failures: list[str] = []
+
+    def on_done(index: int, result: object) -> None:
+        if isinstance(result, Record):
+            done[result.number] = result
+            progress.tell(result)
+        else:
+            failures.append(f"case {missing[index]}: {type(result).__name__}: {result}")
+            _tell(failures[-1])
+
+    if not run_all(works, order.jobs, on_done):
+        _tell(
+            f"Interrupted: {len(done)} of {order.count} cases of {order.block.name} are done and "
+            f"stay in {order.folder}; the same command goes on from there."
+        )
+        return None
+    document = figures(order, [done[number] for number in sorted(done)]) | {"failures": failures}
+    write_text(order.folder / SCORE, json_text(document))
+    return document
+
+
+def figures(order: Order, kept: Sequence[Record]) -> dict[str, Any]:
+    """The figures of a block's records."""
+    counted = scoring.count([scoring.outcome_of(record) for record in kept])
+    return {
+        "schema": 1,
+        "seed": order.seed,
+        "code": dict(Counter(record.code for record in kept)),
+        **counted,
+    }
+
+
+def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Several blocks' figures as one document."""
+    blocks: dict[str, Any] = {}
+    for document in documents:
+        blocks |= document["blocks"]
+    codes = Counter[str]()
+    for document in documents:
+        codes.update(document["code"])
+    seeds = sorted({document["seed"] for document in documents})
+    failures = [each for document in documents for each in document["failures"]]
+    return {
+        "schema": 1,
+        "seed": seeds[0] if len(seeds) == 1 else seeds,
+        "code": dict(codes),
+        "blocks": blocks,
+        "failures": failures,
+    }
+
+
+def run_hidden_effects(orders: Sequence[Order], json_file: Path | None) -> int:
+    """Run blocks one after the other and print their figures.
+
+    Returns:
+        Exit code: 0, 1 if a case could not be drawn or its process died, 130 if interrupted.
+    Raises:
+        JobError: a folder holds another set.
+    """
+    documents = []
+    for order in orders:
+        document = run_block(order)
+        if document is None:
+            return INTERRUPTED
+        documents.append(document)
+        print(table(document), end="\n\n", flush=True)
+    whole = merged(documents)
+    if json_file is not None:
+        write_text(json_file, json_text(whole))
+    return FAILED if whole["failures"] else 0
+
+
+def json_text(document: dict[str, Any]) -> str:
+    """A document as its file has it."""
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+
+
+def fingerprint() -> str:
+    """Of all code that a record depends on: the package's and the generator's."""
+    digest = hashlib.sha256(code_digest().encode())
+    here = Path(__file__).parent
+    for path in sorted([*here.glob("*.py"), *(here / "physics").glob("*.py")]):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+class Progress:
+    """A line a case: what was hidden and said, the rate so far, the time left."""
+
+    def __init__(self, order: Order, known: Sequence[Outcome]) -> None:
+        self.order, self.outcomes = order, list(known)
+        self.begun, self.before = time.monotonic(), len(known)
+
+    def tell(self, record: Record) -> None:
+        """One more case is done."""
+        outcome = scoring.outcome_of(record)
+        self.outcomes.append(outcome)
+        done, count = len(self.outcomes), self.order.count
+        left = (time.monotonic() - self.begun) / (done - self.before) * (count - done)
+        size = "" if outcome.ratio is None else f" (r {outcome.ratio:.2f})"
+        answer = outcome.said if outcome.answered else f"NO ANSWER, {outcome.sentence}"
+        first = RATES[self.order.block.name][0]
+        rate = scoring.rate(map(first.hit, self.outcomes))
+        _tell(
+            f"{done}/{count}  {record.number}: {outcome.hidden}{size}, said {answer};  "
+            f"{first.name} {percent(rate)};  {_time(left)} left"
+        )
+
+
+def _claim(order: Order) -> None:
+    """Make a folder this set's own.
+
+    Raises:
+        JobError: it is another's, or no folder.
+    """
+    mine = {"block": order.block.name, "seed": order.seed}
+    path = order.folder / SET
+    if order.folder.exists() and not order.folder.is_dir():
+        raise JobError(f"--out {order.folder} is a file; name a folder for the results")
+    if path.is_file():
+        theirs = json.loads(path.read_text("utf-8"))
+        if theirs != mine:
+            raise JobError(
+                f"--out {order.folder} holds block {theirs['block']} of seed {theirs['seed']}, "
+                f"not {order.block.name} of seed {order.seed}; name another folder"
+            )
+        return
+    write_text(path, json.dumps(mine) + "\n")
+
+
+def _greeting(order: Order, done: dict[int, Record], code: str) -> str:
+    words = (
+        f"Block {order.block.name}, seed {order.seed}: {order.count} cases, {order.jobs} at a time"
+    )
+    if done:
+        words += f"; {len(done)} are done in {order.folder}"
+    other = sum(record.code != code for record in done.values())
+    if other:
+        words += f", {other} of them by other code than this (--again makes those anew)"
+    return words
+
+
+def _time(seconds: float) -> str:
+    minutes = round(seconds / 60.0)
+    return f"{seconds:.0f} s" if seconds < 90.0 else f"{minutes // 60} h {minutes % 60:02d} min"
+
+
+def _tell(words: str) -> None:
+    print(words, file=sys.stderr, flush=True)
