@@ -357,6 +357,9 @@ def hidden_effects(
     json_file: Annotated[
         Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
     ] = None,
+    rounds: Annotated[
+        int, typer.Option(min=0, max=3, help="Experiments that follow, in block undecidable.")
+    ] = 2,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
     again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
 ) -> None:
@@ -365,7 +368,7 @@ def hidden_effects(
 
     _writable_json(json_file)
     try:
-        blocks, orders = ordered(block), []
+        blocks, orders = ordered(block, rounds), []
         for each in blocks:
             usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
             folder = usual if out is None or len(blocks) > 1 else out

@@ -17,6 +17,7 @@ class Block:
         ratio: range of r, what an effect changes beyond a refit over the noise.
         trials: of a case.
         seconds: of a trial (s).
+        rounds: experiments that follow on the same rig, where the diagnosis asks for one.
     """
 
     name: str
@@ -24,6 +25,7 @@ class Block:
     ratio: tuple[float, float] = (0.5, 2.0)
     trials: int = 6
     seconds: float = 8.0
+    rounds: int = 0
 
     def draw(self, seed: int, number: int) -> Case:
         """Case of a number, 1 and up; the same seed and number give the same bits."""

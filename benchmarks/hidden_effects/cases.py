@@ -134,6 +134,28 @@ def draw_case(
     )
 
 
+def measure(
+    truth: Mapping[str, Any], motor: Array, regulator: Array, first: int, g: np.random.Generator
+) -> list[Array]:
+    """Readings of trials on the rig of a truth, with noise of its kind, shape (rows, 4) each.
+
+    Args:
+        truth: of a case, of which `base`, `effects`, `noise_factors` and `noise_memory` count.
+        motor: (V), shape (trials, rows).
+        regulator: (V), shape (trials, rows).
+        first: how many trials were made before.
+        g: source of the noise.
+    """
+    hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
+    order = first + np.arange(len(motor), dtype=float)
+    clean = simulate_variants(Commands(motor, regulator, order), [(truth["base"], hidden)])[0]
+    levels, colours = (
+        np.array([truth[which][sensor] for sensor in SENSORS])
+        for which in ("noise_factors", "noise_memory")
+    )
+    return [_measured(g, each, levels, colours, hidden) for each in clean]
+
+
 def draw_rig(g: np.random.Generator, most: float) -> tuple[dict[str, float], dict[str, float]]:
     """A rig whose parameters are off by up to a share, and by which factor each is.
 

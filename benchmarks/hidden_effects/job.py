@@ -6,18 +6,20 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison.fingerprint import code_digest
 from benchmarks.files import write_text
 from benchmarks.hidden_effects import records, scoring
-from benchmarks.hidden_effects.blocks import BLOCKS, Block
-from benchmarks.hidden_effects.one_case import Judge, Work, diagnosed
+from benchmarks.hidden_effects.asking import Judge, diagnosed
+from benchmarks.hidden_effects.blocks import Block
+from benchmarks.hidden_effects.one_case import Work
 from benchmarks.hidden_effects.records import Record
 from benchmarks.hidden_effects.tables import percent, table
 from benchmarks.hidden_effects.targets import RATES
+from benchmarks.hidden_effects.undecidable import BLOCKS
 from benchmarks.hidden_effects.verdicts import Outcome
 from benchmarks.processes import run_all
 
@@ -60,17 +62,21 @@ class Order:
     judge: Judge = diagnosed
 
 
-def ordered(block: str) -> list[Block]:
-    """Blocks of a name, all of them of `all`.
+def ordered(block: str, rounds: int = 0) -> list[Block]:
+    """Blocks of a name, all of them of `all`; where experiments may follow, so many.
 
     Raises:
         JobError: there is no such block.
     """
     if block == ALL:
-        return list(BLOCKS.values())
+        return [_with(each, rounds) for each in BLOCKS.values()]
     if block not in BLOCKS:
         raise JobError(f"--block {block}: no such block; choose {', '.join([*BLOCKS, ALL])}")
-    return [BLOCKS[block]]
+    return [_with(BLOCKS[block], rounds)]
+
+
+def _with(block: Block, rounds: int) -> Block:
+    return replace(block, rounds=rounds) if block.rounds else block
 
 
 def run_block(order: Order) -> dict[str, Any] | None:

@@ -48,9 +48,15 @@ def draw_trial(
         pressure = np.minimum(pressure, 470e3)
         begun = np.clip((time - START_S) / g.uniform(0.3, 1.5), 0.0, 1.0)
         load = np.minimum(load, loads_at(float(pressure.min()))[1]) * begun
-    motor = (load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"]
+    motor, regulator = volts(pressure, load)
     if loose:
         motor[time <= START_S] = 0.0
+    return motor, regulator
+
+
+def volts(pressure: Array, load: Array) -> tuple[Array, Array]:
+    """Motor and regulator voltages for pressures (Pa) and loads (N), by the lab's numbers."""
+    motor = (load - NOMINAL["drive_offset"]) / NOMINAL["drive_gain"]
     regulator = (pressure - NOMINAL["regulator_offset"]) / NOMINAL["regulator_gain"]
     # What is logged, in whole millivolts, is what was sent.
     return np.clip(np.round(motor, 3), 0.0, 10.0), np.clip(np.round(regulator, 3), 0.0, 10.0)

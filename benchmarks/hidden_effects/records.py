@@ -12,7 +12,7 @@ from benchmarks.hidden_effects.files import case_name
 CANDIDATES = 6
 """How many of the likeliest candidates are kept."""
 
-ESSENTIALS = ("verdict", "sentence", "effects", "gap", "not_identifiable", "warnings")
+ESSENTIALS = ("verdict", "sentence", "effects", "gap", "not_identifiable", "blind", "warnings")
 """What is kept whole of a `diagnosis.json`."""
 
 

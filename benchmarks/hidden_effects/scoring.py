@@ -26,6 +26,10 @@ Z = 1.959964
 """Of a 95 % interval."""
 
 
+LEAST_ROUNDS = 2
+"""Rounds that a mean counts to, at least: a way that ended before did not settle later."""
+
+
 def score(folder: Path) -> str:
     """Tables of what `draw` and `judge` left in a folder; as JSON in `folder/score.json`."""
     document = count(read(folder))
@@ -55,7 +59,7 @@ def outcome_of(record: Record) -> Outcome:
         outcome = unanswered(record.truth, record.message)
     else:
         outcome = compare(record.truth, record.answer)
-    outcome.number = record.number
+    outcome.number, outcome.rounds = record.number, record.rounds
     outcome.seconds = record.seconds.get("diagnose")
     return outcome
 
@@ -101,6 +105,8 @@ def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "gap_closed": _gap_closed(name, some),
         "sizes": _sizes(some),
         "seconds": _seconds(some),
+        "by_kind": _by_kind(some),
+        "rounds": _rounds(some),
         "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
         "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
     }
@@ -179,14 +185,43 @@ def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
     }
 
 
+def _by_kind(some: Sequence[Outcome]) -> dict[str, Any]:
+    """What was said of each kind of data that excite too little, and how often `undecidable`."""
+    kinds = sorted({outcome.kind for outcome in some if outcome.kind})
+    return {
+        kind: rate(o.verdict == "undecidable" for o in some if o.kind == kind)
+        | {"verdicts": dict(Counter(o.verdict for o in some if o.kind == kind).most_common())}
+        for kind in kinds
+    }
+
+
+def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How far experiments that followed settled the cases in which one was asked for."""
+    asked = [outcome for outcome in some if outcome.rounds]
+    most = max([LEAST_ROUNDS, *(len(r) for o in asked for r in o.rounds.values())])
+    figures: dict[str, Any] = {"asked": rate(bool(outcome.rounds) for outcome in some)}
+    for way in sorted({way for outcome in asked for way in outcome.rounds}):
+        needed = [outcome.rounds_of(way, most) for outcome in asked]
+        figures[way] = {
+            "settled": {k: rate(n <= k for n in needed) for k in range(1, most + 1)},
+            "wrong": rate(any(each["wrong"] for each in o.rounds[way]) for o in asked),
+            "mean_rounds": float(np.mean(needed)),
+        }
+    if asked:
+        pairs = [(o.rounds_of("proposed", most), o.rounds_of("random", most)) for o in asked]
+        figures["faster"] = rate(mine < other for mine, other in pairs)
+        figures["slower"] = rate(mine > other for mine, other in pairs)
+    return figures
+
+
 def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
         return True
     if outcome.block in ("single", "faint", "pair"):
         return not outcome.right
-    if outcome.block == "unknown":
-        return outcome.verdict != "unknown"
+    if outcome.block in ("unknown", "undecidable"):
+        return outcome.verdict != outcome.block
     if outcome.block == "parameters":
         return outcome.detected or outcome.parameters is False
     return outcome.detected
@@ -195,7 +230,7 @@ def _missed(outcome: Outcome) -> bool:
 def _miss(outcome: Outcome) -> dict[str, Any]:
     return {
         "number": outcome.number,
-        "hidden": " ".join([outcome.hidden, *outcome.off]),
+        "hidden": " ".join([outcome.hidden, *outcome.off]) + (outcome.kind and f", {outcome.kind}"),
         "r": outcome.ratio,
         "said": outcome.said,
         "sentence": outcome.sentence,

@@ -42,6 +42,7 @@ def _block(block: str, figures: dict[str, Any]) -> list[str]:
         lines.append(f"  {name:38s}{percent(figure):36s} {judged(figure)}".rstrip())
     lines.append(f"  verdicts: {listed(figures['verdicts'])}")
     lines += _gap(figures["gap_closed"]) + _sizes(figures["sizes"])
+    lines += _rounds(figures["rounds"]) + _kinds(figures["by_kind"])
     seconds = figures["seconds"]
     if seconds["median"] is not None:
         lines.append(
@@ -79,6 +80,30 @@ def _sizes(sizes: dict[str, Any]) -> list[str]:
     for path, figure in sizes["by_parameter"].items():
         words = f"{100 * figure['median_error']:.1f} %"
         lines.append(f"    {path:44s}{words:>8s}   covered {percent(figure['covered'])}")
+    return lines
+
+
+def _kinds(kinds: dict[str, Any]) -> list[str]:
+    return [
+        f"  undecidable in {kind:20s}{percent(figure):34s} {listed(figure['verdicts'])}"
+        for kind, figure in kinds.items()
+    ]
+
+
+def _rounds(rounds: dict[str, Any]) -> list[str]:
+    ways = [way for way in ("proposed", "random") if way in rounds]
+    lines = [f"  an experiment was asked for: {percent(rounds['asked'])}"] if ways else []
+    for way in ways:
+        figures = rounds[way]
+        settled = "; ".join(f"{k}: {percent(each)}" for k, each in figures["settled"].items())
+        lines.append(f"  {way}, of these settled within rounds {settled}")
+        words = f"    mean rounds {figures['mean_rounds']:.2f}, an effect named wrongly "
+        lines.append(words + percent(figures["wrong"]))
+    if ways:
+        lines.append(
+            f"  proposed in fewer rounds than random {percent(rounds['faster'])}, in more "
+            f"{percent(rounds['slower'])}"
+        )
     return lines
 
 

@@ -94,6 +94,15 @@ _UNKNOWN = (
     Rate("detected", lambda o: o.detected),
 )
 
+_UNDECIDABLE = (
+    Rate("undecidable", lambda o: o.verdict == "undecidable", Target(least=0.95)),
+    Rate("a false name", lambda o: o.wrong),
+    Rate("proposed, settled in 2 rounds", lambda o: o.settled_by("proposed", 2), Target(least=0.8)),
+    Rate("proposed, settled in 1 round", lambda o: o.settled_by("proposed", 1)),
+    Rate("random, settled in 2 rounds", lambda o: o.settled_by("random", 2)),
+    Rate("random, settled in 1 round", lambda o: o.settled_by("random", 1)),
+)
+
 RATES: dict[str, tuple[Rate, ...]] = {
     "single": _SINGLE,
     "faint": _FAINT,
@@ -101,6 +110,7 @@ RATES: dict[str, tuple[Rate, ...]] = {
     "parameters": _PARAMETERS,
     "pair": _PAIR,
     "unknown": _UNKNOWN,
+    "undecidable": _UNDECIDABLE,
 }
 """By block."""
 

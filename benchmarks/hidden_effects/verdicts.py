@@ -1,6 +1,6 @@
 """One answer against its truth."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -63,6 +63,8 @@ class Outcome:
         answered: whether there was an answer; without one it hits nothing and claims nothing.
         off: base parameters that were off by a tenth, where nothing else is hidden.
         sentence: the answer as a person would say it, or what was raised instead.
+        kind: of data that excite too little; empty elsewhere.
+        rounds: what came of experiments that followed, by who chose them.
     """
 
     block: str
@@ -87,6 +89,8 @@ class Outcome:
     strong: bool = True
     answered: bool = True
     off: tuple[str, ...] = ()
+    kind: str = ""
+    rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     sentence: str = ""
 
     @property
@@ -100,6 +104,16 @@ class Outcome:
     def said(self) -> str:
         """What was named, or the verdict that names nothing."""
         return " + ".join(sorted(self.named)) or self.verdict
+
+    def settled_by(self, way: str, most: int) -> bool:
+        """Whether the truth or its group was named within so many rounds of a way, or at once."""
+        if self.verdict == "effect" and self.near:
+            return True
+        return any(each["settled"] for each in self.rounds.get(way, ())[:most])
+
+    def rounds_of(self, way: str, most: int) -> int:
+        """In which round the truth or its group was named; one more than most if in none."""
+        return next((k for k in range(most + 1) if self.settled_by(way, k)), most + 1)
 
 
 def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
@@ -160,6 +174,7 @@ def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
         number=truth.get("number", 0),
         ratio=min(ratios, default=None),
         off=tuple(_off(truth)) if block == "parameters" else (),
+        kind=truth.get("kind", ""),
         strong=all(ratio >= least for ratio in ratios),
         **said,
     )

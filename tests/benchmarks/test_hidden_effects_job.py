@@ -3,43 +3,34 @@
 import json
 import re
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.hidden_effects import job, scoring
-from benchmarks.hidden_effects.blocks import BLOCKS, Block
+from benchmarks.hidden_effects.asking import Answer
+from benchmarks.hidden_effects.blocks import Block
 from benchmarks.hidden_effects.effects import KINDS
 from benchmarks.hidden_effects.job import JobError, Order, run_block
+from benchmarks.hidden_effects.library import named, random_experiment
+from benchmarks.hidden_effects.physics.rig import noise_levels
+from benchmarks.hidden_effects.physics.simulation import RATE, Commands
+from benchmarks.hidden_effects.rounds import follow, with_trial
+from benchmarks.hidden_effects.size import Experiment, simulate_variants
 from benchmarks.hidden_effects.targets import RATES
+from benchmarks.hidden_effects.undecidable import (
+    BLOCKS,
+    KNOWN,
+    SHOWN,
+    UNTOLD,
+    Behind,
+    draw_undecidable,
+)
 from benchmarks.hidden_effects.verdicts import compare, unanswered
+from tests.benchmarks.cheap_diagnosis import by_size, document
 
 TINY = Block("nothing", trials=3, seconds=3.0)
-
-
-def document(verdict="agrees", *effects):
-    """A `diagnosis.json` with what a record keeps."""
-    return {
-        "verdict": verdict,
-        "sentence": f"{verdict}.",
-        "effects": [
-            {"name": n, "confused_with": [], "p_value": 0.001, "parameters": p} for n, p in effects
-        ],
-        "parameters": {},
-        "gap": {},
-        "not_identifiable": {},
-        "warnings": [],
-        "candidates": [],
-        "next_experiment": None,
-    }
-
-
-def by_size(folder):
-    """A diagnosis that needs no time: what it says depends on the trials' bytes alone."""
-    text = (folder / "trial_01.csv").read_text("utf-8")
-    if sum(map(ord, text)) % 2:
-        raise ValueError("an odd file")
-    return document("effect", ("creep", {}))
 
 
 class Interrupting:
@@ -193,5 +184,101 @@ def test_parameters_count_as_named_only_where_they_moved():
 
 
 def test_every_block_has_its_rates_and_effects_take_turns():
-    assert set(BLOCKS) == set(RATES)
+    assert list(BLOCKS) == list(RATES)
     assert BLOCKS["single"].turns == tuple(KINDS) == BLOCKS["faint"].turns
+
+
+@pytest.fixture(scope="module")
+def poor():
+    """A case whose data do not tell that the regulator is limited in rate."""
+    return draw_undecidable(90002, 1, "regulator_rate_limit")
+
+
+def test_an_undecidable_case_keeps_what_the_ruler_promised(poor):
+    (hidden,) = poor.truth["effects"]
+    assert poor.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN
+    motor, regulator = np.array(poor.motor), np.array(poor.regulator)
+    commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
+    with_it = {"regulator_rate_limit": hidden["parameters"]}
+    rig = poor.truth["base"]
+    plain, limited = simulate_variants(commands, [(rig, {}), (rig, with_it)])
+    # Without any refit, so that nothing rests on what a refit may absorb.
+    assert np.sum(((limited - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
+    # The library's pressure steps ask for more than the limit lets through.
+    step = np.abs(np.diff(named("pressure steps", np.random.default_rng(0))[1][1])).max()
+    assert 59.9 * step > hidden["parameters"]["limit_kpa_per_s"] / RATE
+
+
+def test_what_parameters_and_rivals_absorb_is_not_told():
+    numbers = {"radius": 1.0, "mass": 2.0}
+    g = np.random.default_rng(1)
+    base, *shapes = 100.0 * g.standard_normal((5, 2, 40, 4))
+    few = Commands(np.zeros((2, 40)), np.zeros((2, 40)), np.arange(2.0))
+    behind = Behind(
+        Experiment(few, np.ones((2, 40), bool), np.ones(4)),
+        numbers,
+        base,
+        [base + 0.005 * shapes[0], base + 0.01 * shapes[1]],
+    )
+    small, large = (behind.log_odds(base + size * KNOWN * shapes[0]) for size in (1.0, 5.0))
+    # Half the square of how many standard deviations the radius must be off.
+    assert small == pytest.approx(0.5, rel=0.02) and large == pytest.approx(12.5, rel=0.02)
+    alone = behind.log_odds(base + shapes[2])
+    assert alone > 100.0
+    assert behind.log_odds(base + shapes[2], base + 3.0 * shapes[2]) < 1e-9
+    assert behind.log_odds(base + shapes[2], base + shapes[3]) > 0.5 * alone
+
+
+def asking(folder):
+    """Names a wrong effect as soon as it has the short trial."""
+    trials = sorted(folder.glob("trial_*.csv"))
+    rows = len(trials[-1].read_text("utf-8").splitlines()) - 1
+    if rows == 150:
+        return Answer(document("effect", ("hysteresis", {})))
+    raise ValueError(f"a trial of {rows} rows")
+
+
+def test_what_is_proposed_is_carried_out_on_the_same_rig(poor):
+    assert follow(poor, Answer(document("undecidable")), 2, asking) == {}
+    said = document("undecidable") | {"next_experiment": {"protocol": "a short hold"}}
+    first = Answer(said, following=(np.full(150, 3.0), np.full(150, 5.0)))
+    rounds = follow(poor, first, 2, asking)
+    assert [len(rounds[way]) for way in ("proposed", "random")] == [1, 1]
+    assert rounds["proposed"][0]["protocol"] == "a short hold"
+    assert rounds["proposed"][0]["said"] == "hysteresis" and rounds["proposed"][0]["wrong"]
+    more = with_trial(poor, (np.full(150, 3.0), np.full(150, 5.0)), np.random.default_rng(3))
+    assert len(more.readings) == len(poor.readings) + 1 and more.readings[-1].shape == (150, 4)
+    # 3 V: 97.84 N/V, give or take a tenth; 5 V: 59.9 kPa/V.
+    assert more.readings[-1][:, 2].mean() == pytest.approx(291.5, rel=0.12)
+    assert more.readings[-1][:, 3].mean() == pytest.approx(279.1, rel=0.02)
+
+
+def test_a_random_experiment_is_as_long_as_the_one_proposed():
+    g = np.random.default_rng(2)
+    for rows in (300, 5000):
+        words, (motor, regulator) = random_experiment(g, rows)
+        assert words and motor.shape == regulator.shape == (rows,)
+        assert 0.0 <= motor.min() and motor.max() <= 10.0
+
+
+def test_rounds_are_counted_by_way():
+    def after(proposed, random, verdict="undecidable"):
+        hidden = truth("undecidable", ("bump", {}, 0.0), kind="one load")
+        outcome = compare(hidden, document(verdict))
+        outcome.rounds = {
+            way: [{"settled": each, "wrong": False} for each in came]
+            for way, came in (("proposed", proposed), ("random", random))
+        }
+        return outcome
+
+    silent = compare(truth("undecidable", ("bump", {}, 0.0), kind="held"), document("agrees"))
+    some = [after([True], [False, True]), after([False, True], [False, False]), silent]
+    figures = scoring.count(some)["blocks"]["undecidable"]
+    assert figures["rates"]["undecidable"]["hits"] == 2
+    assert figures["rates"]["proposed, settled in 2 rounds"]["hits"] == 2
+    assert figures["rates"]["proposed, settled in 2 rounds"]["n"] == 3
+    assert figures["rates"]["random, settled in 2 rounds"]["hits"] == 1
+    rounds = figures["rounds"]
+    assert rounds["asked"]["hits"] == 2 and rounds["proposed"]["mean_rounds"] == 1.5
+    assert rounds["random"]["mean_rounds"] == 2.5 and rounds["faster"]["hits"] == 2
+    assert figures["by_kind"]["held"]["verdicts"] == {"agrees": 1}
