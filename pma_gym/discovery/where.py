@@ -139,7 +139,7 @@ def localise(
         return (), ()
     levels = np.asarray(noise_levels, float)[:, None]
     residuals = [part / levels for part in left_over(evidence, readings)]
-    ticks = _ticks(evidence.logged, readings, residuals)
+    ticks = ticks_of(evidence.logged, readings, residuals)
     seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(ticks, channel)]
     return _places(ticks, seen, seed), tuple(_map(ticks, channel) for channel in seen)
 
@@ -152,7 +152,16 @@ def _has_gap(ticks: Ticks, channel: int) -> bool:
 # ---- conditions ----
 
 
-def _ticks(logs: Sequence[Logged], readings: Sequence[Array], residuals: Sequence[Array]) -> Ticks:
+def ticks_of(
+    logs: Sequence[Logged], readings: Sequence[Array], residuals: Sequence[Array]
+) -> Ticks:
+    """All trials in ticks.
+
+    Args:
+        logs: the trials.
+        readings: what the sensors hold (SI), shape (4, rows) for each trial.
+        residuals: those less what was measured, in units of the noise, NaN where nothing was.
+    """
     parts = []
     for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
         order = number / max(len(logs) - 1, 1)
@@ -472,4 +481,4 @@ def _edges(values: Array) -> Array:
     return np.linspace(low, high, CELLS + 1)
 
 
-__all__ = ["adjusted", "localise"]
+__all__ = ["Ticks", "adjusted", "localise", "ticks_of"]

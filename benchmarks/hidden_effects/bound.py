@@ -1,0 +1,289 @@
+"""Where the data, not the method, is the limit: what a test that knows everything could tell.
+
+    python -m benchmarks.hidden_effects.bound --cases D
+
+Of a case whose truth is known, what the hidden effect changes is set, without noise, beside the
+lab's model with its parameters refitted, and beside that model with each rival of the catalogue,
+fitted too. What is left, in units of the true noise made white, is the distance d between two
+hypotheses; for Gaussian noise the log-likelihood ratio has mean d^2 / 2 and standard deviation d.
+A test that knows effect, sizes and noise then detects with Phi(d - z) at an alarm rate of
+Phi(-z), and tells it from its nearest rival with Phi(d / 2). No test does better that has to learn
+any of it. Distances are taken in proportion to r; rivals that were not fitted count by their best
+probe, and fits end where they end, so that a distance to a rival may be too large, never too small.
+"""
+
+import json
+import os
+import sys
+import time
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Annotated, Any
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+import numpy as np  # noqa: E402
+import typer  # noqa: E402
+from numpy.typing import NDArray  # noqa: E402
+from scipy.linalg import solve_toeplitz  # noqa: E402
+from scipy.stats import norm  # noqa: E402
+
+from benchmarks.hidden_effects.groups import group  # noqa: E402
+from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
+    NOISE,
+    SENSORS,
+    SIGNALS,
+    UNITS,
+    noise_levels,
+)
+from benchmarks.hidden_effects.physics.simulation import Commands  # noqa: E402
+from benchmarks.hidden_effects.size import simulate_variants  # noqa: E402
+from pma_gym.data.dataset import Dataset, read_dataset  # noqa: E402
+from pma_gym.data.trial import Trial  # noqa: E402
+from pma_gym.discovery.fits import Bench, Fitted  # noqa: E402
+from pma_gym.discovery.noise import Whitening  # noqa: E402
+from pma_gym.discovery.parameters import own_parameters  # noqa: E402
+from pma_gym.discovery.screening import Baseline, beginnings, look  # noqa: E402
+from pma_gym.discovery.suspects import Suspect, suspects  # noqa: E402
+from pma_gym.files import replace_file  # noqa: E402
+from pma_gym.plant.model import Model, load_model  # noqa: E402
+
+Array = NDArray[np.float64]
+
+ALARM = 0.005
+"""Rate of false alarms of the ideal test."""
+
+RATIOS = (0.1, 0.2, 0.3, 0.5, 0.7, 1.0, 1.4, 2.0)
+"""Values of r at which the curves are given."""
+
+ORDER = 6
+"""Of the autoregression that stands for coloured noise and rounding together."""
+
+FITTED = 4
+"""Rivals that are fitted, those that look nearest."""
+
+NOT_A_MEAN = ("sensor_quantisation",)
+"""Effects that change no mean; a likelihood ratio of Gaussian noise says nothing of them."""
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+
+def detected(distance: Array | float) -> Array:
+    """Chance that the ideal test detects at a distance, at a rate of `ALARM` of false alarms.
+
+    >>> [round(float(p), 3) for p in (detected(0.0), detected(2.576))]
+    [0.005, 0.5]
+    """
+    return np.asarray(norm.cdf(np.asarray(distance) - norm.isf(ALARM)))
+
+
+def told(distance: Array | float) -> Array:
+    """Chance that the likelier of two hypotheses at a distance is the true one.
+
+    >>> [round(float(p), 3) for p in (told(0.0), told(2.0))]
+    [0.5, 0.841]
+    """
+    return np.asarray(norm.cdf(0.5 * np.asarray(distance)))
+
+
+def true_noise(truth: Mapping[str, Any]) -> tuple[Whitening, ...]:
+    """Whitening of each output by the noise that the generator gave it, rounding included."""
+    factors = np.array([truth["noise_factors"][sensor] for sensor in SENSORS])
+    levels = noise_levels(factors)
+    coloured = np.array(NOISE) * factors * np.array(UNITS)
+    found = []
+    for channel, sensor in enumerate(SENSORS):
+        lags = coloured[channel] ** 2 * truth["noise_memory"][sensor] ** np.arange(ORDER + 1)
+        # Rounding of a moving signal is white (Widrow 1956).
+        lags[0] = levels[channel] ** 2
+        coefficients = solve_toeplitz(lags[:-1], lags[1:])
+        innovation = np.sqrt(lags[0] - coefficients @ lags[1:])
+        level = float(levels[channel])
+        found.append(Whitening(tuple(map(float, coefficients)), float(innovation), level))
+    return tuple(found)
+
+
+def left_by(bench: Bench, fit: Fitted, extra: Sequence[Suspect] = ()) -> float:
+    """Distance that a fit leaves to readings without noise, what is assumed beforehand apart."""
+    pieces = bench.evidence(fit.model, extra).pieces(fit.values, np.empty(0))
+    return float("inf") if pieces is None else float(np.sqrt(pieces.total()[0, 0]))
+
+
+def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple[Bench, Model]:
+    """Trials without noise, and the lab's model at the true rig's parameters.
+
+    What the effect changes comes from the generator, and is added to what our own plant gives
+    without it: two integrators differ by some hundredths of the noise, which is no effect.
+    """
+    trials = [named.trial for named in dataset.trials]
+    commands = Commands(
+        np.stack([trial.commands["motor_voltage"] for trial in trials]),
+        np.stack([trial.commands["regulator_voltage"] for trial in trials]),
+        np.arange(len(trials), dtype=float),
+    )
+    hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
+    base, with_it = simulate_variants(commands, [(truth["base"], {}), (truth["base"], hidden)])
+    noise = true_noise(truth)
+    plain = Bench([_read(t, r) for t, r in zip(trials, base, strict=True)], given,
+                  own_parameters(given), noise)  # fmt: skip
+    found = plain.careful_fit(given)
+    if found is None:
+        raise ValueError(f"model {given.name} cannot be simulated on {dataset.title}")
+    readings = plain.evidence(found.model).readings(found.values)
+    assert readings is not None
+    changed = [
+        _read(trial, held.T + after - before)
+        for trial, held, before, after in zip(trials, readings, base, with_it, strict=True)
+    ]
+    return Bench(changed, found.model, own_parameters(found.model), noise), found.model
+
+
+def _read(trial: Trial, readings: Array) -> Trial:
+    """A trial that reads (SI), shape (rows, 4)."""
+    return Trial(trial.time, trial.commands, dict(zip(SIGNALS, readings.T, strict=True)))
+
+
+def distances(bench: Bench, model: Model, orders: Sequence[float], name: str) -> dict[str, Any]:
+    """How far a hidden effect is from nothing, from its likeness in the catalogue, from rivals.
+
+    Args:
+        bench: trials without noise, and the true noise.
+        model: where the base parameters are true.
+        orders: which repeat each trial is.
+        name: of the effect, in the catalogue.
+    """
+    refitted = bench.fit(model)
+    if refitted is None:
+        raise ValueError(f"model {model.name} cannot be simulated")
+    whole = left_by(bench, refitted)
+    baseline = Baseline.at(bench.evidence(refitted.model), refitted.values, refitted.steps)
+    catalogue = suspects(model, orders)
+    looks = look(baseline, catalogue, 0, lambda each: bench.probed(refitted.model, each))
+    looks.sort(key=lambda each: -each.gain)
+    found = {
+        each.suspect.name: float(np.sqrt(max(whole**2 - each.gain, 0.0))) for each in looks
+    }  # fmt: skip
+    rivals = [each for each in looks if each.suspect.name != name and each.starts][:FITTED]
+    for each in [*rivals, *(each for each in looks if each.suspect.name == name and each.starts)]:
+        evidence = bench.probed(refitted.model, each.suspect)
+        begun = beginnings(baseline, evidence, each)[0]
+        fit = bench.fit(refitted.model, (each.suspect,), {each.suspect.name: begun})
+        if fit is not None:
+            left = left_by(bench, fit, (each.suspect,))
+            found[each.suspect.name] = min(found[each.suspect.name], left)
+    others = {other: d for other, d in found.items() if other != name}
+    apart = {other: d for other, d in others.items() if other not in group(name)}
+    return {
+        "nothing": whole,
+        "likeness": found.get(name),
+        "rival": min(others, key=lambda other: others[other]),
+        "to_rival": min(others.values()),
+        "rival_outside": min(apart, key=lambda other: apart[other]),
+        "to_rival_outside": min(apart.values()),
+    }
+
+
+def bounded(folder: Path, case: str) -> dict[str, Any]:
+    """Distances of one drawn case that hides one effect."""
+    truth = json.loads((folder / "truth" / f"{case}.json").read_text("utf-8"))
+    dataset = read_dataset(folder / "cases" / case)
+    bench, model = noiseless(dataset, truth, load_model(dataset.model or "station"))
+    effect = truth["effects"][0]
+    orders = [float(named.order or 0.0) for named in dataset.trials]
+    found = distances(bench, model, orders, effect["name"])
+    return {"case": case, "effect": effect["name"], "r": effect["r"], **found}
+
+
+def curves(some: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Medians over an effect's cases: distances at r = 1, and chances over r."""
+
+    def at(ratio: float, what: str) -> Array:
+        return np.array([each[what] * ratio / each["r"] for each in some])
+
+    rivals = [each["rival"] for each in some]
+    likeness = [each["likeness"] / each["r"] for each in some if each["likeness"] is not None]
+    return {
+        "n": len(some),
+        "d_nothing": float(np.median(at(1.0, "nothing"))),
+        "d_likeness": float(np.median(likeness)) if likeness else None,
+        "d_rival": float(np.median(at(1.0, "to_rival"))),
+        "d_rival_outside": float(np.median(at(1.0, "to_rival_outside"))),
+        "rivals": sorted(set(rivals), key=lambda name: -rivals.count(name)),
+        "r": list(RATIOS),
+        "detected": [float(np.mean(detected(at(r, "nothing")))) for r in RATIOS],
+        "told": [float(np.mean(told(at(r, "to_rival")))) for r in RATIOS],
+        "told_outside": [float(np.mean(told(at(r, "to_rival_outside")))) for r in RATIOS],
+    }
+
+
+def table(by_effect: Mapping[str, Mapping[str, Any]]) -> str:
+    """The curves as text."""
+    shown = (0.1, 0.3, 0.5, 1.0, 2.0)
+    places = [RATIOS.index(r) for r in shown]
+    heads = "  ".join(f"{r:>5g}" for r in shown)
+    lines = [
+        "distance d at r = 1 to nothing, to the effect's likeness in the catalogue, to its nearest "
+        "rival;",
+        f"chance (%) to detect at r = 0.1, and to tell it from that rival at r = {heads}",
+    ]
+    for name, each in sorted(by_effect.items()):
+        likeness = "    -" if each["d_likeness"] is None else f"{each['d_likeness']:5.1f}"
+        chances = "  ".join(f"{100 * each['told'][k]:5.1f}" for k in places)
+        lines.append(
+            f"  {name:24s}n {each['n']:<3d}{each['d_nothing']:6.1f} {likeness} "
+            f"{each['d_rival']:6.1f}   {100 * each['detected'][0]:5.1f}   {chances}"
+            f"   {', '.join(each['rivals'][:2])}"
+        )
+    return "\n".join(lines)
+
+
+@app.command()
+def main(
+    cases: Annotated[Path, typer.Option(help="Folder that `draw` wrote.", exists=True)],
+    json_file: Annotated[Path | None, typer.Option("--json", help="Curves to a file.")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
+) -> None:
+    """Bound what can be told of cases that hide one effect; what is there is kept."""
+    kept = cases / "bounds"
+    kept.mkdir(exist_ok=True)
+    names = [path.stem for path in sorted((cases / "truth").glob("case_*.json")) if _counts(path)]
+    missing = [name for name in names if not (kept / f"{name}.json").is_file()]
+    begun = time.monotonic()
+    print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
+    for done, name in enumerate(_bounds(cases, missing, jobs), 1):
+        took = time.monotonic() - begun
+        print(f"{done}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
+    found = [json.loads((kept / f"{name}.json").read_text("utf-8")) for name in names]
+    by_effect = {
+        effect: curves([each for each in found if each["effect"] == effect])
+        for effect in dict.fromkeys(each["effect"] for each in found)
+    }
+    if json_file is not None:
+        document = {"alarm": ALARM, "effects": by_effect, "cases": found}
+        replace_file(json_file, (json.dumps(document, indent=1) + "\n").encode())
+    typer.echo(table(by_effect))
+
+
+def _counts(truth: Path) -> bool:
+    effects = json.loads(truth.read_text("utf-8"))["effects"]
+    return len(effects) == 1 and effects[0]["name"] not in NOT_A_MEAN
+
+
+def _bound_one(folder: Path, case: str) -> str:
+    text = json.dumps(bounded(folder, case), indent=1) + "\n"
+    replace_file(folder / "bounds" / f"{case}.json", text.encode())
+    return case
+
+
+def _bounds(folder: Path, missing: Sequence[str], jobs: int):  # noqa: ANN202
+    if jobs == 1:
+        yield from (_bound_one(folder, name) for name in missing)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        futures = [pool.submit(_bound_one, folder, name) for name in missing]
+        yield from (future.result() for future in as_completed(futures))
+
+
+if __name__ == "__main__":
+    app()

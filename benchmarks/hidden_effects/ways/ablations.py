@@ -1,0 +1,81 @@
+"""Ours, whole and with one part off.
+
+A part is taken out by giving a module of the diagnosis another function in its place while one
+diagnosis runs; the workflow stays the one that users run.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Any
+from unittest.mock import patch
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from pma_gym.data.dataset import Dataset
+from pma_gym.discovery import diagnose, selection, workflow
+from pma_gym.discovery.noise import Whitening, white_noise
+from pma_gym.discovery.parameters import Own
+from pma_gym.discovery.screening import Look
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+HELD = 1e-3
+"""Share of what parameters may be off by that is left to them where they are not refitted."""
+
+
+def ours(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
+    """The diagnosis as users run it."""
+    return diagnose(dataset, seed=seed, jobs=jobs).document()
+
+
+def no_whitening(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
+    """Without the noise's memory: what a fit leaves counts as white noise of its variance."""
+    with _instead(selection, "autoregression", _no_memory):
+        return ours(dataset, seed, jobs)
+
+
+def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
+    """Without a refit: the model's own parameters stay as given, zeros of sensors are free."""
+    own = workflow.own_parameters
+
+    def held(model: Model) -> Own:
+        found = own(model)
+        return replace(found, prior=HELD * found.prior)
+
+    with _instead(workflow, "own_parameters", held):
+        found = ours(dataset, seed, jobs)
+    # Parameters that were not free are neither off nor undetermined.
+    return {**found, "parameters": {}, "not_identifiable": {}}
+
+
+def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
+    """Without the simulated chance: a likelihood ratio passes by chi-square, by itself."""
+    whole = selection.look
+
+    def by_chi_square(*args: Any, **options: Any) -> list[Look]:  # noqa: ANN401
+        return [replace(each, p_value=wilks(each)) for each in whole(*args, **options)]
+
+    with _instead(selection, "look", by_chi_square):
+        return ours(dataset, seed, jobs)
+
+
+def wilks(found: Look) -> float:
+    """Chance of so large a gain by chi-square with as many degrees as parameters are fitted."""
+    return float(chi2.sf(found.gain, int(found.suspect.fitted.sum())))
+
+
+def _no_memory(parts: Sequence[Array], level: float) -> Whitening:
+    """White noise of what is left, never less than what is seen at rest."""
+    every = np.concatenate([part[np.isfinite(part)] for part in parts])
+    return white_noise(max(level, float(np.sqrt(np.mean(every**2)))))
+
+
+@contextmanager
+def _instead(module: object, name: str, other: object) -> Iterator[None]:
+    """Another function in a module's place; AttributeError where it has none of that name."""
+    with patch.object(module, name, other):
+        yield
