@@ -379,6 +379,31 @@ def hidden_effects(
     raise typer.Exit(code)
 
 
+@app.command("hidden-effects-report")
+def hidden_effects_report(
+    places: Annotated[
+        list[Path], typer.Argument(help="Folders or --json files of `hidden-effects`.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Markdown or .html file; printed if not given.", callback=_writable),
+    ] = None,
+) -> None:
+    """Write the figures of several blocks of hidden effects as one page of tables."""
+    from benchmarks.files import write_text
+    from benchmarks.hidden_effects.job import JobError
+    from benchmarks.hidden_effects.summary import read_scores, report
+
+    try:
+        text = report(read_scores(places), out.suffix if out else ".md")
+    except JobError as error:
+        _refuse(error)
+    if out is None:
+        print(text)
+    else:
+        write_text(out, text)
+
+
 def _listed(text: str) -> list[str]:
     return [part.strip() for part in text.split(",") if part.strip()]
 

@@ -13,9 +13,9 @@ from benchmarks.hidden_effects.asking import Answer
 from benchmarks.hidden_effects.blocks import Block
 from benchmarks.hidden_effects.effects import KINDS
 from benchmarks.hidden_effects.job import JobError, Order, run_block
-from benchmarks.hidden_effects.library import named, random_experiment
+from benchmarks.hidden_effects.library import random_experiment
 from benchmarks.hidden_effects.physics.rig import noise_levels
-from benchmarks.hidden_effects.physics.simulation import RATE, Commands
+from benchmarks.hidden_effects.physics.simulation import Commands
 from benchmarks.hidden_effects.rounds import follow, with_trial
 from benchmarks.hidden_effects.size import Experiment, simulate_variants
 from benchmarks.hidden_effects.targets import RATES
@@ -30,7 +30,7 @@ from benchmarks.hidden_effects.undecidable import (
 from benchmarks.hidden_effects.verdicts import compare, unanswered
 from tests.benchmarks.cheap_diagnosis import by_size, document
 
-TINY = Block("nothing", trials=3, seconds=3.0)
+TINY = Block("nothing", trials=3, seconds=2.0)
 
 
 class Interrupting:
@@ -190,23 +190,21 @@ def test_every_block_has_its_rates_and_effects_take_turns():
 
 @pytest.fixture(scope="module")
 def poor():
-    """A case whose data do not tell that the regulator is limited in rate."""
-    return draw_undecidable(90002, 1, "regulator_rate_limit")
+    """A case of three trials at one pressure each, which cannot tell that its regulator is late."""
+    return draw_undecidable(90003, 1, "regulator_delay")
 
 
 def test_an_undecidable_case_keeps_what_the_ruler_promised(poor):
     (hidden,) = poor.truth["effects"]
     assert poor.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN
     motor, regulator = np.array(poor.motor), np.array(poor.regulator)
+    assert np.all(np.ptp(regulator, axis=1) == 0.0) and np.ptp(motor) > 1.0
     commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
-    with_it = {"regulator_rate_limit": hidden["parameters"]}
-    rig = poor.truth["base"]
-    plain, limited = simulate_variants(commands, [(rig, {}), (rig, with_it)])
+    rig, with_it = poor.truth["base"], {"regulator_delay": hidden["parameters"]}
+    plain, late = simulate_variants(commands, [(rig, {}), (rig, with_it)])
     # Without any refit, so that nothing rests on what a refit may absorb.
-    assert np.sum(((limited - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
-    # The library's pressure steps ask for more than the limit lets through.
-    step = np.abs(np.diff(named("pressure steps", np.random.default_rng(0))[1][1])).max()
-    assert 59.9 * step > hidden["parameters"]["limit_kpa_per_s"] / RATE
+    assert np.sum(((late - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
+    assert hidden["witness"]["protocol"].startswith("pressure steps")
 
 
 def test_what_parameters_and_rivals_absorb_is_not_told():
@@ -282,3 +280,21 @@ def test_rounds_are_counted_by_way():
     assert rounds["asked"]["hits"] == 2 and rounds["proposed"]["mean_rounds"] == 1.5
     assert rounds["random"]["mean_rounds"] == 2.5 and rounds["faster"]["hits"] == 2
     assert figures["by_kind"]["held"]["verdicts"] == {"agrees": 1}
+
+
+def test_a_page_has_every_block_once(whole, tmp_path):
+    score = whole[0] / "score.json"
+    call = ["hidden-effects-report", str(whole[0])]
+    text = CliRunner().invoke(app, call).stdout
+    alarm = whole[1]["blocks"]["nothing"]["rates"]["false alarm"]
+    assert re.search(
+        rf"nothing *\| *false alarm *\| .*{alarm['hits']} of 3 *\| *<= 0.01 *\| *missed", text
+    )
+    assert CliRunner().invoke(app, [*call, "--out", str(tmp_path / "page.html")]).exit_code == 0
+    assert "false alarm" in (tmp_path / "page.html").read_text("utf-8")
+    twice = CliRunner().invoke(app, [*call, str(score)])
+    assert twice.exit_code == 2 and "block nothing is in 2 of the files" in twice.stderr
+    torn = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path / "page.html")])
+    assert torn.exit_code == 2 and "page.html is no JSON file" in torn.stderr
+    nowhere = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path)])
+    assert nowhere.exit_code == 2 and "there is no such file" in nowhere.stderr
