@@ -93,7 +93,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
     done = {
         record.number: record
         for record in records.read(order.folder, order.count)
-        if record.code == code or not order.again
+        if (record.code == code or not order.again) and record.most_rounds >= order.block.rounds
     }
     _tell(_greeting(order, done, code))
     missing = [number for number in range(1, order.count + 1) if number not in done]

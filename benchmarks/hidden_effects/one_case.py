@@ -55,6 +55,7 @@ class Work:
             rounds,
             {name: round(took, 3) for name, took in ends.items()},
             self.code,
+            self.block.rounds,
         )
         records.write(record, self.folder)
         return record

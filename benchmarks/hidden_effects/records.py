@@ -28,6 +28,7 @@ class Record:
         rounds: what came of experiments that followed, by who chose them.
         seconds: to draw it, to read and to diagnose it.
         code: fingerprint of the code that made it.
+        most_rounds: how many experiments could follow.
     """
 
     number: int
@@ -37,6 +38,7 @@ class Record:
     rounds: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
     seconds: dict[str, float] = field(default_factory=dict)
     code: str = ""
+    most_rounds: int = 0
 
 
 def essentials(document: Mapping[str, Any]) -> dict[str, Any]:

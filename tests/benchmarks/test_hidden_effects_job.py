@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -117,6 +118,14 @@ def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, 
     assert "1 of them by other code" in capsys.readouterr().err
     found = run_block(order(tmp_path, count=1, again=True))
     assert found is not None and found["code"] == {"newer": 1}
+
+
+def test_cases_without_the_rounds_that_are_asked_for_are_made_anew(tmp_path, capsys):
+    run_block(order(tmp_path, count=1))
+    run_block(order(tmp_path, count=1, block=replace(TINY, rounds=1)))
+    assert "are done" not in capsys.readouterr().err
+    run_block(order(tmp_path, count=1))
+    assert "1 are done" in capsys.readouterr().err
 
 
 def test_a_folder_holds_one_set(whole):
