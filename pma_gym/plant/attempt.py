@@ -17,7 +17,7 @@ SHRINK, GROW = 0.1, 4.0
 LEAST_S = 1e-7
 """A step of this length (s) is taken whatever its error."""
 
-LOST = 1e300
+LOST = 1e20
 """A step of the least length with such an error, or one that is no number, ends the span: what the
 states are then says that the trial was lost."""
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
 
@@ -125,3 +126,14 @@ def test_beyond_the_tables_it_extrapolates(plant):
     assert not plant.extrapolates(575e3)
     assert plant.extrapolates(149e3)
     assert plant.extrapolates(576e3)
+
+
+def test_a_muscle_that_runs_away_is_lost_at_once():
+    """Softer than its force grows: a step of pressure leaves it nowhere to stop."""
+    softening = {"linear": -1.145, "quadratic": -2.29}
+    model = load_model("serres2008").with_effects(
+        {"nonlinear_stiffness": {**softening, "stiffness_n_per_mm": 20, "resting_length_mm": 250}}
+    )
+    model = model.replace({"contractile_force.slope_n_per_kpa": 2.4})
+    asked = trial([0.0, 5.0, 10.0, 15.0], motor_voltage=0.0, regulator_voltage=[1.5, 9.0, 9.0, 9.0])
+    assert abs(Plant(model).simulate(asked, noise=False).truth["contraction"][-1]) > 1.0
