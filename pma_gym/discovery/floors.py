@@ -7,10 +7,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.dataset import NamedTrial
-from pma_gym.discovery.noise import at_rest, distinct_readings, level_at_rest, step_between
+from pma_gym.discovery.evidence import FREE_ZEROS
+from pma_gym.discovery.noise import (
+    at_rest,
+    distinct_readings,
+    level_at_rest,
+    sparse,
+    step_between,
+)
 from pma_gym.plant import sensors
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model
+from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -52,29 +60,49 @@ def initial_floors(
         if repeats is not None:
             sources["repeats"] = repeats
         source = next(name for name in ("rest segments", "the model's sensor") if name in sources)
+        parts = [_readings(each, channel) for each in logged if each.measures[channel]]
+        if rest is None and sparse(parts) and sources.get("repeats", 0.0) > sources[source]:
+            source = "repeats"
         level = max(sources[source], float(rounding))
         distinct = len(distinct_readings(logged, channel))
         found.append(Level(level, source, sources, step, line.resolution, distinct))
     return found
 
 
+def _readings(logged: Logged, channel: int) -> Array:
+    """A signal of a trial (SI), NaN where it was not read."""
+    values = logged.measured[channel].copy()
+    values[logged.missing[channel]] = np.nan
+    return values
+
+
 def _between_repeats(
     logged: Sequence[Logged], named: Sequence[NamedTrial], channel: int
 ) -> float | None:
-    """Rms of the difference of repeats over root 2, their means taken out; None without any."""
-    places = {each.name: i for i, each in enumerate(named)}
-    squares, count = 0.0, 0
+    """Scatter between a trial and its repeats (SI); None without any, or of too few readings.
+
+    Rms of their differences over root 2, their means taken out; of a signal that is read seldom
+    and has no free zero, a mean over one or two readings is noise too, and stays.
+    """
+    groups: dict[str, list[int]] = {}
     for i, each in enumerate(named):
-        first = places.get(each.repeat_of or "")
-        if first is None or not logged[i].measures[channel] or not logged[first].measures[channel]:
-            continue
-        shared = min(len(logged[i].time), len(logged[first].time))
-        if not np.array_equal(logged[i].time[:shared], logged[first].time[:shared]):
-            continue
-        both = logged[i].measured[channel, :shared] - logged[first].measured[channel, :shared]
-        missing = np.union1d(logged[i].missing[channel], logged[first].missing[channel])
-        both = np.delete(both, missing[missing < shared])
-        if len(both) > 1:
-            squares += float(np.sum((both - both.mean()) ** 2)) / 2.0
-            count += len(both) - 1
+        groups.setdefault(each.repeat_of or each.name, []).append(i)
+    few = sparse([_readings(each, channel) for each in logged if each.measures[channel]])
+    centred = not few or OUTPUTS[channel] in FREE_ZEROS
+    squares, count = 0.0, 0
+    for group in groups.values():
+        for i, j in zip(group, group[1:], strict=False):
+            apart = _difference(logged[i], logged[j], channel)
+            if apart.size > centred:
+                squares += float(np.sum((apart - centred * apart.mean()) ** 2)) / 2.0
+                count += apart.size - centred
     return float(np.sqrt(squares / count)) if count else None
+
+
+def _difference(one: Logged, other: Logged, channel: int) -> Array:
+    """What one repeat reads beyond another (SI), shape (n,); empty where their times differ."""
+    shared = min(len(one.time), len(other.time))
+    if not np.array_equal(one.time[:shared], other.time[:shared]):
+        return np.empty(0)
+    both = _readings(other, channel)[:shared] - _readings(one, channel)[:shared]
+    return both[np.isfinite(both)]

@@ -3,7 +3,9 @@
 Noise is seen where nothing moves: in rest segments, at constant commands long after the last
 change, and between repeats of a trial. What an autoregression of the residual cannot foretell is a
 third estimate. The largest of what is seen at rest and the rounding of the readings counts: a
-reading that stands still inside one step of the DAQ shows no noise at all.
+reading that stands still inside one step of the DAQ shows no noise at all. Of a signal that is read
+a few times a trial, only repeats tell the noise, and no autoregression: its readings are seconds
+apart.
 """
 
 from collections.abc import Sequence
@@ -131,6 +133,8 @@ def autoregression(parts: Sequence[Array], level: float) -> Whitening:
             lags[lag] += series[: len(series) - lag] @ series[lag:]
     if count < ENOUGH or lags[0] <= 0.0:
         return white_noise(level)
+    if sparse(parts):
+        return white_noise(max(level, float(np.sqrt(lags[0] / count))))
     best, least = white_noise(max(level, float(np.sqrt(lags[0] / count)))), count * np.log(lags[0])
     for order in range(1, MOST_ORDER + 1):
         found = solve_toeplitz(lags[:order], lags[1 : order + 1])
@@ -143,6 +147,16 @@ def autoregression(parts: Sequence[Array], level: float) -> Whitening:
             share = np.sqrt(left / lags[0])
             best = Whitening(tuple(map(float, found)), float(share * best.level), best.level)
     return best
+
+
+def sparse(parts: Sequence[Array]) -> bool:
+    """Whether a signal is read too seldom to be taken for a series.
+
+    Args:
+        parts: its readings or residuals in each trial, NaN where there is none.
+    """
+    counts = [int(np.isfinite(part).sum()) for part in parts]
+    return not counts or max(counts) < LEAST_REST
 
 
 def distinct_readings(trials: Sequence[Logged], channel: int) -> Array:
@@ -172,12 +186,20 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
     return step if len(gaps) and float(np.max(miss)) < 0.05 and span / step < 2e4 else 0.0
 
 
-def slow_part(parts: Sequence[Array], rate_hz: float) -> float:
+def slow_part(parts: Sequence[Array], rate_hz: float, level: float = 0.0) -> float:
     """Mean square of what is slow in a residual (SI squared), whatever its noise.
 
     The autocovariance over `SLOW_S`: sensors' noise has forgotten itself by then, and what a wrong
-    model leaves has not.
+    model leaves has not. Of a signal that is read seldom, all that is more than noise.
+
+    Args:
+        parts: the residual in each trial (SI), NaN where there is none.
+        rate_hz: rows a second (Hz).
+        level: standard deviation of the noise (SI).
     """
+    if sparse(parts):
+        readings = np.concatenate([part[np.isfinite(part)] for part in parts] or [np.empty(0)])
+        return max(0.0, float(np.mean(readings**2)) - level**2) if readings.size else 0.0
     first, last = (max(1, round(lag * rate_hz)) for lag in SLOW_S)
     sums, count = 0.0, 0
     for part in parts:

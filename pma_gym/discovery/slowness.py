@@ -26,5 +26,5 @@ def _slow(found: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float6
     shares = np.zeros(4)
     for channel, floor in enumerate(found.floors):
         parts = [part[channel] for part in left]
-        shares[channel] = slow_part(parts, float(np.median(rates))) / floor.level**2
+        shares[channel] = slow_part(parts, float(np.median(rates)), floor.level) / floor.level**2
     return shares

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from pma_gym.data.dataset import NamedTrial
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.noise import (
     FIRST_REST_S,
     REST_S,
@@ -168,3 +170,34 @@ def test_white_noise_has_no_slow_part_and_a_slow_sine_is_all_slow():
     both = [2.0 * np.sin(2 * np.pi * 0.2 * time) + part for part in white]
     assert slow_part(both, 128.0) == pytest.approx(2.0, rel=0.06)
     assert slow_part([], 128.0) == 0.0
+
+
+def test_a_signal_read_a_few_times_a_trial_is_no_series():
+    """Readings seconds apart: whitened by their level alone, and all misfit beyond it is slow."""
+    rng = np.random.default_rng(3)
+    # Within a trial all readings share what a wrong model misses: neighbours are not noise.
+    parts = [rng.normal(0.0, 5.0) + rng.normal(0.0, 1.0, 4) for _ in range(200)]
+    found = autoregression(parts, 1.0)
+    assert found.coefficients == ()
+    assert found.level == pytest.approx(np.sqrt(26.0), rel=0.2)
+    assert slow_part(parts, 0.2, 1.0) == pytest.approx(25.0, rel=0.3)
+
+
+def test_noise_of_a_few_readings_comes_from_repeats():
+    """No segment rests long enough; the model's sensor says far less than repeats scatter."""
+    rng = np.random.default_rng(4)
+    named = []
+    for load in range(60):
+        for repeat in range(3):
+            read = np.array([30e-3, np.nan, 20e-3, 29e-3]) + rng.normal(0.0, 0.6e-3, 4)
+            trial = Trial(
+                np.array([0.0, 5.0, 10.0, 15.0]),
+                {"motor_voltage": np.zeros(4), "regulator_voltage": np.full(4, 5.0)},
+                {"contraction": read},
+            )
+            first = None if repeat == 0 else f"{load} 0"
+            named.append(NamedTrial(f"{load} {repeat}", trial, float(repeat), first))
+    read = [Logged.of(STATION, i, each.trial) for i, each in enumerate(named)]
+    level = initial_floors(STATION, read, named)[0]
+    assert level.source == "repeats"
+    assert level.level == pytest.approx(0.6e-3, rel=0.1)
