@@ -17,6 +17,7 @@ from benchmarks.hidden_effects.ways import (
     forest,
     judge,
     prepared,
+    process,
     stepwise,
 )
 from benchmarks.hidden_effects.ways.prepared import prepare
@@ -114,15 +115,18 @@ def test_a_signature_says_where_the_residual_is(ready):
     )
 
 
-def test_the_forest_learns_from_no_judged_case():
+def test_the_forest_learns_from_no_judged_case(folder, tmp_path):
     known = forest.read_table(forest.TABLE)
     assert not set(known.seeds.tolist()) & set(JUDGED)
-    assert command.TRAINING_SEED not in JUDGED
     assert set(known.seeds.tolist()) == {command.TRAINING_SEED}
     assert len(set(known.labels)) > 20 and forest.NOTHING in known.labels
     assert np.isfinite(known.values).all()
-    with pytest.raises(ValueError, match="train on another seed"):
-        forest.train(1, 5, forest.TABLE, 1, seen=JUDGED)
+    forest.check_unseen(folder, forest.TABLE)
+    (tmp_path / "truth").mkdir()
+    truth = json.dumps({"seed": command.TRAINING_SEED})
+    (tmp_path / "truth" / "case_0007.json").write_text(truth, "utf-8")
+    with pytest.raises(ValueError, match="case_0007.*another seed"):
+        forest.check_unseen(tmp_path, forest.TABLE)
 
 
 def test_a_table_of_signatures_names_what_is_lacking(tmp_path):
@@ -139,6 +143,7 @@ def test_every_way_sees_much_creep(way, folder, dataset, monkeypatch):
     # The whole catalogue, pair by pair, would take a minute to compile and fit.
     few = [each for each in prepared.suspects(load_model(dataset.model)) if each.name in FEW]
     monkeypatch.setattr(prepared, "suspects", lambda model, orders: few)
+    monkeypatch.setattr(process, "MOST_TICKS", 60)
     for name in WAYS[way].needs:
         pytest.importorskip(name)
     answer = WAYS[way].ask(dataset, 0, 1)

@@ -27,6 +27,7 @@ def run(
     """Ask the ways about every case that they have not answered, and print one table."""
     import json
 
+    from benchmarks.hidden_effects.ways import forest
     from benchmarks.hidden_effects.ways.compared import compared, table
     from benchmarks.hidden_effects.ways.judge import ask_all
     from benchmarks.hidden_effects.ways.registry import WAYS
@@ -38,6 +39,11 @@ def run(
             raise typer.BadParameter(f"{name!r} is none of {', '.join(WAYS)}", param_hint="--ways")
     left_out = {name: WAYS[name].absence for name in chosen if WAYS[name].absence}
     chosen = [name for name in chosen if name not in left_out]
+    if "random_forest" in chosen:
+        try:
+            forest.check_unseen(cases, forest.TABLE)
+        except (FileNotFoundError, ValueError) as error:
+            raise typer.BadParameter(str(error), param_hint="--cases") from None
     ask_all(cases, chosen, jobs, seed)
     document = compared(cases, chosen)
     if json_file is not None:

@@ -7,6 +7,7 @@ of `signatures.csv`, one line a case, from which the forest is grown when it is 
 # pyright: reportMissingImports=false
 import csv
 import io
+import json
 import sys
 import tempfile
 import time
@@ -93,23 +94,34 @@ def _grown(file: Path, seed: int):  # noqa: ANN202
     return forest.fit(known.values, known.labels), known.names
 
 
-def train(count: int, seed: int, file: Path, jobs: int, seen: Sequence[int] = ()) -> None:
+def check_unseen(folder: Path, file: Path) -> None:
+    """Refuse to judge a forest by cases of a set that it has learnt from.
+
+    Args:
+        folder: what `draw` wrote.
+        file: the table.
+    Raises:
+        ValueError: a case of one of its seeds.
+    """
+    learnt = set(read_table(file).seeds.tolist())
+    for path in sorted((folder / "truth").glob("case_*.json")):
+        seed = json.loads(path.read_text("utf-8"))["seed"]
+        if seed in learnt:
+            raise ValueError(
+                f"{path.stem} in {folder} is of seed {seed}, from which the forest's table {file} "
+                "was made: it would know the answers; draw cases of another seed"
+            )
+
+
+def train(count: int, seed: int, file: Path, jobs: int) -> None:
     """Draw cases, read their signatures, and add those that are missing to a table.
 
     Args:
         count: how many cases the set has.
-        seed: of the set.
+        seed: of the set; no case of it may be judged (`check_unseen`).
         file: the table; what it has is kept.
         jobs: processes.
-        seen: seeds of cases that are judged, which nothing may be learnt from.
-    Raises:
-        ValueError: a seed that is judged.
     """
-    if seed in seen:
-        raise ValueError(
-            f"seed {seed} is one that is judged ({', '.join(map(str, seen))}); a forest that had "
-            "seen it would know the answers: train on another seed"
-        )
     rows = _rows(file)
     known = {(int(row["seed"]), int(row["number"])) for row in rows}
     missing = [k for k in range(1, count + 1) if (seed, k) not in known]
