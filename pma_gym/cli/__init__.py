@@ -112,6 +112,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _doubts(model: Model, trial: Trial) -> list[str]:
     """Where a simulated trial leaves what the model was identified on, or what a rig endures."""
     doubts = []
+    if model.plant == "slide":
+        # It has neither a pressure nor limits of its own.
+        return doubts
     valid = model.parameters["validity"]
     pressure = trial.truth["pressure"]
     low, high = valid.lowest - _PRESSURE_TOLERANCE, valid.highest + _PRESSURE_TOLERANCE

@@ -112,10 +112,15 @@ Recipe = Callable[[float], tuple[str, Trial]]
 def library(models: Sequence[Model], seed: int = 0) -> Iterator[Protocol]:
     """All protocols that are safe, one after the other.
 
+    None for what is no station: only a station comes to rest by itself.
+
     Args:
         models: those that may be true; the first one's lines give the volts.
         seed: of the phases of multisines.
     """
+    if models[0].plant != "station":
+        # A slide that nothing holds runs away from commands that nobody corrects.
+        return
     plants = [Plant(model) for model in models]
     for recipe in _recipes(models[0], seed):
         found = _largest(plants, recipe)

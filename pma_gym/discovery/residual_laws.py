@@ -53,7 +53,12 @@ class Drawn:
 
 
 def drawn_laws(bench: Bench, refitted: Fitted) -> list[Drawn]:
-    """Every law fitted, the one that explains most first."""
+    """Every law fitted, the one that explains most first; none for a slide, which lacks a muscle.
+
+    They are laws of a muscle and of a drive that only pulls.
+    """
+    if bench.given.plant == "slide":
+        return []
     before = bench.evidence(refitted.model).sums(refitted.values, np.empty(0)).chi_square
     ranges = _ranges(bench, refitted)
     found = []

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.parameters import values
 from pma_gym.effects import CATALOGUE, Effect
-from pma_gym.plant import sensors, station
-from pma_gym.plant.model import Model, ModelError
+from pma_gym.plant import sensors
+from pma_gym.plant.model import PLANTS, Model, ModelError
 from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
@@ -163,7 +163,7 @@ def _lacking(model: Model, effect: Effect, orders: Sequence[float] | None) -> "S
     counted = "repeat" in effect.quantities
     if counted and (orders is None or len(set(orders)) < 2):
         return None
-    if effect.port not in station.PORTS and not effect.port.startswith("sensor:"):
+    if effect.port not in PLANTS[model.plant].PORTS and not effect.port.startswith("sensor:"):
         return None
     if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
         return None

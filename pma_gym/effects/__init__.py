@@ -21,6 +21,7 @@ from pma_gym.effects.geometric_force import (
     SCHULZ_FORCE,
     TONDU_LOPEZ_FORCE,
 )
+from pma_gym.effects.hanging_load import HANGING_LOAD
 from pma_gym.effects.hysteresis import HYSTERESIS
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.load_dependent_damping import LOAD_DEPENDENT_DAMPING
@@ -52,8 +53,10 @@ from pma_gym.effects.sensor_errors import (
 from pma_gym.effects.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
 from pma_gym.effects.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.slide import SLIDE
+from pma_gym.effects.start import START
 from pma_gym.effects.stiffness import STIFFNESS
 from pma_gym.effects.torque_ripple import TORQUE_RIPPLE
+from pma_gym.effects.two_way_drive import TWO_WAY_DRIVE
 from pma_gym.effects.warm_up import WARM_UP
 
 CATALOGUE: dict[str, Effect] = {
@@ -87,6 +90,7 @@ CATALOGUE: dict[str, Effect] = {
         RESIDUAL_FORCE_OF_PRESSURE,
         CABLE,
         DRIVE,
+        TWO_WAY_DRIVE,
         DRIVE_DEAD_ZONE,
         DRIVE_SATURATION,
         DRIVE_DELAY,
@@ -95,7 +99,9 @@ CATALOGUE: dict[str, Effect] = {
         TORQUE_RIPPLE,
         BEARING_FRICTION,
         ROTOR,
+        HANGING_LOAD,
         SLIDE,
+        START,
         REGULATOR_LINE,
         REGULATOR_DELAY,
         REGULATOR_LAG,

@@ -132,6 +132,11 @@ def rig_model(task: Task, options: Options) -> Model:
         ValueError: a cascade where there must be a station.
     """
     model = load_model(options.model)
+    if model.plant == "slide":
+        raise ValueError(
+            f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
+            "which has no muscle; take station or serres2008"
+        )
     operated = options.disturbing.operator_force != 0.0
     if model.plant != "station" and (operated or task.load):
         what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"

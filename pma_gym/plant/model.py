@@ -12,12 +12,12 @@ import numpy as np
 
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
-from pma_gym.plant import cascade, station
+from pma_gym.plant import cascade, slide, station
 from pma_gym.plant.compose import Port
 from pma_gym.plant.toml import TOMLError, read_toml, toml_text
 
 SCHEMA = 1
-PLANTS = {"station": station, "cascade": cascade}
+PLANTS = {"station": station, "cascade": cascade, "slide": slide}
 _HEAD = ("schema", "name", "title", "plant")
 
 
@@ -47,7 +47,7 @@ class Model:
     Attributes:
         name: short name.
         title: one line for people.
-        plant: `station` or `cascade`.
+        plant: `station`, `cascade` or `slide`.
         parameters: NamedTuple of parameters (SI) by effect name, in catalogue order.
         notes: source and interval by `effect.parameter_unit`.
     """
@@ -296,10 +296,10 @@ def _check_ports(model: Model) -> None:
             raise ModelError(f"a {model.plant} cannot have [{name}]: {refused[name]}")
     for part in plant.PARTS:
         if part not in model.parameters:
-            raise ModelError(
-                f"a {model.plant} needs [{part}]; copy it from the shipped model "
-                f"{'serres2008' if model.plant == 'station' else 'cascade'}"
-            )
+            doors = ", ".join(CATALOGUE[part].names_at_the_door())
+            source = {"station": "serres2008", "cascade": "cascade"}.get(model.plant)
+            where = f"copy it from the shipped model {source}" if source else f"it has {doors}"
+            raise ModelError(f"a {model.plant} needs [{part}]; {where}")
     for name, port in plant.PORTS.items():
         _check_port(model, name, port)
 

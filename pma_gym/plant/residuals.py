@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant import sensors, settle
+from pma_gym.plant import beginnings, sensors, settle
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS, Plant
@@ -69,7 +69,7 @@ class Residuals:
     A residual is simulated minus measured, in standard deviations: the sensor's noise and the
     rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
     does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
-    begins settled at its first commands.
+    begins settled at its first commands; a slide that nothing holds, as fast as fits it best.
 
     Args:
         model: the model; its noise levels weigh the sensors, its drive and its regulator's line
@@ -117,6 +117,11 @@ class Residuals:
         self.count = sum(logged.count for logged in self._trials)
         self._buffer = np.empty(0)
         self._own: list[tuple[int, Array]] = []
+        self._begun: list[tuple[int, Array]] = []
+        if self.plant.model.plant == "slide":
+            where, speed = beginnings.starts(self._trials)
+            paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
+            self._begun = self._places({path: list(row) for path, row in paths.items()})
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums at parameters, with the Jacobian by finite differences.
@@ -174,8 +179,10 @@ class Residuals:
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self._factors[column]
-        every = self._every(vectors)
-        count, number = len(tried), len(self.plant.states)
+        count, number = len(tried) + bool(self._begun), len(self.plant.states)
+        every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
+        if self._begun:
+            every[len(tried) :: count, self._begun[-1][0]] += beginnings.MOVE
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
@@ -198,13 +205,22 @@ class Residuals:
                     ]
                 simulate_all(self.plant.program, runs, self.threads)
                 logs = [self._trials[i] for i in block]
-                found += pool.map(work, logs, spaces, zeros[block], repeat(vectors))
+                if self._begun:
+                    spaces = list(map(self._met, spaces, logs))
+                found += pool.map(work, logs, spaces, zeros[block, : len(tried)], repeat(vectors))
         return found
+
+    def _met(self, space: Array, logged: Logged) -> Array:
+        """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
+        column = self.plant.sensor_columns[0]
+        at = column if column >= 0 else self.plant.states.index("contraction")
+        beginnings.meet(space, space[:, :, at].copy(), logged)
+        return space[:-1]
 
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
         every = np.tile(vectors, (len(self._trials), 1))
-        for place, values in self._own:
+        for place, values in (*self._begun, *self._own):
             every[:, place] = np.repeat(values, len(vectors))
         return every
 

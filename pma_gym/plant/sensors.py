@@ -8,17 +8,23 @@ from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant.model import Model
+from pma_gym.plant.model import PLANTS, Model
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
 """Volts by which a conversion may miss the range."""
 
 _MENDS = {
-    "load_command": "the drive pulls and cannot push; write newtons",
+    "load_command": "write newtons, or give the drive another gain",
     "pressure_command": "write gauge pressure in kPa: 1 bar is 100, 1 psi 6.895, 1000 Pa 1",
 }
 """What to do about a command out of range."""
+
+_NO_PUSH = (
+    "a cable pulls and cannot push; write newtons of pull, or, for a drive on a rigid link that "
+    "pushes too, take a model of plant = 'slide' with [two_way_drive]"
+)
+"""What to do about a load below 0."""
 
 SENSORS = {
     "lvdt": ("contraction", calibration.LVDT),
@@ -75,7 +81,9 @@ def measure(
     readings = lagged
     if generator is not None:
         readings = read(lagged, noise_levels(model), generator.standard_normal(lagged.shape))
-    return {name: readings[:, i] for i, (name, _) in enumerate(SENSORS.values())}
+    silent = getattr(PLANTS[model.plant], "SILENT", ())
+    names = [name for name, _ in SENSORS.values()]
+    return {name: readings[:, i] for i, name in enumerate(names) if name not in silent}
 
 
 def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
@@ -85,15 +93,23 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
         TrialError: a command is missing, or is less than 0 or more than 0-10 V give; a
             `SampleError` where it is one sample's.
     """
-    line = model.parameters["regulator_line"]
-    return (
-        _voltage(trial, "motor_voltage", "load_command", model.parameters.get("drive")),
-        _voltage(trial, "regulator_voltage", "pressure_command", line),
-    )
+    line, two_way = (model.parameters.get(each) for each in ("regulator_line", "two_way_drive"))
+    drive, least = model.parameters.get("drive"), 0.0
+    if two_way is not None:
+        drive, least = two_way, -np.inf
+    motor = _voltage(trial, "motor_voltage", "load_command", drive, least)
+    if model.plant == "slide":
+        return motor, np.zeros(len(motor))
+    return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
 
 
-def _voltage(trial: Trial, voltage: str, wish: str, line: Parameters | None) -> np.ndarray:
-    """A voltage as commanded, or as a line (gain, offset) gives it from what is wished for."""
+def _voltage(
+    trial: Trial, voltage: str, wish: str, line: Parameters | None, least: float = 0.0
+) -> np.ndarray:
+    """A voltage as commanded, or as a line (gain, offset) gives it from what is wished for.
+
+    What is wished for is not below a least value, whatever the line gives at 0 V.
+    """
     given = _command(trial, voltage)
     if given is not None:
         return given
@@ -103,8 +119,7 @@ def _voltage(trial: Trial, voltage: str, wish: str, line: Parameters | None) -> 
         raise TrialError(f"the trial does not command the {voltage.split('_')[0]}: give {choice}")
     found = (wished - line.offset) / line.gain
     lowest, highest = VOLTAGE_RANGE
-    # Neither a load nor a gauge pressure goes below 0, whatever the line gives at 0 V.
-    low, high = max(0.0, line.gain * lowest + line.offset), line.gain * highest + line.offset
+    low, high = max(least, line.gain * lowest + line.offset), line.gain * highest + line.offset
     margin = _ROUNDING * line.gain
     outside = np.flatnonzero((wished < low - margin) | (wished > high + margin))
     if outside.size:
@@ -112,7 +127,8 @@ def _voltage(trial: Trial, voltage: str, wish: str, line: Parameters | None) -> 
         least, most, came = (v / SI_FACTORS[column.unit] for v in (low, high, float(wished[at])))
         raise SampleError(
             f"{column.name} must lie in {least:g} to {most:g} {column.unit}, what {voltage}_v of "
-            f"up to {highest:g} V gives; {{place}} has {came:g}; {_MENDS[wish]}",
+            f"up to {highest:g} V gives; {{place}} has {came:g}; "
+            + (_NO_PUSH if wish == "load_command" and wished[at] < 0.0 == least else _MENDS[wish]),
             at,
         )
     return np.clip(found, *VOLTAGE_RANGE)

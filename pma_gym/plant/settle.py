@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.effects.effect import signals
+from pma_gym.effects.hanging_load import GRAVITY
 from pma_gym.plant.program import parameter_names
 
 if TYPE_CHECKING:
@@ -64,14 +65,16 @@ def _search(
 ) -> "_Search":
     search = _Search(plant, motor_voltages, regulator_voltages, vectors)
     search.relax_memory("regulator_delay")
-    _settle_pressure(search)
+    if "pressure" in search.names:
+        _settle_pressure(search)
     for port in ("drive_delay", "drive_lag"):
         search.relax_memory(port)
-    find = _station if plant.model.plant == "station" else _cascade
-    find(search)
+    {"station": _station, "cascade": _cascade, "slide": _slide}[plant.model.plant](search)
     for name in plant.states:
         if name.startswith("lag_"):
             search.relax(name)
+    if plant.model.plant == "slide" and "lag_lvdt" in plant.states:
+        search.follow("lag_lvdt", search["velocity"])
     return search
 
 
@@ -130,6 +133,12 @@ class _Search:
         # From there again: the difference above has lost digits, and a rate may have a kink.
         for _ in range(3):
             self[name] -= self.rate(of or name) / slope
+
+    def follow(self, name: str, rate: np.ndarray) -> None:
+        """Put a state, which rests, where it changes at a rate; its own is linear in it."""
+        still, rest = self.rate(name), self[name].copy()
+        self[name] = rest + 1.0
+        self[name] = rest + rate / (self.rate(name) - still)
 
     def relax_memory(self, port: str) -> None:
         """Put the memory of the effect at a port that follows a command where it rests."""
@@ -206,12 +215,28 @@ def _cascade(search: _Search) -> None:
     search.zero[:] = truth[:, plant.outputs.index("contraction")] + search["extension"]
 
 
+def _slide(search: _Search) -> None:
+    """A slide that nothing holds begins as its model says; its bristles are relaxed."""
+    start = search.parameters("start")
+    search.zero[:] = search["contraction"] = start["contraction"]
+    search["velocity"] = start["velocity"]
+
+
+def _drive_load(search: _Search) -> np.ndarray:
+    """Load of the drive (N), which the pulley shows while the cable hangs slack."""
+    rotor, pull = search.parameters("rotor"), search.rate("spin")
+    if "hanging_load" not in search.plant.model.effects:
+        return pull * rotor["inertia"] / rotor["radius"]
+    # The load is what accelerates rotor and weights, whose mass is the load's: L - M a = J a / r^2.
+    share = search.parameters("hanging_load")["share"] * rotor["radius"] * pull / GRAVITY
+    return pull * rotor["inertia"] / (rotor["radius"] * (1.0 - share))
+
+
 def _station(search: _Search) -> None:
     search.zero[:] = _balance(search, np.zeros(len(search.state)))
     search["contraction"] = search.zero
     # With the zero at the contraction itself the cable is slack: the rotor shows the drive's load.
-    rotor = search.parameters("rotor")
-    load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
+    load = _drive_load(search)
     search["contraction"] = _balance(search, np.maximum(load, 0.0))
     search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
     ripples = [e for e in search.plant.model.effects.values() if e.port == RIPPLE and e.law]
@@ -240,7 +265,7 @@ def _settle_by_angle(search: _Search) -> None:
     for _ in range(_MOST_APPROACHES):
         search["angle"] = angle
         search["contraction"] = search.zero - rotor["radius"] * angle - _CLEAR_M
-        load = search.rate("spin") * rotor["inertia"] / rotor["radius"]
+        load = _drive_load(search)
         search["angle"] = 0.0
         search["contraction"] = _balance(search, np.maximum(load, 0.0))
         found = np.where(load > 0.0, _taut_angles(search, load), 0.0)

@@ -11,6 +11,9 @@ The tension T is what the load cell reads. Effects add to these balances at thei
 from collections.abc import Mapping
 
 from pma_gym.effects.effect import Parameters
+from pma_gym.effects.hanging_load import hanging_inertia
+from pma_gym.kernels.graph import Value
+from pma_gym.kernels.trace import trace
 from pma_gym.plant.compose import Equations, Port
 
 PORTS: dict[str, Port] = {
@@ -95,6 +98,15 @@ def _write_drive(eq: Equations) -> None:
     eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
 
 
+def _inertia(eq: Equations) -> Value:
+    """Inertia at the pulley (kg m^2): the rotor's, and that of what hangs on the cable."""
+    rotor = eq.parameters["rotor"]
+    if "hanging_load" not in eq.parameters:
+        return rotor.inertia
+    hanging = eq.parameters["hanging_load"]
+    return rotor.inertia + trace(hanging_inertia, eq["load_asked"], rotor.radius, hanging)
+
+
 def _write_states(eq: Equations) -> None:
     rotor, slide = eq.parameters["rotor"], eq.parameters["slide"]
     force = eq["muscle_force"] + eq["slide_force"] - eq["cable_tension"]
@@ -105,7 +117,7 @@ def _write_states(eq: Equations) -> None:
         "velocity", (force - eq["resistance"] * eq["velocity"]) / slide.mass, SCALES["velocity"]
     )
     eq.add_state("angle", eq["spin"], SCALES["angle"])
-    eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / rotor.inertia, SCALES["spin"])
+    eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / _inertia(eq), SCALES["spin"])
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)

@@ -14,7 +14,7 @@ from pma_gym.effects.effect import signals
 from pma_gym.kernels.graph import CHANGING, Graph
 from pma_gym.kernels.text import evaluate
 from pma_gym.kernels.trace import trace
-from pma_gym.plant import cascade, station
+from pma_gym.plant import cascade, slide, station
 from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.plant.plant import Condition, Plant
@@ -180,7 +180,7 @@ def test_every_quantity_has_unit_bounds_and_source(effect):
     doors = effect.names_at_the_door()
     assert len(doors) == len(effect.parameters._fields)
     assert effect.parameters.__doc__
-    ports = {"part", *station.PORTS, *cascade.PORTS}
+    ports = {"part", *station.PORTS, *cascade.PORTS, *slide.PORTS}
     assert effect.port in ports or effect.port.startswith("sensor:")
 
 

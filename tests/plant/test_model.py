@@ -159,7 +159,10 @@ BROKEN = {
         "schema must be 1, .*, there is none; write schema = 1 as the first line",
     ),
     "no head": (GOOD.replace('plant = "station"\n', ""), "a model needs .* missing: plant"),
-    "unknown plant": (GOOD.replace('"station"', '"rig"'), "one of station, cascade, got 'rig'"),
+    "unknown plant": (
+        GOOD.replace('"station"', '"rig"'),
+        "one of station, cascade, slide, got 'rig'",
+    ),
     "unknown effect": (
         GOOD.replace("[coulomb_friction]", "[coulomb_fricton]"),
         r"unknown effect \[coulomb_fricton\]; did you mean \[coulomb_friction\]\?",

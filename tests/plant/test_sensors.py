@@ -107,8 +107,8 @@ def test_readings_stay_within_the_daqs_range():
     [
         ("pressure_command", 700e3, "must lie in 0 to 578.6 kPa, .* sample 1 has 700; write ga"),
         ("pressure_command", -1e3, "must lie in 0 to 578.6 kPa, .* sample 1 has -1; write gauge"),
-        ("load_command", 2e3, "must lie in 0 to 976.4 N, .* sample 1 has 2000; the drive pulls"),
-        ("load_command", -1.0, "must lie in 0 to 976.4 N, .* sample 1 has -1; the drive pulls"),
+        ("load_command", 2e3, "must lie in 0 to 976.4 N, .* sample 1 has 2000; write newto"),
+        ("load_command", -1.0, "must lie in 0 to 976.4 N, .* sample 1 has -1; a cable pulls"),
     ],
 )
 def test_commands_that_no_voltage_gives_are_refused(command, value, message):
