@@ -112,7 +112,13 @@ def _moved(door: dict[str, Array], quantity: str) -> str:
     return next((name for name in _DRIVERS[quantity] if _span(door.get(name)) >= _LARGE[name]), "")
 
 
+_MUSCLE = ("regulator_voltage", "pressure_command", "pressure")
+"""Of these a log of a muscle has one; a slide without a muscle goes as far as it likes."""
+
+
 def _contraction(door: dict[str, Array]) -> _Slip | None:
+    if not any(name in door for name in _MUSCLE):
+        return None
     largest, command = _largest(door.get("contraction")), _moved(door, "contraction")
     if largest > 250.0:
         unit, factor = ("micrometres", 1e-3) if largest <= 250e3 else ("raw counts", 0.0)

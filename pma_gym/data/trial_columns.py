@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data import calibration
-from pma_gym.data.calibration import DAQ_LIMIT, Calibration
+from pma_gym.data.calibration import DAQ_LIMIT, DAQ_STEP, Calibration
 from pma_gym.units import SI_FACTORS
 
 ColumnMap = Mapping[str, str | Mapping[str, object]]
 """A lab's own column names to ours: `{"Weg": "contraction_mm"}`, or with a linear conversion,
 `{"Weg": {"name": "contraction_mm", "factor": -1.0, "offset": 60.0}}`: ours = factor * theirs +
-offset, in the unit of our column. It is what `[columns]` of a `dataset.toml` holds."""
+offset, in the unit of our column. `range`, two numbers in that unit, says where the sensor ends:
+readings there or beyond are not measured. It is what `[columns]` of a `dataset.toml` holds."""
 
 
 class TrialError(ValueError):
@@ -131,6 +132,8 @@ class Source:
         column: what it is.
         factor: ours = factor * theirs + offset.
         offset: see factor; in the unit of our column.
+        ends: where its sensor ends, in the unit of our column: readings there or beyond are not
+            measured; None where that is not known.
     """
 
     index: int
@@ -138,6 +141,7 @@ class Source:
     column: Column
     factor: float = 1.0
     offset: float = 0.0
+    ends: tuple[float, float] | None = None
 
 
 def sources(
@@ -180,13 +184,14 @@ def suggestion(name: str, known: Iterable[str] = BY_NAME) -> str:
 def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
     """The source that one header names; None for an unknown one."""
     if name not in mapping:
-        return Source(index, name, BY_NAME[name]) if name in BY_NAME else None
+        column = BY_NAME.get(name)
+        return None if column is None else Source(index, name, column, ends=_daq_ends(column))
     entry = mapping[name]
     entry = {"name": entry} if isinstance(entry, str) else entry
-    extra = set(entry) - {"name", "factor", "offset"}
+    extra = set(entry) - {"name", "factor", "offset", "range"}
     if extra:
         raise TrialError(
-            f"[columns] {name!r} takes name, factor and offset, got {sorted(extra)[0]!r}"
+            f"[columns] {name!r} takes name, factor, offset and range, got {sorted(extra)[0]!r}"
         )
     ours = entry.get("name", name)
     if not isinstance(ours, str) or ours not in BY_NAME:
@@ -200,7 +205,38 @@ def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
     )
     if factor == 0.0:
         raise TrialError(f"[columns] {name!r} factor must not be 0, or every value is the same")
-    return Source(index, name, BY_NAME[ours], factor, offset)
+    return Source(index, name, BY_NAME[ours], factor, offset, _ends(name, ours, entry.get("range")))
+
+
+def _ends(name: str, ours: str, given: object) -> tuple[float, float] | None:
+    """Where a mapped column's sensor ends."""
+    column = BY_NAME[ours]
+    if given is None:
+        return _daq_ends(column)
+    if column.kind != "measurement":
+        raise TrialError(
+            f"[columns] {name!r} has a range, but {ours} is no measurement; remove range: it is "
+            "where a sensor ends"
+        )
+    if not isinstance(given, list | tuple) or len(given) != 2:
+        raise TrialError(
+            f"[columns] {name!r} range must be two numbers in {column.unit}, the lowest and the "
+            f"highest that the sensor reads, got {given!r}; write range = [0, 50]"
+        )
+    low, high = (_number(f"[columns] {name!r} range", value) for value in given)
+    if low >= high:
+        raise TrialError(
+            f"[columns] {name!r} range must grow, the lowest reading first, got {given!r}"
+        )
+    return low, high
+
+
+def _daq_ends(column: Column) -> tuple[float, float] | None:
+    """Where the DAQ ends, for raw volts: its first and last levels."""
+    if column.calibration is None:
+        return None
+    last = DAQ_LIMIT - 1.5 * DAQ_STEP
+    return -last, last
 
 
 def _number(name: str, value: object) -> float:

@@ -57,7 +57,7 @@ def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
         TrialError: the file cannot be used; names file, row, column, rule and mend.
     Warns:
         TrialWarning: unknown columns, which are passed over; a time of over ten minutes, which may
-            be no seconds.
+            be no seconds; readings at an end of their sensor's range, which are not measured.
     """
     path = Path(path)
     table = _load(path)
@@ -217,7 +217,26 @@ def _door_values(source: Source, table: Table) -> NDArray[np.float64]:
     values = source.factor * theirs + source.offset
     if source.column.kind != "time":
         check_values(source.column.name, values, source.column, table.place, _COUNTS)
-    return values
+    return values if source.ends is None else _within(values, source, table)
+
+
+def _within(values: NDArray[np.float64], source: Source, table: Table) -> NDArray[np.float64]:
+    """Values less those at an end of their sensor's range, which say only that it ends there."""
+    assert source.ends is not None
+    low, high = source.ends
+    with np.errstate(invalid="ignore"):
+        beyond = (values <= low) | (values >= high)
+    at = np.flatnonzero(beyond)
+    if not at.size:
+        return values
+    first, last = table.rows[int(at[0])], table.rows[int(at[-1])]
+    name = f"{source.name!r} ({source.column.name})" if source.name != source.column.name else ""
+    _warn(
+        f"{table.file}: {name or source.name} is at an end of its range, {low:.6g} to {high:.6g} "
+        f"{source.column.unit}, in {at.size} of {values.size} rows, row {first} to row {last}; "
+        "there it counts as not measured"
+    )
+    return np.where(beyond, np.nan, values)
 
 
 def _number(cell: object) -> float | None:

@@ -1,11 +1,16 @@
-"""Trials that a fit has not seen: how far it is from them."""
+"""Readings that a fit has not seen: how far it is from them.
+
+Whole trials are left out. Of one long trial, stretches of time are: it is simulated from its
+beginning, so that what the rig remembers goes on through them, but their readings take no part.
+"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.trial import Trial
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.suspects import Suspect
 
@@ -14,10 +19,16 @@ Array = NDArray[np.float64]
 FOLDS = 6
 """Parts that trials are divided into; each is left out once."""
 
+LONG_S = 20.0
+"""A single trial of this length (s) or more has stretches that can be left out."""
+
+STRETCH_S = 5.0
+"""About how long such a stretch is (s): longer than what the rig remembers of before."""
+
 
 @dataclass(frozen=True)
 class Unseen:
-    """What a model says of trials that it was not fitted to.
+    """What a model says of readings that it was not fitted to.
 
     Attributes:
         readings: what its sensors hold (SI), shape (4, rows) for each trial.
@@ -33,6 +44,16 @@ def folds(count: int) -> list[list[int]]:
     return [list(range(k, count, FOLDS)) for k in range(min(FOLDS, count))]
 
 
+def stretches(trials: Sequence[Trial]) -> list[NDArray[np.bool_]]:
+    """Of one long trial, the rows of each fold; nothing for several trials, or a short one."""
+    if len(trials) != 1 or trials[0].duration < LONG_S:
+        return []
+    time = trials[0].time
+    count = FOLDS * max(1, round(trials[0].duration / (FOLDS * STRETCH_S)))
+    number = ((time - time[0]) * (count / (time[-1] - time[0]) * (1.0 - 1e-12))).astype(int)
+    return [number % FOLDS == fold for fold in range(FOLDS)]
+
+
 def unseen(
     bench: Bench,
     fit: Fitted,
@@ -41,11 +62,11 @@ def unseen(
 ) -> Unseen | None:
     """Leave each fold out once, fit the others from where the fit of all is, and look at it.
 
-    None with fewer than two trials, or where a fit fails.
+    None with a single trial that is not long, or where a fit fails.
     """
+    if len(bench.trials) < 2:
+        return _unseen_stretches(bench, fit, chosen, progress)
     count = len(bench.trials)
-    if count < 2:
-        return None
     readings: list[Array] = [np.empty(0)] * count
     chi_square = np.zeros(count)
     parts = folds(count)
@@ -54,14 +75,59 @@ def unseen(
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
         found = bench.fit(fit.model, chosen, trials=seen)
-        if found is None:
-            return None
-        evidence = bench.evidence(found.model, chosen, left_out)
-        pieces = evidence.pieces(found.values, np.empty(0))
-        held = evidence.readings(found.values)
-        if pieces is None or held is None:
+        held = None if found is None else _look(bench, found, chosen, left_out)
+        if held is None:
             return None
         for k, i in enumerate(left_out):
-            readings[i] = held[k]
-            chi_square[i] = pieces.total([k])[0, 0]
+            readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
     return Unseen(readings, chi_square)
+
+
+def _unseen_stretches(
+    bench: Bench,
+    fit: Fitted,
+    chosen: Sequence[Suspect],
+    progress: Callable[[int, int], None] | None,
+) -> Unseen | None:
+    """The same for the stretches of a single trial; None where it has none."""
+    parts = stretches(bench.trials)
+    if not parts:
+        return None
+    (trial,) = bench.trials
+    readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
+    for number, left_out in enumerate(parts):
+        if progress is not None:
+            progress(number, len(parts))
+        seen, rest = _masked(trial, left_out), _masked(trial, ~left_out)
+        if not all(_measures(part) for part in (seen, rest)):
+            return None
+        found = replace(bench, trials=[seen]).fit(fit.model, chosen)
+        held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
+        if held is None:
+            return None
+        readings[:, left_out] = held.readings[0][:, left_out]
+        chi_square += float(held.chi_square[0])
+    return Unseen([readings], np.array([chi_square]))
+
+
+def _look(
+    bench: Bench, found: Fitted, chosen: Sequence[Suspect], left_out: Sequence[int]
+) -> Unseen | None:
+    """Trials beside a fit; None where it cannot be simulated on them."""
+    evidence = bench.evidence(found.model, chosen, left_out)
+    pieces = evidence.pieces(found.values, np.empty(0))
+    held = evidence.readings(found.values)
+    if pieces is None or held is None:
+        return None
+    count = range(len(left_out))
+    return Unseen(held, np.array([pieces.total([k])[0, 0] for k in count]))
+
+
+def _masked(trial: Trial, left_out: NDArray[np.bool_]) -> Trial:
+    """A trial whose readings in some rows do not count."""
+    kept = {name: np.where(left_out, np.nan, row) for name, row in trial.measurements.items()}
+    return replace(trial, measurements=kept)
+
+
+def _measures(trial: Trial) -> bool:
+    return any(np.isfinite(row).any() for row in trial.measurements.values())

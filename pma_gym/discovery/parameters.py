@@ -101,6 +101,9 @@ def _is_own(model: Model, path: str) -> bool:
         return False
     if stem in law.rows or stem in law.held or effect in sensors.SENSORS:
         return False
+    if effect == "drive" and "hanging_load" in model.parameters:
+        # Weights have been weighed.
+        return False
     if effect.endswith("_error"):
         return False
     quantity, value = law.quantities[stem], getattr(model.parameters[effect], stem)

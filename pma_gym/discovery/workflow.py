@@ -17,6 +17,7 @@ from pma_gym.discovery.held_out import unseen
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
+from pma_gym.discovery.preparation import prepared
 from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.discovery.rivals import rivals
 from pma_gym.discovery.selection import Selection, relearnt, select
@@ -99,6 +100,7 @@ class _Work:
 
     def run(self, search: bool) -> Diagnosis:
         named, given = self._input()
+        named, words = prepared(named, given)
         trials = [each.trial for each in named]
         journal = Journal(self.folder, trials, given, f"diagnosis 1 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
@@ -133,7 +135,8 @@ class _Work:
         )
         found = self._timed("confirmation", lambda: self._confirmed(found))
         diagnosis = self._timed("report", lambda: answer(found, self._tell))
-        return replace(diagnosis, seconds=dict(self.seconds))
+        warnings = (*words, *diagnosis.warnings)
+        return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
     def _input(self) -> tuple[list[NamedTrial], Model]:
         if isinstance(self.asked, Dataset):
@@ -144,10 +147,11 @@ class _Work:
         if not named:
             raise TrialError("a diagnosis needs at least one trial; give measured trials")
         model = load_model(self.wanted or source or DEFAULT_MODEL)
-        if model.plant != "station":
+        if model.plant not in ("station", "slide"):
             raise ModelError(
-                f"model {model.name} is a {model.plant}; a diagnosis needs a station, the balance "
-                "of forces that effects act on; give serres2008, station or one made of them"
+                f"model {model.name} is a {model.plant}; a diagnosis needs a station or a slide, "
+                "the balance of forces that effects act on; give serres2008, station or one made "
+                "of them"
             )
         return named, model
 

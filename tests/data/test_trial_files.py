@@ -242,16 +242,38 @@ def test_a_csv_file_that_cannot_be_used(text, message, tmp_path):
         read_trial(written(tmp_path, text))
 
 
+def test_readings_at_an_end_of_a_range_are_not_measured(tmp_path):
+    text = "time_s,motor_voltage_v,F,lvdt_v\n0,1,0,1\n1,1,49,9.9951\n2,1,50,2\n3,1,51,-10\n"
+    with pytest.warns(TrialWarning) as warned:
+        trial = read_trial(
+            written(tmp_path, text), {"F": {"name": "load_n", "range": [0, 50]}}
+        ).measurements
+    assert np.array_equal(np.isnan(trial["load"]), [True, False, True, True])
+    assert np.array_equal(np.isnan(trial["contraction"]), [False, True, False, True])
+    said = sorted(str(each.message) for each in warned)
+    assert (
+        "'F' (load_n) is at an end of its range, 0 to 50 N, in 3 of 4 rows, row 2 to row 5"
+        in (said[0])
+    )
+    assert "lvdt_v is at an end of its range, -9.99268 to 9.99268 V, in 2 of 4 rows" in said[1]
+
+
 @pytest.mark.parametrize(
     ("mapping", "message"),
     [
         ({"a": "tme_s"}, r"'a' must name one of time_s, .*, got 'tme_s' \(did you mean 'time_s'"),
         ({"a": {"factor": 2.0}}, "'a' must name one of .*, got 'a'"),
-        ({"a": {"name": "load_n", "scale": 2}}, "takes name, factor and offset, got 'scale'"),
+        (
+            {"a": {"name": "load_n", "scale": 2}},
+            "takes name, factor, offset and range, got 'scale'",
+        ),
         ({"a": {"name": "load_n", "factor": "2"}}, "'a' factor must be a finite number, got '2'"),
         ({"a": {"name": "load_n", "offset": np.nan}}, "'a' offset must be a finite number, got na"),
         ({"a": {"name": "load_n", "factor": 0}}, "'a' factor must not be 0"),
         ({"a": "contraction_mm"}, "contraction twice, in columns 'contraction_mm' and 'a'"),
+        ({"a": {"name": "load_n", "range": 5}}, r"range must be two numbers in N.*range = \[0, 50"),
+        ({"a": {"name": "load_n", "range": [5, 0]}}, r"range must grow, .*, got \[5, 0\]"),
+        ({"a": {"name": "load_command_n", "range": [0, 5]}}, "but load_command_n is no measure"),
     ],
 )
 def test_a_mapping_that_cannot_be_used(mapping, message, tmp_path):

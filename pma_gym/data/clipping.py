@@ -1,0 +1,165 @@
+"""Sensors at an end of their range, found by what their readings do.
+
+A reading at an end says only that the truth lies beyond. Ends that are known (the DAQ's, or `range`
+in `[columns]`) are seen when a file is read; this module finds those that nobody wrote down: a
+sensor that stands exactly at its largest or smallest reading for long, while the commands move and
+although its readings nowhere else stand as long.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import MEASUREMENTS, Trial
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+LEAST_ROWS = 8
+"""Fewest equal readings in a row that an end of a range is known by."""
+
+TIMES = 4.0
+"""How many times as long as anywhere else they must last: a coarse sensor stands still at rest."""
+
+JUMP = 3.0
+"""How many steps between readings the line through the readings before must lead beyond."""
+
+BEFORE = 5
+"""Readings that this line is drawn through."""
+
+NEAR = 3
+"""Rows between two readings at an end that count as at the end too."""
+
+
+@dataclass(frozen=True)
+class End:
+    """A sensor at an end of its range.
+
+    Attributes:
+        quantity: what it senses.
+        value: its reading there (SI).
+        rows: by number of the trial, which rows are there.
+    """
+
+    quantity: str
+    value: float
+    rows: Mapping[int, Rows]
+
+    def words(self, names: Sequence[str], trials: Sequence[Trial]) -> str:
+        """What to tell: column, value, files and rows, and what comes of it."""
+        column = BY_QUANTITY[self.quantity]
+        places = []
+        for number, rows in self.rows.items():
+            at, time = np.flatnonzero(rows), trials[number].time
+            places.append(
+                f"{len(at)} readings of {names[number]}, number {at[0] + 1} to {at[-1] + 1} "
+                f"({time[at[0]]:.4g} to {time[at[-1]]:.4g} s)"
+            )
+        shown = "; ".join(places[:3]) + (f"; {len(places) - 3} more" if len(places) > 3 else "")
+        value = self.value / SI_FACTORS[column.unit]
+        return (
+            f"{column.name} stands at the end of its sensor's range, {value:.6g} {column.unit}: "
+            f"{shown}; there it counts as not measured"
+        )
+
+
+def ends(trials: Sequence[Trial]) -> list[End]:
+    """Sensors of some trials of one rig that stand at an end of their range.
+
+    Args:
+        trials: the trials.
+    Returns:
+        The ends, in the order of the columns, the upper one of a sensor first.
+    """
+    found = []
+    for quantity in MEASUREMENTS:
+        for sign in (1.0, -1.0):
+            end = _end(trials, quantity, sign)
+            if end is not None:
+                found.append(end)
+    return found
+
+
+def without(trials: Sequence[Trial], clipped: Sequence[End]) -> list[Trial]:
+    """The trials, with what their sensors read at an end of their range not measured."""
+    kept = list(trials)
+    for end in clipped:
+        for number, rows in end.rows.items():
+            trial = kept[number]
+            values = np.where(rows, np.nan, trial.measurements[end.quantity])
+            kept[number] = replace(trial, measurements={**trial.measurements, end.quantity: values})
+    return kept
+
+
+def _end(trials: Sequence[Trial], quantity: str, sign: float) -> End | None:
+    """One end of a sensor's range; None where no trial comes there."""
+    series = {
+        number: sign * trial.measurements[quantity]
+        for number, trial in enumerate(trials)
+        if quantity in trial.measurements and np.isfinite(trial.measurements[quantity]).any()
+    }
+    if not series:
+        return None
+    readings = np.unique(np.concatenate([row[np.isfinite(row)] for row in series.values()]))
+    if len(readings) < LEAST_ROWS:
+        return None
+    largest, step = float(readings[-1]), float(np.median(np.diff(readings)))
+    tolerance = 1e-6 * max(step, 1e-12)
+    at = {number: np.abs(row - largest) <= tolerance for number, row in series.items()}
+    elsewhere = max(_longest(row, ~at[number]) for number, row in series.items())
+    least = max(LEAST_ROWS, TIMES * elsewhere)
+    shown = any(
+        stop - start >= least
+        and _moves(trials[number], start, stop)
+        and _jumps(series[number], start, stop, step)
+        for number, there in at.items()
+        for start, stop in runs(there)
+    )
+    if not shown:
+        return None
+    rows = {number: _closed(there) for number, there in at.items() if there.any()}
+    return End(quantity, sign * largest, rows)
+
+
+def runs(there: Rows) -> Iterator[tuple[int, int]]:
+    """Beginning and end (one past the last) of every run of true rows."""
+    edges = np.flatnonzero(np.diff(np.r_[0, there.astype(np.int8), 0]))
+    yield from (
+        (int(start), int(stop)) for start, stop in zip(edges[::2], edges[1::2], strict=True)
+    )
+
+
+def _longest(row: Array, counted: Rows) -> int:
+    """Length of the longest run of equal readings among those that count."""
+    equal = (np.diff(row) == 0.0) & counted[1:] & counted[:-1]
+    return 1 + max((stop - start for start, stop in runs(equal)), default=0)
+
+
+def _moves(trial: Trial, start: int, stop: int) -> bool:
+    """Whether a command moves in most of the rows: what stands still at rest is no end."""
+    changes = [np.diff(np.nan_to_num(row[start:stop])) != 0.0 for row in trial.commands.values()]
+    return any(2 * moved.sum() > moved.size for moved in changes)
+
+
+def _jumps(row: Array, start: int, stop: int, step: float) -> bool:
+    """Whether the readings before or after lead straight beyond the end."""
+    for part in (row[max(0, start - BEFORE) : start], row[stop : stop + BEFORE][::-1]):
+        if len(part) == BEFORE and np.isfinite(part).all():
+            slope = float(np.polyfit(np.arange(BEFORE), part, 1)[0])
+            if slope * min(stop - start, BEFORE) > JUMP * step:
+                return True
+    return False
+
+
+def _closed(there: Rows) -> Rows:
+    """The rows, with short gaps between them."""
+    closed = there.copy()
+    found = list(runs(there))
+    for (_, stop), (start, _) in zip(found, found[1:], strict=False):
+        if start - stop <= NEAR:
+            closed[stop:start] = True
+    return closed
