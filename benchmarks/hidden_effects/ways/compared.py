@@ -17,10 +17,11 @@ COLUMNS = (
     "named right",
     "right or in its group",
     "confidently wrong",
+    "a spurious second",
     "alarm, nothing hidden",
     "effect claimed, parameters off",
 )
-"""The first four over cases of block single, the others over those that hide no effect."""
+"""The first five over cases of block single, the others over those that hide no effect."""
 
 
 def compared(folder: Path, ways: Sequence[str]) -> dict[str, Any]:
@@ -55,6 +56,7 @@ def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:
         [each.right for each in single],
         [each.near for each in single],
         [each.wrong for each in single],
+        [each.spurious for each in single],
         [each.detected for each in nothing],
         [each.detected for each in parameters],
     )
