@@ -50,14 +50,8 @@ def uneven_with_other_channels():
     return [only(logged(k, uneven(384, k, 2.5)), *channels[k]) for k in range(3)]
 
 
-def one_and_two_kilohertz():
-    logs = logged(0, at(1000, 1.6)), logged(2, at(2000, 1.2))
-    return [only(log, "contraction") for log in logs]
-
-
-@pytest.mark.parametrize("log", [uneven_with_other_channels, one_and_two_kilohertz])
-def test_hysteresis_is_named_however_it_is_logged(log):
-    found = diagnose(log(), STATION)
+def test_hysteresis_is_named_in_uneven_logs_of_other_channels():
+    found = diagnose(uneven_with_other_channels(), STATION)
     assert found.verdict == "effect", found.sentence
     assert named(found) == ["hysteresis"], found.sentence
     assert found.effects[0].parameters["force_n"].value == pytest.approx(8.0, rel=0.25)
@@ -147,6 +141,14 @@ def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(lo
     assert all(gap.held_out for gap in found.gap.values())
     cut = any("nothing holds this slide" in words for words in found.warnings)
     assert cut == (log is one_long_drive)
+
+
+def test_dry_friction_is_found_at_one_and_two_kilohertz():
+    rates = enumerate((1000, 2000))
+    logs = [driven_slide(12.0, lanes=2, seconds=1.5, rate=rate)[k] for k, rate in rates]
+    found = diagnose(logs, DRIVEN)
+    assert named(found) == ["coulomb_friction"], found.sentence
+    assert found.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.1)
 
 
 @pytest.mark.parametrize("hidden", ["nothing", "creep"])
