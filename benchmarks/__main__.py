@@ -210,6 +210,35 @@ def budget(
 
 
 @app.command()
+def measured(
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "measured",
+    jobs: Jobs = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of simulated chance.")] = 0,
+    rounds: Annotated[
+        int, typer.Option(min=1, help="Most diagnoses, each of what the one before amended.")
+    ] = 5,
+    write: Annotated[
+        Path | None,
+        typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
+    ] = None,
+) -> None:
+    """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
+    from benchmarks.measured.job import run_measured, write_trials
+
+    for folder, option in ((out, "--out"), (write, "--write")):
+        if folder is not None and folder.exists() and not folder.is_dir():
+            _refuse(ValueError(f"{option} {folder} is a file; name a folder"))
+    if write is not None:
+        print(f"{write_trials(write)} trials in {write}")
+        return
+    try:
+        run_measured(out, jobs, seed, rounds)
+    except KeyboardInterrupt:
+        print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+@app.command()
 def voltages(
     controller: Annotated[
         str, typer.Option(help="serres_replay, serres_feedforward or improved_feedforward.")

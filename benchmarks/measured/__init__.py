@@ -1,0 +1,1 @@
+"""`python -m benchmarks measured`: the diagnosis on the dissertation's own measurements."""

@@ -1,0 +1,155 @@
+"""Whole pressures left out: what models say of table I3's rows that they were not fitted to."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.dataset import Dataset
+from pma_gym.discovery.evidence import Evidence
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.floors import initial_floors
+from pma_gym.discovery.noise import white_noise
+from pma_gym.discovery.parameters import Own, own_parameters, values
+from pma_gym.discovery.suspects import Suspect, suspects
+from pma_gym.plant.logged import Logged
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import OUTPUTS
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+
+WIDER = 3.0
+"""How many times as far from the dissertation's numbers its parameters may lie as a diagnosis takes
+for likely at first: its rounds, one after the other, may go as far."""
+
+MANY = 1000.0
+"""Repeats after which a muscle is worked."""
+
+BEFORE, LOADED, BACK = 0, 2, 3
+"""Rows of an I3 trial before the load, at 10 s and at 15 s."""
+
+FIGURES = {
+    "extension_mm": ("contraction", BEFORE, LOADED, "mm"),
+    "return_mm": ("contraction", BACK, LOADED, "mm"),
+    "rotation_deg": ("rotation", LOADED, BEFORE, "deg"),
+    "return_deg": ("rotation", LOADED, BACK, "deg"),
+}
+"""What is judged: a signal, the row that counts plus and the one that counts minus, the unit."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Trials and the model that all fits begin from.
+
+    Attributes:
+        data: the trials.
+        given: the model.
+        bench: trials and noise, ready for fits; its own parameters about the given model's.
+        known: every effect that may be added, by name.
+    """
+
+    data: Dataset
+    given: Model
+    bench: Bench
+    known: dict[str, Suspect]
+
+    @classmethod
+    def of(cls, data: Dataset, given: Model, threads: int = 1) -> "Rig":
+        """From trials, with noise from their repeats."""
+        trials = [each.trial for each in data.trials]
+        logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
+        levels = initial_floors(given, logged, data.trials)
+        noise = tuple(white_noise(each.level) for each in levels)
+        own = own_parameters(given)
+        bench = Bench(trials, given, Own(own.free, WIDER * own.prior), noise, threads)
+        orders = [float(each.order or 0.0) for each in data.trials]
+        return cls(data, given, bench, {each.name: each for each in suspects(given, orders)})
+
+    def fit(self, effects: Sequence[str], begun: Model) -> Fitted | None:
+        """The given model with effects in it, fitted to the trials.
+
+        Args:
+            effects: names of the effects.
+            begun: where the fit begins; an effect that it lacks begins as usual.
+        """
+        chosen = [self.known[name] for name in effects]
+        starts = {
+            each.name: values(begun, each.paths)
+            if each.effect in begun.parameters
+            else each.probes[len(each.probes) // 2]
+            for each in chosen
+        }
+        free = self.bench.own.free
+        own = dict(zip(free, values(begun, free).tolist(), strict=True))
+        return self.bench.fit(self.given.replace(own), chosen, starts)
+
+
+def _compared(held: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Array]:
+    found: dict[str, list[float]] = {name: [] for name in FIGURES}
+    for simulated, each in zip(held, logged, strict=True):
+        for name, (signal, plus, minus, unit) in FIGURES.items():
+            channel = OUTPUTS.index(signal)
+            if {plus, minus} & set(each.missing[channel].tolist()):
+                continue
+            off = simulated[channel] - each.measured[channel]
+            found[name].append(float(off[plus] - off[minus]) / SI_FACTORS[unit])
+    return {name: np.array(errors) for name, errors in found.items()}
+
+
+def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
+    """Predicted less measured of I3's trials, from the commands alone, at the door, by `FIGURES`.
+
+    Args:
+        model: as it is.
+        data: trials of I3; those without a load are passed over.
+    """
+    loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
+    some = ("drive.offset_n",)
+    evidence = Evidence(
+        model,
+        [each.trial for each in loaded],
+        some,
+        tuple(white_noise(1.0) for _ in OUTPUTS),
+        np.array([np.inf]),
+        own={path: [float(each.order or 0.0) for each in loaded] for path in _repeats(model)},
+    )
+    held = evidence.readings(values(model, some))
+    if held is None:
+        return {name: np.array([np.nan]) for name in FIGURES}
+    return _compared(held, evidence.logged)
+
+
+def _repeats(model: Model) -> list[str]:
+    """Parameters that are the number of the repeat."""
+    return [path for path in model.paths() if path == "warm_up.repeat"]
+
+
+def worked(model: Model) -> Model:
+    """The model of a muscle that has been worked for long, as far as it knows of warming up."""
+    return model.replace({path: MANY for path in _repeats(model)})
+
+
+def rms(errors: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(errors**2)))
+
+
+def repeat_scatter(data: Dataset) -> dict[str, float]:
+    """Rms of I3's rows about the mean of their repeats, at the door, by `FIGURES`."""
+    groups: dict[str, list[int]] = {}
+    loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
+    for i, each in enumerate(loaded):
+        groups.setdefault(each.repeat_of or each.name, []).append(i)
+    found = {}
+    for name, (signal, plus, minus, unit) in FIGURES.items():
+        squares, count = 0.0, 0
+        for group in groups.values():
+            read = np.array([loaded[i].trial.measurements[signal] for i in group])
+            apart = read[:, plus] - read[:, minus]
+            apart = apart[np.isfinite(apart)] / SI_FACTORS[unit]
+            squares += float(np.sum((apart - apart.mean()) ** 2)) if apart.size else 0.0
+            count += apart.size
+        found[name] = float(np.sqrt(squares / count)) if count else float("nan")
+    return found

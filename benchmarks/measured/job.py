@@ -1,0 +1,229 @@
+"""`python -m benchmarks measured`: the diagnosis on the dissertation's own measurements."""
+
+import json
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+from rich.progress import Progress as Bar
+
+from benchmarks.files import write_text
+from benchmarks.measured.pages import measured_page
+from benchmarks.measured.reverse import Explanation, searched
+from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
+from benchmarks.measured.steps import Step, folds, steps
+from benchmarks.measured.tables import print_measured
+from benchmarks.measured.trials import measured_dataset
+from benchmarks.measured.triangles import Held, held_against
+from pma_gym.data.dataset import Dataset
+from pma_gym.data.trial_files import encode_trial
+from pma_gym.discovery.journal import digest
+from pma_gym.plant.model import load_model
+
+GIVEN = "serres2008"
+"""The model to begin with."""
+
+STATION = "station"
+"""The model that `python -m benchmarks identify` made of the same tables."""
+
+REVERSE_ROUNDS = 2
+"""Most explanations that are added to it, one after the other."""
+
+DIAGNOSED_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)
+"""Pressures that the diagnosis sees. Effects are chosen, and parameters fitted, without the other
+five."""
+
+UNSEEN_KPA = (200.0, 275.0, 350.0, 450.0, 550.0)
+"""Pressures on which every step is judged."""
+
+LOADS_N = (150.0, 450.0, 900.0)
+"""Loads of I3 that are diagnosed; all twelve are judged on."""
+
+REPEATS = (1, 3)
+"""Repeats that are diagnosed: the first, rested, and the last, worked; all three are judged on."""
+
+I2_EVERY = 12
+"""Every how many rows of I2 are diagnosed: they tell no more than how the pressure reads."""
+
+FOLDS = ((150.0, 275.0, 400.0, 550.0), (200.0, 300.0, 450.0, 575.0), (250.0, 350.0, 500.0))
+"""All pressures, each left out once from a fit of all effects."""
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What the job finds.
+
+    Attributes:
+        rounds: the diagnoses.
+        steps: models with one effect more at a time.
+        folds: rms errors of all effects with every pressure left out once, by figure.
+        floors: scatter between repeats, by figure.
+        reverse: what explains the misfit of the identified station in tables 21-30, round by round.
+        held: models against the validation under triangular pressure.
+        seconds: computing time of the whole job (s).
+        settings: what was diagnosed.
+    """
+
+    rounds: list[Round]
+    steps: list[Step]
+    folds: dict[str, float]
+    floors: dict[str, float]
+    reverse: list[list[Explanation]]
+    held: list[Held]
+    seconds: float
+    settings: dict[str, Any]
+
+
+def run_measured(
+    out: Path,
+    jobs: int = 1,
+    seed: int = 0,
+    most: int = MOST_ROUNDS,
+    console: Console | None = None,
+) -> Measured:
+    """Diagnose, judge and write.
+
+    Args:
+        out: folder of `measured.json`, `measured.html` and `model.toml`, and of what an
+            interrupted job goes on from.
+        jobs: threads.
+        seed: of simulated chance.
+        most: most diagnoses, one after the other.
+        console: where to print.
+    """
+    console, begun = console or Console(), time.perf_counter()
+    folder, given = out / "stages", load_model(GIVEN)
+    data = diagnosed(DIAGNOSED_KPA)
+    with _bar(console) as tell:
+        found, amended = rounds(
+            data,
+            given,
+            folder,
+            seed,
+            jobs,
+            lambda number: _prefixed(tell, f"round {number}: "),
+            most,
+        )
+        effects = [name for each in found for name in each.effects]
+        judged = judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA)
+        stepped = steps(
+            given,
+            amended,
+            effects,
+            (data, *judged),
+            folder,
+            jobs,
+            lambda done, total: tell("effect by effect", done, total),
+        )
+        left_out = folds(
+            given,
+            amended,
+            effects,
+            _without,
+            FOLDS,
+            jobs,
+            lambda done, total: tell("pressures left out", done, total),
+        )
+        reverse = _reverse(folder, lambda done, total: tell("the reverse", done, total))
+    final = load_model(folder / f"step_{len(stepped) - 1}.toml")
+    models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
+    held = held_against(models, given)
+    seconds = time.perf_counter() - begun
+    result = Measured(found, stepped, left_out, floors(), reverse, held, seconds, _settings(seed))
+    write_text(out / "model.toml", stepped[-1].model)
+    write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
+    write_text(out / "measured.html", measured_page(result))
+    print_measured(result, console)
+    console.print(f"written: {out / 'measured.html'}, measured.json, model.toml")
+    return result
+
+
+def _reverse(folder: Path, progress: Callable[[int, int], None]) -> list[list[Explanation]]:
+    """What explains the misfit of the identified station, from the folder where it is there."""
+    path, model = folder / "reverse.json", load_model(STATION)
+    asked = digest([], model, "reverse 1")
+    if path.is_file():
+        kept = json.loads(path.read_text(encoding="utf-8"))
+        if kept["asked"] == asked:
+            return [[Explanation(**each) for each in every] for every in kept["found"]]
+    found = searched(model, REVERSE_ROUNDS, progress)
+    kept = {"asked": asked, "found": [[asdict(each) for each in every] for every in found]}
+    write_text(path, json.dumps(kept, indent=1))
+    return found
+
+
+def diagnosed(pressures_kpa: Sequence[float]) -> Dataset:
+    """The trials of some pressures that are diagnosed."""
+    return measured_dataset(pressures_kpa, LOADS_N, REPEATS, I2_EVERY)
+
+
+def judged_at(pressures_kpa: Sequence[float]) -> Dataset:
+    """All of I3's trials at some pressures."""
+    return measured_dataset(pressures_kpa, steps=0)
+
+
+def _without(pressures_kpa: Sequence[float]) -> tuple[Dataset, Dataset]:
+    others = [each for each in (*DIAGNOSED_KPA, *UNSEEN_KPA) if each not in pressures_kpa]
+    return diagnosed(others), judged_at(pressures_kpa)
+
+
+def floors() -> dict[str, float]:
+    """Scatter of I3's rows about the mean of their repeats (rms, at the door), by figure."""
+    from benchmarks.measured.held_out import repeat_scatter
+
+    return repeat_scatter(measured_dataset(steps=0))
+
+
+def write_trials(folder: Path) -> int:
+    """Write the trials that are diagnosed as a data set that `pma-gym diagnose` reads.
+
+    Args:
+        folder: a CSV file a trial and dataset.toml.
+    Returns:
+        How many trials.
+    """
+    data = diagnosed(DIAGNOSED_KPA)
+    lines = [f'title = "{data.title}"', f'model = "{data.model}"']
+    for each in data.trials:
+        write_text(folder / each.name, encode_trial(each.trial, each.name).decode())
+        lines += [f'[trials."{each.name}"]', f"order = {each.order:g}"]
+        if each.repeat_of is not None:
+            lines.append(f'repeat_of = "{each.repeat_of}"')
+    write_text(folder / "dataset.toml", "\n".join(lines) + "\n")
+    return len(data)
+
+
+def _settings(seed: int) -> dict[str, Any]:
+    return {
+        "model": GIVEN,
+        "seed": seed,
+        "diagnosed_kpa": DIAGNOSED_KPA,
+        "unseen_kpa": UNSEEN_KPA,
+        "loads_n": LOADS_N,
+        "repeats": REPEATS,
+    }
+
+
+Tell = Callable[[str, int, int], None]
+
+
+def _prefixed(tell: Tell, prefix: str) -> Tell:
+    return lambda step, done, total: tell(prefix + step, done, total)
+
+
+@contextmanager
+def _bar(console: Console) -> Iterator[Tell]:
+    """A line that says what is being done."""
+    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    with Bar(*columns, console=console) as bar:
+        task = bar.add_task("begins", total=None)
+
+        def tell(step: str, done: int, total: int) -> None:
+            bar.update(task, description=step, completed=done, total=total)
+
+        yield tell

@@ -1,0 +1,156 @@
+"""The page of the job: what was found first, then by how much each effect helps."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.measured.replays import PHASE_NAMES
+from benchmarks.measured.tables import (
+    COLUMNS,
+    HELD_HEADER,
+    REPLAY_HEADER,
+    REVERSE_HEADER,
+    TARGET_MM,
+    error_rows,
+    experiment_words,
+    held_rows,
+    readable,
+    replay_rows,
+    reverse_rows,
+    reverse_words,
+    round_rows,
+    verdict_words,
+)
+from pma_gym.discovery.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
+from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture, TextTable, to_html
+from pma_gym.pages.figures import legend_below, picture, png
+
+if TYPE_CHECKING:
+    from benchmarks.measured.job import Measured
+
+_SHOWN = (("extension_mm", "extension, rms error (mm)"), ("rotation_deg", "rotation, rms (deg)"))
+_REPLAYS = (("displacement", "mm"), ("I", "deg"), ("II", "deg"), ("III", "deg"))
+
+
+def measured_page(result: "Measured") -> str:
+    """All of it as one page of HTML that needs nothing else."""
+    pictures = {"errors": errors_picture(result), "replays": replays_picture(result)}
+    return to_html(_blocks(result), pictures)
+
+
+def _blocks(result: "Measured") -> list[Block]:
+    effects = [readable(name) for name in result.steps[-1].effects]
+    names = tuple(label for _, label in COLUMNS)
+    blocks: list[Block] = [
+        Heading("Tables I2 and I3, diagnosed", 1),
+        Callout(
+            f"Beginning with `{result.settings['model']}`, the diagnosis added "
+            f"{', '.join(effects) or 'nothing'}.",
+            tone="good",
+        ),
+        *(Paragraph(words) for words in verdict_words(result)),
+        Picture(
+            "errors",
+            "Error of table I3's rows from the commands alone, model after model: at pressures "
+            "that took no part in the choice of effects or in the fit, and at those that did. "
+            "The dashed line is the scatter of the repeats about their mean.",
+        ),
+        TextTable(
+            "Errors (rms) at pressures that took no part", ("model", *names), error_rows(result)
+        ),
+        TextTable(
+            "The diagnoses, one after the other",
+            ("round", "verdict", "added", "p", "explains as much"),
+            round_rows(result.rounds),
+            words=3,
+        ),
+        *(Paragraph(each.sentence) for each in result.rounds),
+        Heading("Tables that took no part"),
+        Picture(
+            "replays",
+            "The printed voltages of the displacement and rotation trials, open loop: mean "
+            "absolute error of the mean position against tables 21 and 27-29.",
+        ),
+    ]
+    for phase, label in PHASE_NAMES.items():
+        unit = "mm" if phase == "displacement" else "deg"
+        title = f"{label}: mean absolute error ({unit}, slope in {unit}/s)"
+        blocks.append(TextTable(title, REPLAY_HEADER, replay_rows(result, phase)))
+    blocks.append(Heading("What these tables cannot tell"))
+    blocks += [Paragraph(words) for words in experiment_words(result.rounds)]
+    blocks += _reverse_blocks(result)
+    return blocks
+
+
+def _reverse_blocks(result: "Measured") -> list[Block]:
+    """What the identified station misses."""
+    blocks: list[Block] = [
+        Heading("The reverse: what the identified station misses in tables 21-30"),
+        Paragraph(
+            "Each measured phase is known by slope, intercept and the mean square about its line. "
+            "Every effect that `station` lacks, and the numbers that it has, are fitted to what "
+            "its simulation misses of them, with each pressure left out in turn (one step of the "
+            "fit, simulated)."
+        ),
+        *(Paragraph(words) for words in reverse_words(result)),
+    ]
+    for number, found in enumerate(result.reverse, 1):
+        title = f"Explanations, {number}: rms (mm at the muscle)"
+        blocks.append(TextTable(title, REVERSE_HEADER, reverse_rows(found), words=2))
+    blocks += [
+        Heading("Validation under triangular pressure (figures 28 and 29)"),
+        Paragraph(
+            "The curves are pictures; their text gives the error of the dissertation's own model "
+            "in mm and in percent of the contraction, taken here for the stroke."
+        ),
+        TextTable("Models and the printed figures", HELD_HEADER, held_rows(result), words=2),
+    ]
+    return blocks
+
+
+def errors_picture(result: "Measured") -> bytes:
+    """Errors before and after each effect, seen and unseen pressures, with the floor."""
+    labels = [readable(step.name) for step in result.steps]
+    at = np.arange(len(labels))
+    with picture(9.0, 1.2 + 0.42 * len(labels)) as drawn:
+        panels = drawn.subplots(1, len(_SHOWN), sharey=True)
+        handles = []
+        for panel, (key, title) in zip(panels, _SHOWN, strict=True):
+            unseen = [step.unseen[key] for step in result.steps]
+            seen = [step.seen[key] for step in result.steps]
+            one = panel.barh(at - 0.2, unseen, 0.38, color=PARAMETERS, label="took no part")
+            two = panel.barh(at + 0.2, seen, 0.38, color=AFTER, label="fitted to")
+            panel.bar_label(one, [f"{value:.2f}" for value in unseen], padding=2, fontsize=8)
+            line = panel.axvline(result.floors[key], label="repeats", **FLOOR)
+            handles = [one, two, line]
+            panel.set_xscale("log")
+            panel.set_xlim(0.4 * result.floors[key], 2.2 * max(*unseen, *seen))
+            panel.set_xlabel(title)
+            panel.set_yticks(at, labels)
+            panel.grid(visible=False, axis="y")
+        goal = panels[0].axvline(TARGET_MM, color=BEFORE, linewidth=1.0, label="target, 1 mm")
+        panels[0].invert_yaxis()
+        legend_below(drawn, [*handles, goal], 4)
+        return png(drawn)
+
+
+def replays_picture(result: "Measured") -> bytes:
+    """Error of the mean position in each phase, model after model."""
+    labels = [readable(step.name) for step in result.steps]
+    at = np.arange(len(labels))
+    with picture(9.0, 1.0 + 0.36 * len(labels)) as drawn:
+        panels = drawn.subplots(1, len(_REPLAYS), sharey=True)
+        for panel, (phase, unit) in zip(panels, _REPLAYS, strict=True):
+            values = [
+                next((float(e["mean"]) for e in step.replay if e["phase"] == phase), np.nan)  # type: ignore[arg-type]
+                for step in result.steps
+            ]
+            bars = panel.barh(at, values, 0.65, color=PARAMETERS)
+            panel.bar_label(bars, [f"{value:.2f}" for value in values], padding=2, fontsize=8)
+            panel.set_title("displacement" if phase == "displacement" else f"rotation {phase}")
+            panel.set_xlabel(f"error ({unit})")
+            panel.set_xlim(0.0, 1.25 * np.nanmax(values))
+            panel.set_yticks(at, labels)
+            panel.grid(visible=False, axis="y")
+        panels[0].invert_yaxis()
+        return png(drawn)

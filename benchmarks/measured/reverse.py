@@ -1,0 +1,291 @@
+"""The reverse: what the station, identified from I2 and I3, misses in tables 21, 22 and 27-30.
+
+Each measured phase of each trial is known by three numbers: slope and intercept of a line, and the
+mean square about it. Beside a simulation under the printed voltages they leave three residuals, in
+what they make of the position (rms, mm at the muscle): the slope's, the mid-phase position's and
+the roughness's. Every suspect of the station is fitted to all of them at once; what is left at a
+pressure is then foretold from the others, by the fit's own derivatives.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import OptimizeResult, least_squares
+
+from benchmarks.score import PHASES, measured_score
+from pma_gym.data.serres2008 import load_table
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.evidence import Evidence
+from pma_gym.discovery.noise import white_noise
+from pma_gym.discovery.parameters import prior, values
+from pma_gym.discovery.suspects import Suspect, bounds, suspects
+from pma_gym.metrics import PHASE_DURATION, regression
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+
+RATE_HZ = 60.0
+"""Rows a second of a simulated trial: the printed voltages fall on them."""
+
+PULLEY_M = 25.4e-3
+"""What makes an angle comparable with a way (m)."""
+
+PARAMETERS = (
+    "drive.gain_n_per_v",
+    "drive.offset_n",
+    "rotor.radius_mm",
+    "cable.stiffness_n_per_mm",
+    "cable.slack_mm",
+    "hysteresis.force_n",
+    "regulator_line.gain_kpa_per_v",
+)
+"""Numbers that the station has and that may be off, each set beside the effects that it lacks."""
+
+LIKE = 1.15
+"""Explanations whose rms left at pressures left out is within this factor of the best cannot be
+told apart."""
+
+GAIN = 0.9
+"""A further explanation must leave at most this share of what was left before it."""
+
+NOTHING = "nothing added"
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One way to explain the misfit.
+
+    Attributes:
+        name: the effect, or the parameter.
+        values: fitted values at the door, by path.
+        fitted_mm: rms left where all pressures were fitted (mm at the muscle).
+        left_out_mm: at pressures left out.
+        displacement_mm: of that, in the displacement trials.
+        rotation_mm: in the rotation trials.
+    """
+
+    name: str
+    values: dict[str, float]
+    fitted_mm: float
+    left_out_mm: float
+    displacement_mm: float
+    rotation_mm: float
+
+
+def explanations(
+    model: Model, progress: Callable[[int, int], None] | None = None
+) -> list[Explanation]:
+    """Every explanation that the catalogue has, the best at pressures left out first.
+
+    The first in the list that adds nothing is the model as it is.
+    """
+    summary = Summary.measured(model)
+    every = [each for each in suspects(model) if _reaches(each)]
+    found = [summary.explained(NOTHING, model, (), np.empty((1, 0)))]
+    total = len(every) + len(PARAMETERS)
+    for number, suspect in enumerate(every):
+        if progress is not None:
+            progress(number, total)
+        free = np.flatnonzero(suspect.fitted)
+        some = suspect.probes[_spread(len(suspect.probes))]
+        switched = suspect.model.replace(
+            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        )
+        paths = tuple(np.array(suspect.paths)[free].tolist())
+        found.append(summary.explained(suspect.name, switched, paths, some[:, free]))
+    for number, path in enumerate(PARAMETERS):
+        if progress is not None:
+            progress(len(every) + number, total)
+        here = values(model, [path])
+        found.append(summary.explained(path, model, (path,), here[None] + 0.5 * prior(model, path)))
+    return sorted(found, key=lambda each: each.left_out_mm)
+
+
+def searched(
+    model: Model, most: int = 2, progress: Callable[[int, int], None] | None = None
+) -> list[list[Explanation]]:
+    """Explanations of the model as it is, then of the model with the best one in it, and so on.
+
+    It ends where the best gains less than a tenth at pressures left out.
+    """
+    found = []
+    while len(found) < most:
+        every = explanations(model, progress)
+        found.append(every)
+        before = next(each.left_out_mm for each in every if each.name == NOTHING)
+        if every[0].left_out_mm > GAIN * before:
+            break
+        model = _with(model, every[0])
+    return found
+
+
+def _with(model: Model, found: Explanation) -> Model:
+    """The model with an explanation in it."""
+    lacking = {each.name: each for each in suspects(model)}
+    if found.name in lacking:
+        suspect = lacking[found.name]
+        model = suspect.model.replace(
+            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        )
+    return model.replace(found.values)
+
+
+def alike(found: Sequence[Explanation]) -> list[str]:
+    """Explanations that cannot be told from the best."""
+    least = min(each.left_out_mm for each in found)
+    return [each.name for each in found if each.left_out_mm <= LIKE * least]
+
+
+def _reaches(suspect: Suspect) -> bool:
+    """Whether an effect is in the true motion, which alone is known, and has a size."""
+    sensed = suspect.model.effects[suspect.effect].port.startswith(("sensor", "part"))
+    lag = suspect.name.endswith("_lag") and suspect.effect != "drive_lag"
+    return bool(suspect.fitted.any()) and not sensed and not lag
+
+
+def _spread(count: int) -> list[int]:
+    """A few of so many probes."""
+    return sorted({0, count // 2, count - 1})
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Known commands and the figures that were measured under them.
+
+    Attributes:
+        trials: the commands, one trial a profile.
+        tasks: task of each trial.
+        pressure: of each residual (kPa), shape (n,).
+        task: whether each residual is of a rotation, shape (n,).
+        measured: slope, mid-phase position and roughness of all phases, in mm, shape (n,).
+    """
+
+    trials: list[Trial]
+    tasks: list[str]
+    pressure: Array
+    rotation: NDArray[np.bool_]
+    figures: Array
+
+    @classmethod
+    def measured(cls, model: Model) -> "Summary":
+        """From the tables; the regulator's voltage is what the model makes the pressure with."""
+        plant = Plant(model)
+        trials, tasks, pressures, rotation, figures = [], [], [], [], []
+        for number in range(4, 21):
+            table = load_table(f"I{number}")
+            task, pressure = str(table["task"][0]), float(table["pressure_kpa"][0])
+            end = PHASE_DURATION * len(PHASES[task])
+            time = np.arange(round(end * RATE_HZ) + 1) / RATE_HZ
+            volts = np.interp(time, table["time_s"], table["motor_voltage_v"])
+            pressed = plant.regulator_voltage(pressure * SI_FACTORS["kPa"])
+            trials.append(
+                Trial(
+                    time,
+                    {"motor_voltage": volts, "regulator_voltage": np.full(len(time), pressed)},
+                    {"contraction": np.zeros(len(time))},
+                )
+            )
+            tasks.append(task)
+            unit = _millimetres(task)
+            for phase in PHASES[task]:
+                score = measured_score(task, phase, pressure)
+                figures += [
+                    score.slope * unit * PHASE_DURATION / np.sqrt(12.0),
+                    score.mean * unit,
+                    np.sqrt(score.residual_mean_square) * unit,
+                ]
+                pressures += 3 * [pressure]
+                rotation += 3 * [task == "rotation"]
+        return cls(trials, tasks, np.array(pressures), np.array(rotation), np.array(figures))
+
+    def residuals(self, evidence: Evidence, at: Array) -> Array:
+        """Simulated less measured at parameters, shape (n,) in mm; infinite where it is lost."""
+        held = evidence.readings(at)
+        if held is None or not all(np.isfinite(part).all() for part in held):
+            return np.full(self.figures.shape, 1e3)
+        found = []
+        for signals, trial, task in zip(held, self.trials, self.tasks, strict=True):
+            contraction = signals[OUTPUTS.index("contraction")]
+            position = (
+                (contraction[0] - contraction) * 1e3
+                if task == "displacement"
+                else signals[OUTPUTS.index("rotation")] * PULLEY_M * 1e3
+            )
+            for number in range(len(PHASES[task])):
+                begin = PHASE_DURATION * number
+                inside = (trial.time >= begin) & (trial.time <= begin + PHASE_DURATION)
+                line = regression(trial.time[inside] - begin, position[inside])
+                found += [
+                    line.slope * PHASE_DURATION / np.sqrt(12.0),
+                    line.intercept + 0.5 * PHASE_DURATION * line.slope,
+                    np.sqrt(line.residual_mean_square),
+                ]
+        return np.clip(np.array(found) - self.figures, -1e3, 1e3)
+
+    def explained(self, name: str, model: Model, paths: Sequence[str], begun: Array) -> Explanation:
+        """Fit parameters of a model, from the best of some beginnings, shape (starts, p)."""
+        # A reading of every parameter keeps the zero free; one that does nothing is always there.
+        free = tuple(paths) or ("drive.offset_n",)
+        evidence = Evidence(
+            model,
+            self.trials,
+            free,
+            tuple(white_noise(1.0) for _ in OUTPUTS),
+            np.full(len(free), np.inf),
+        )
+        if not paths:
+            left = self.residuals(evidence, values(model, free))
+            return self._explanation(name, {}, left, left)
+        first = min(begun, key=lambda row: float(np.sum(self.residuals(evidence, row) ** 2)))
+        lower, upper = bounds(paths)
+        inside = np.clip(first, lower + 1e-9, upper - 1e-9)
+        fit = least_squares(
+            lambda at: self.residuals(evidence, at),
+            inside,
+            bounds=(lower, upper),
+            x_scale=np.maximum(np.abs(inside), 1e-3),
+            diff_step=1e-3,
+            max_nfev=25,
+        )
+        fitted = dict(zip(paths, map(float, fit.x), strict=True))
+        return self._explanation(name, fitted, fit.fun, self._foretold(evidence, fit))
+
+    def _foretold(self, evidence: Evidence, fit: OptimizeResult) -> Array:
+        """What is left at each pressure by a fit to the others: one step from the fit of all.
+
+        The step is simulated, and not taken where it does not help at the others.
+        """
+        found, left = fit.fun.copy(), fit.fun
+        for pressure in np.unique(self.pressure):
+            there = self.pressure == pressure
+            step, *_ = np.linalg.lstsq(fit.jac[~there], -left[~there], rcond=1e-8)
+            at = np.clip(fit.x + step, evidence.lower, evidence.upper)
+            moved = self.residuals(evidence, at)
+            if np.sum(moved[~there] ** 2) <= np.sum(left[~there] ** 2):
+                found[there] = moved[there]
+        return found
+
+    def _explanation(
+        self, name: str, fitted: dict[str, float], left: Array, foretold: Array
+    ) -> Explanation:
+        return Explanation(
+            name,
+            fitted,
+            _rms(left),
+            _rms(foretold),
+            _rms(foretold[~self.rotation]),
+            _rms(foretold[self.rotation]),
+        )
+
+
+def _millimetres(task: str) -> float:
+    """Millimetres at the muscle in the unit that a task is measured in."""
+    return 1.0 if task == "displacement" else SI_FACTORS["deg"] * PULLEY_M * 1e3
+
+
+def _rms(left: Array) -> float:
+    return float(np.sqrt(np.mean(left**2)))

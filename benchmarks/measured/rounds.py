@@ -1,0 +1,145 @@
+"""Diagnosis after diagnosis: the amended model of one round is what the next begins with."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.files import write_text
+from pma_gym.data.dataset import Dataset
+from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.journal import digest
+from pma_gym.discovery.workflow import diagnose
+from pma_gym.plant.model import Model, dump_model, load_model
+
+MOST_ROUNDS = 5
+"""Most diagnoses, one after the other."""
+
+ADDED = "added to the model"
+"""What a diagnosis says of a candidate that is in its amended model."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Round:
+    """One diagnosis.
+
+    Attributes:
+        verdict: its verdict.
+        sentence: its answer in words.
+        effects: effects that it added, in order.
+        confused_with: others that explain as much, by effect.
+        p_values: family-wise, by effect.
+        rivals: the candidates that came next: name, gain in log-likelihood, p-value, reason.
+        blind: effects that these trials would not show at their usual size.
+        next_experiment: what to measure next, or nothing.
+        gap: misfit as given, refitted, amended and the noise, by signal.
+        seconds: by step.
+    """
+
+    verdict: str
+    sentence: str
+    effects: tuple[str, ...]
+    confused_with: Mapping[str, Sequence[str]]
+    p_values: Mapping[str, float]
+    rivals: Sequence[Sequence[Any]]
+    blind: tuple[str, ...]
+    next_experiment: Mapping[str, Any] | None
+    gap: Mapping[str, Mapping[str, float]]
+    seconds: Mapping[str, float] = field(default_factory=dict)
+
+
+def rounds(
+    data: Dataset,
+    given: Model,
+    folder: Path,
+    seed: int,
+    jobs: int,
+    progress: Callable[[int], Progress],
+    most: int = MOST_ROUNDS,
+) -> tuple[list[Round], Model]:
+    """Diagnose until nothing more is found.
+
+    Args:
+        data: the trials.
+        given: the model to begin with.
+        folder: where finished rounds and fits are kept, from which an interrupted job goes on.
+        seed: of simulated chance.
+        jobs: threads.
+        progress: gives what is called with a round's steps.
+        most: most diagnoses.
+    Returns:
+        The rounds, the last of which added nothing unless there were too many; the amended model.
+    """
+    found: list[Round] = []
+    model = given
+    while len(found) < most:
+        number = len(found) + 1
+        each, model = _round(data, model, folder, seed, jobs, progress(number), number)
+        found.append(each)
+        if not each.effects:
+            break
+    return found, model
+
+
+def _round(
+    data: Dataset,
+    model: Model,
+    folder: Path,
+    seed: int,
+    jobs: int,
+    progress: Progress,
+    number: int,
+) -> tuple[Round, Model]:
+    """A round and its amended model, from the folder where it is there."""
+    stage, amended = folder / f"round_{number}.json", folder / f"round_{number}.toml"
+    asked = digest([each.trial for each in data.trials], model, f"measured 1 seed {seed}")
+    if stage.is_file() and amended.is_file():
+        kept = json.loads(stage.read_text(encoding="utf-8"))
+        if kept.pop("asked", "") == asked:
+            return Round(**kept), load_model(amended)
+    diagnosis = diagnose(
+        data, model, seed=seed, jobs=jobs, journal=folder / "journal", progress=progress
+    )
+    found = round_of(diagnosis)
+    write_text(amended, dump_model(diagnosis.model if found.effects else model))
+    write_text(stage, json.dumps({"asked": asked, **asdict(found)}, indent=1))
+    # As it is read again, so that a job that goes on ends as one that was not interrupted.
+    return found, load_model(amended)
+
+
+def round_of(diagnosis: Diagnosis) -> Round:
+    """What a diagnosis found.
+
+    A diagnosis that says `unknown`, because a law without a shape of its own explains even more,
+    has added effects to its model all the same: these count. One that cannot decide has not.
+    """
+    added = [each.name for each in diagnosis.candidates if each.why == ADDED]
+    named = {each.name: each for each in diagnosis.effects}
+    kept = diagnosis.verdict in ("effect", "unknown")
+    ordered = [name for name in named if name in added]
+    ordered += [name for name in added if name not in named]
+    experiment = diagnosis.next_experiment
+    return Round(
+        verdict=diagnosis.verdict,
+        sentence=diagnosis.sentence,
+        effects=tuple(ordered) if kept else (),
+        confused_with={name: tuple(each.confused_with) for name, each in named.items()},
+        p_values={each.name: each.p_value for each in diagnosis.candidates if each.name in added},
+        rivals=[
+            (each.name, each.delta_log_likelihood, each.p_value, each.why)
+            for each in diagnosis.candidates[:8]
+        ],
+        blind=tuple(diagnosis.blind),
+        next_experiment=None
+        if experiment is None
+        else {
+            "protocol": experiment.protocol,
+            "separates": list(experiment.separates),
+            "expected_odds": experiment.expected_odds,
+        },
+        gap={signal: asdict(gap) for signal, gap in diagnosis.gap.items()},
+        seconds=dict(diagnosis.seconds),
+    )

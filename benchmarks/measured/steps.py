@@ -1,0 +1,146 @@
+"""Effect by effect: the error on whole pressures that took no part, and on other tables."""
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+from benchmarks.files import write_text
+from benchmarks.measured.held_out import FIGURES, Rig, limit_errors, rms, worked
+from benchmarks.measured.replays import Replay, replays
+from pma_gym.data.dataset import Dataset
+from pma_gym.discovery.journal import digest
+from pma_gym.plant.model import Model, dump_model
+
+AS_GIVEN, REFITTED = "as given", "parameters refitted"
+
+
+@dataclass(frozen=True)
+class Step:
+    """A model on the way, and its errors.
+
+    Attributes:
+        name: what was added to the one before.
+        effects: all effects that it has.
+        seen: rms errors at the pressures that it was fitted to, by `FIGURES`.
+        unseen: at whole pressures that it was not.
+        replay: open-loop replay of the printed voltages, a phase each.
+        model: the model as TOML.
+    """
+
+    name: str
+    effects: tuple[str, ...]
+    seen: Mapping[str, float]
+    unseen: Mapping[str, float]
+    replay: Sequence[Mapping[str, object]]
+    model: str
+
+
+def steps(
+    given: Model,
+    amended: Model,
+    effects: Sequence[str],
+    data: tuple[Dataset, Dataset, Dataset],
+    folder: Path,
+    jobs: int,
+    progress: Callable[[int, int], None],
+) -> list[Step]:
+    """The model as given, refitted, and with one effect more at a time.
+
+    Args:
+        given: the model to begin with.
+        amended: with all effects, where fits begin.
+        effects: in the order in which a diagnosis added them.
+        data: what models are fitted to; I3's trials at those pressures; those at other pressures.
+        folder: where finished steps are kept.
+        jobs: threads.
+        progress: called with what is done and the total.
+    """
+    fitted, seen, unseen = data
+    rig = Rig.of(fitted, given, jobs)
+    names = [AS_GIVEN, REFITTED, *effects]
+    trials = [each.trial for part in data for each in part.trials]
+    found = []
+    for number, name in enumerate(names):
+        progress(number, len(names))
+        some = tuple(effects[: max(number - 1, 0)])
+        asked = digest(trials, amended, f"steps 1 {name} {some}")
+        kept = _kept(folder / f"step_{number}.json", asked)
+        if kept is None:
+            model = given if name == AS_GIVEN else _fitted(rig, some, amended)
+            kept = _judged(name, some, model, seen, unseen, folder / f"step_{number}.toml")
+            text = json.dumps({"asked": asked, **asdict(kept)}, indent=1)
+            write_text(folder / f"step_{number}.json", text)
+        found.append(kept)
+    progress(len(names), len(names))
+    return found
+
+
+def folds(
+    given: Model,
+    amended: Model,
+    effects: Sequence[str],
+    data_of: Callable[[Sequence[float]], tuple[Dataset, Dataset]],
+    groups: Sequence[Sequence[float]],
+    jobs: int,
+    progress: Callable[[int, int], None],
+) -> dict[str, float]:
+    """Rms errors with each group of pressures (kPa) left out once, all other pressures seen.
+
+    Args:
+        given: the model to begin with.
+        amended: with all effects, where fits begin.
+        effects: what is added to the given model.
+        data_of: what is fitted to, and what is judged on, with pressures left out.
+        groups: the pressures that are left out together.
+        jobs: threads.
+        progress: called with what is done and the total.
+    """
+    squares = {name: 0.0 for name in FIGURES}
+    counts = dict.fromkeys(FIGURES, 0)
+    for number, group in enumerate(groups):
+        progress(number, len(groups))
+        fitted, judged = data_of(group)
+        model = _fitted(Rig.of(fitted, given, jobs), effects, amended)
+        for name, errors in limit_errors(model, judged).items():
+            squares[name] += float(errors @ errors)
+            counts[name] += len(errors)
+    progress(len(groups), len(groups))
+    return {name: (squares[name] / counts[name]) ** 0.5 for name in FIGURES}
+
+
+def _fitted(rig: Rig, effects: Sequence[str], begun: Model) -> Model:
+    """The better of fits that begin at an amended model and at the given one."""
+    fits = [fit for model in (begun, rig.given) if (fit := rig.fit(effects, model)) is not None]
+    if not fits:
+        raise ValueError(
+            f"{rig.given.name} with {', '.join(effects) or 'no effect'} cannot be simulated on "
+            "tables I2 and I3"
+        )
+    return min(fits, key=lambda fit: fit.chi_square).model
+
+
+def _judged(
+    name: str, effects: tuple[str, ...], model: Model, seen: Dataset, unseen: Dataset, path: Path
+) -> Step:
+    # The other tables' trials were made by a muscle that had been worked.
+    write_text(path, dump_model(worked(model)))
+    return Step(
+        name,
+        effects,
+        {each: rms(errors) for each, errors in limit_errors(model, seen).items()},
+        {each: rms(errors) for each, errors in limit_errors(model, unseen).items()},
+        [_plain(each) for each in replays(path)],
+        dump_model(worked(model)),
+    )
+
+
+def _plain(replay: Replay) -> dict[str, object]:
+    return {key: value for key, value in asdict(replay).items() if key != "errors"}
+
+
+def _kept(path: Path, asked: str) -> Step | None:
+    if not path.is_file():
+        return None
+    entry = json.loads(path.read_text(encoding="utf-8"))
+    return Step(**entry) if entry.pop("asked", "") == asked else None

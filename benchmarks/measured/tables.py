@@ -1,0 +1,214 @@
+"""What the job found, as rows of text: for the terminal and for the page."""
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.measured.replays import PHASE_NAMES
+from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
+from benchmarks.measured.rounds import Round
+
+if TYPE_CHECKING:
+    from benchmarks.measured.job import Measured
+
+TARGET_MM = 1.0
+"""Extension that is aimed at, on pressures that took no part (mm)."""
+
+COLUMNS = (
+    ("extension_mm", "extension (mm)"),
+    ("rotation_deg", "rotation (deg)"),
+    ("return_mm", "return (mm)"),
+    ("return_deg", "return rotation (deg)"),
+)
+"""Figures and their headings."""
+
+Rows = list[tuple[str, ...]]
+
+
+def readable(name: str) -> str:
+    """An effect's name in words."""
+    return name.replace("_", " ")
+
+
+def round_rows(found: Sequence[Round]) -> Rows:
+    """Each diagnosis: verdict, what it added, and with what that may be confused."""
+    rows = []
+    for number, each in enumerate(found, 1):
+        if not each.effects:
+            rows.append((str(number), each.verdict, "nothing", "", ""))
+        for name in each.effects:
+            others = ", ".join(readable(other) for other in each.confused_with.get(name, ()))
+            chance = f"{each.p_values[name]:.2g}" if name in each.p_values else ""
+            rows.append((str(number), each.verdict, readable(name), chance, others))
+    return rows
+
+
+def error_rows(result: "Measured") -> Rows:
+    """Errors on pressures that took no part, model after model, with the scatter of repeats."""
+    rows = [
+        (_label(step.name), *(f"{step.unseen[key]:.2f}" for key, _ in COLUMNS))
+        for step in result.steps
+    ]
+    every = tuple(f"{result.folds[key]:.2f}" for key, _ in COLUMNS)
+    rows.append(("all effects, every pressure left out once", *every))
+    rows.append(("scatter of the repeats", *(f"{result.floors[key]:.2f}" for key, _ in COLUMNS)))
+    return rows
+
+
+def replay_rows(result: "Measured", phase: str) -> Rows:
+    """Errors of the replay in a phase, model after model."""
+    return [
+        (
+            _label(step.name),
+            *(_figure(entry, key) for key in ("slope", "intercept", "mean", "mean_signed", "rmse")),
+            f"{entry['trials']}",
+        )
+        for step in result.steps
+        for entry in step.replay
+        if entry["phase"] == phase
+    ]
+
+
+def reverse_rows(found: Sequence[Explanation]) -> Rows:
+    """Explanations of what the station misses in tables 21-30, the best first."""
+    return [
+        (
+            readable(each.name),
+            ", ".join(f"{value:.4g}" for value in each.values.values()),
+            f"{each.fitted_mm:.2f}",
+            f"{each.left_out_mm:.2f}",
+            f"{each.displacement_mm:.2f}",
+            f"{each.rotation_mm:.2f}",
+        )
+        for each in found[:MOST_SHOWN]
+    ] + [
+        (each.name, "", f"{each.fitted_mm:.2f}", f"{each.left_out_mm:.2f}",
+         f"{each.displacement_mm:.2f}", f"{each.rotation_mm:.2f}")
+        for each in found[MOST_SHOWN:]
+        if each.name == NOTHING
+    ]  # fmt: skip
+
+
+REVERSE_HEADER = (
+    *("explanation", "size", "all pressures"),
+    *("left-out pressures", "in displacement", "in rotation"),
+)
+MOST_SHOWN = 8
+"""Explanations that are listed."""
+
+
+def reverse_words(result: "Measured") -> Iterator[str]:
+    """What explains the misfit, and what cannot be told from it."""
+    for found in result.reverse:
+        before = next(each.left_out_mm for each in found if each.name == NOTHING)
+        best, others = found[0], [name for name in alike(found) if name != found[0].name]
+        if best.name == NOTHING or best.left_out_mm > GAIN * before:
+            yield (
+                f"Nothing further explains a tenth of the {before:.2f} mm that are left at "
+                "pressures left out."
+            )
+            continue
+        told = f" Not told from it: {', '.join(map(readable, others))}." if others else ""
+        yield (
+            f"{readable(best.name)} explains it best: {before:.2f} mm before, "
+            f"{best.left_out_mm:.2f} mm at pressures left out.{told}"
+        )
+
+
+def held_rows(result: "Measured") -> Rows:
+    """Models against the validation under triangular pressure."""
+    return [
+        (
+            str(each.figure),
+            each.model,
+            f"{each.stroke_mm:.1f}",
+            f"{each.printed_mm[0]:.1f}-{each.printed_mm[1]:.1f}",
+            f"{each.apart_mm:.2f}",
+            f"{each.rmse_mm:.2f}",
+        )
+        for each in result.held
+    ]
+
+
+HELD_HEADER = (
+    *("figure", "model", "stroke (mm)", "measured (mm)"),
+    *("from the dissertation's model, rms (mm)", "that model from the measurement, rms (mm)"),
+)
+
+REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
+
+
+def experiment_words(found: Sequence[Round]) -> list[str]:
+    """What these data could not show, and what to measure, in words."""
+    last = found[-1]
+    words = [
+        f"Blind: at its usual size, {', '.join(map(readable, last.blind)) or 'no effect'} would "
+        "not show in these trials."
+    ]
+    for number, each in enumerate(found, 1):
+        following = each.next_experiment
+        if following is not None:
+            separates = ", ".join(readable(name) for name in following["separates"])
+            words.append(
+                f"Round {number} proposes: {following['protocol']} (to tell {separates} apart, "
+                f"expected odds {following['expected_odds']:.3g})."
+            )
+    return words
+
+
+def print_measured(result: "Measured", console: Console) -> None:
+    """All of it as tables."""
+    header = ("round", "verdict", "added", "p", "explains as much")
+    _print(console, "Diagnoses of I2 and I3", header, round_rows(result.rounds))
+    names = tuple(label for _, label in COLUMNS)
+    title = "Table I3 at pressures that took no part: rms error, from the commands alone"
+    _print(console, title, ("model", *names), error_rows(result))
+    for phase, label in PHASE_NAMES.items():
+        title = f"Replay of the printed voltages, {label}: mean absolute error"
+        _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
+    for number, found in enumerate(result.reverse, 1):
+        title = (
+            f"The reverse, {number}: misfit of `station` in tables 21-30, rms (mm at the muscle)"
+        )
+        _print(console, title, REVERSE_HEADER, reverse_rows(found))
+    for line in reverse_words(result):
+        console.print(line, highlight=False)
+    _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))
+    for line in (*experiment_words(result.rounds), *verdict_words(result)):
+        console.print(line, highlight=False)
+
+
+def verdict_words(result: "Measured") -> Iterator[str]:
+    """What was aimed at, and what was reached."""
+    first, last = result.steps[0], result.steps[-1]
+    got = last.unseen["extension_mm"]
+    met = "met" if got <= TARGET_MM else "MISSED"
+    yield (
+        f"Extension at pressures that took no part: {first.unseen['extension_mm']:.2f} mm as "
+        f"given, {got:.2f} mm with {len(last.effects)} effects; target {TARGET_MM:g} mm: {met}; "
+        f"repeats scatter by {result.floors['extension_mm']:.2f} mm."
+    )
+    yield (
+        f"Rotation: {first.unseen['rotation_deg']:.2f} deg as given, "
+        f"{last.unseen['rotation_deg']:.2f} deg; repeats {result.floors['rotation_deg']:.2f} deg."
+    )
+    yield f"Computed in {result.seconds:.0f} s."
+
+
+def _label(name: str) -> str:
+    return name if name in ("as given", "parameters refitted") else f"+ {readable(name)}"
+
+
+def _figure(entry: Any, key: str) -> str:  # noqa: ANN401
+    return f"{float(entry[key]):.2f}"
+
+
+def _print(console: Console, title: str, header: Sequence[str], rows: Rows) -> None:
+    table = Table(title=title, title_justify="left")
+    for number, name in enumerate(header):
+        table.add_column(name, justify="left" if number == 0 else "right")
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)

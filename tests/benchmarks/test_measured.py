@@ -1,0 +1,163 @@
+"""The dissertation's tables as trials, their diagnosis in rounds, and the reverse."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks.measured import rounds as of_rounds
+from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, worked
+from benchmarks.measured.job import DIAGNOSED_KPA, UNSEEN_KPA, diagnosed, write_trials
+from benchmarks.measured.reverse import Summary
+from benchmarks.measured.rounds import ADDED, rounds
+from benchmarks.measured.trials import measured_dataset
+from pma_gym.data.dataset import read_dataset
+from pma_gym.data.serres2008 import load_table
+from pma_gym.data.trial_files import TrialWarning
+from pma_gym.discovery.evidence import Evidence
+from pma_gym.discovery.floors import initial_floors
+from pma_gym.discovery.noise import white_noise
+from pma_gym.plant.logged import Logged
+from pma_gym.plant.model import load_model
+
+
+@pytest.fixture(scope="module")
+def every():
+    return measured_dataset()
+
+
+def named(data, name):
+    return next(each for each in data.trials if each.name == name)
+
+
+def test_every_row_is_a_trial_and_every_no_load_contraction_is_in_one(every):
+    kinds = [each.name.split("_")[0:2] for each in every.trials]
+    walks = [each for each in every.trials if "noload" in each.name]
+    assert len(kinds) == 396 + 116 + 36
+    read = np.concatenate([each.trial.measurements["contraction"] for each in walks])
+    printed = load_table("I3")["no_load_contraction_mm"]
+    assert np.sort(read[np.isfinite(read)]) == pytest.approx(np.sort(printed) * 1e-3)
+
+
+def test_a_row_is_read_where_it_was(every):
+    """150 kPa, 75 N, first repeat: 27.5 mm, pulled out by 4.7 mm at 10 s, all back at 15 s."""
+    each = named(every, "I3_150kPa_75N_1.csv")
+    contraction = each.trial.measurements["contraction"] * 1e3
+    assert contraction[[0, 2, 3]] == pytest.approx([27.5, 22.8, 27.5])
+    assert np.isnan(contraction[1])
+    assert np.rad2deg(each.trial.measurements["rotation"][[0, 2, 3]]) == pytest.approx(
+        [0.0, 11.2, 0.9]
+    )
+    assert each.trial.time.tolist() == [0.0, 5.0, 10.0, 15.0]
+    assert each.trial.commands["motor_voltage"].tolist() == [0.0, 0.76, 0.76, 0.0]
+    third = named(every, "I3_150kPa_75N_3.csv")
+    assert (each.order, each.repeat_of) == (0.0, None)
+    assert (third.order, third.repeat_of) == (2.0, each.name)
+
+
+def test_the_three_element_model_misses_extension_by_a_centimetre(every):
+    """physics.md, section 4: 9.9 mm, against 0.65 mm between repeats."""
+    errors = limit_errors(load_model("serres2008"), every)
+    assert rms(errors["extension_mm"]) == pytest.approx(9.9, abs=0.1)
+    assert len(errors["extension_mm"]) == 396
+    assert repeat_scatter(every)["extension_mm"] == pytest.approx(0.62, abs=0.05)
+    assert rms(limit_errors(load_model("station"), every)["extension_mm"]) < 1.2
+
+
+def test_what_is_diagnosed_holds_no_pressure_that_it_is_judged_on():
+    assert not set(DIAGNOSED_KPA) & set(UNSEEN_KPA)
+    assert len(DIAGNOSED_KPA) + len(UNSEEN_KPA) == 11
+    for each in diagnosed(DIAGNOSED_KPA).trials:
+        assert not any(f"_{pressure:.0f}kPa" in each.name for pressure in UNSEEN_KPA)
+
+
+def test_noise_comes_from_the_repeats():
+    data, model = diagnosed(DIAGNOSED_KPA), load_model("serres2008")
+    logged = [Logged.of(model, i, each.trial) for i, each in enumerate(data.trials)]
+    level = initial_floors(model, logged, data.trials)[0]
+    assert level.source == "repeats"
+    assert 0.4e-3 < level.level < 1.0e-3
+
+
+def test_written_trials_are_read_again(tmp_path):
+    count = write_trials(tmp_path / "trials")
+    with pytest.warns(TrialWarning, match="not measured"):
+        data = read_dataset(tmp_path / "trials")
+    assert len(data) == count == len(diagnosed(DIAGNOSED_KPA))
+    assert data.model == "serres2008"
+    one = named(data, "I3_150kPa_150N_3.csv")
+    assert one.repeat_of == "I3_150kPa_150N_1.csv"
+    ours = named(diagnosed(DIAGNOSED_KPA), one.name).trial.measurements["contraction"]
+    assert one.trial.measurements["contraction"] == pytest.approx(ours, nan_ok=True)
+
+
+def candidate(name, why=ADDED):
+    return SimpleNamespace(name=name, why=why, p_value=0.001, delta_log_likelihood=9.0)
+
+
+def answer(model, effect=None, verdict="effect"):
+    return SimpleNamespace(
+        verdict=verdict,
+        sentence="",
+        effects=[],
+        candidates=[candidate("creep", "chance")] + ([candidate(effect)] if effect else []),
+        blind=("creep",),
+        next_experiment=None,
+        gap={},
+        seconds={},
+        model=model,
+    )
+
+
+@pytest.fixture
+def asked(monkeypatch):
+    """Diagnoses of which the first finds slack, the second nothing; and who asked with what."""
+    models = []
+
+    def diagnose(data, model, **_):
+        models.append(model)
+        if model.parameters["cable"].slack == 0.0:
+            return answer(model.replace({"cable.slack_mm": 1.0}), "cable_slack")
+        return answer(model, verdict="agrees")
+
+    monkeypatch.setattr(of_rounds, "diagnose", diagnose)
+    return models
+
+
+def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
+    data = measured_dataset((150.0,), (75.0,), steps=0)
+
+    def run():
+        silent = lambda *_: None  # noqa: E731
+        return rounds(data, load_model("serres2008"), tmp_path, 0, 1, lambda _: silent)
+
+    found, model = run()
+    assert [each.effects for each in found] == [("cable_slack",), ()]
+    assert model.parameters["cable"].slack == pytest.approx(1e-3)
+    assert len(asked) == 2
+    again, same = run()
+    assert len(asked) == 2, "a finished round is not asked again"
+    assert (again[0].effects, again[1].verdict) == (["cable_slack"], "agrees")
+    assert same.parameters == model.parameters
+
+
+def test_a_worked_muscle_has_no_warmth_left():
+    warm = {"force_n": 100.0, "fade_kpa": 100.0, "repeats": 1.0, "repeat": 0.0}
+    model = load_model("serres2008").with_effects({"warm_up": warm})
+    assert worked(model).parameters["warm_up"].repeat == 1000.0
+    assert worked(load_model("station")).parameters == load_model("station").parameters
+
+
+def test_a_pulley_of_another_size_is_found_in_the_summaries():
+    """Figures that another pulley would leave are explained by it, at pressures left out too."""
+    model, path = load_model("station"), "rotor.radius_mm"
+    whole = Summary.measured(model)
+    # The displacement at 550 kPa and the rotation at 275 kPa.
+    chosen = np.where(whole.rotation, whole.pressure == 275.0, whole.pressure == 550.0)
+    parts = whole.trials[8:10], whole.tasks[8:10], whole.pressure[chosen], whole.rotation[chosen]
+    noise = tuple(white_noise(1.0) for _ in range(4))
+    evidence = Evidence(model, parts[0], (path,), noise, np.array([np.inf]))
+    made = Summary(*parts, np.zeros(chosen.sum())).residuals(evidence, np.array([28.0]))
+    found = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
+    assert found.values[path] == pytest.approx(28.0, abs=0.05)
+    assert found.left_out_mm < 0.05
