@@ -34,13 +34,18 @@ Judge = Callable[[Path], Answer]
 """What `diagnosed` is: takes the folder of a data set."""
 
 
-def diagnosed(folder: Path) -> Answer:
+def unproposed(folder: Path) -> Answer:
+    """As `diagnosed`, without the seconds that a proposal takes."""
+    return diagnosed(folder, propose=False)
+
+
+def diagnosed(folder: Path, propose: bool = True) -> Answer:
     """The answer of `pma-gym diagnose` with its defaults, without the start of a process."""
     # Here, for other judges need none of it.
     from pma_gym.data.dataset import read_dataset
     from pma_gym.discovery import diagnose
 
-    found = diagnose(read_dataset(folder), jobs=1)
+    found = diagnose(read_dataset(folder), jobs=1, propose=propose)
     proposal, following = found.next_experiment, None
     if proposal is not None:
         commands = proposal.trial.commands

@@ -277,6 +277,29 @@ OUTSIDE: dict[str, Kind] = {
         ("gain",),
         lambda p: outside.Resonance(p["gain"], 3, 3, one(p["hertz"]), 0.04),
     ),
+    "load_cell_tilt": Kind(
+        lambda g, most: {"percent_per_mm": _sign(g) * _log(g, 0.05, 0.5)},
+        ("percent_per_mm",),
+        lambda p: outside.TiltedLoadCell(p["percent_per_mm"] * 10.0),
+        20.0,
+    ),
+    "potentiometer_eccentricity": Kind(
+        lambda g, most: {"height_deg": _log(g, 0.3, 3.0), "phase_deg": g.uniform(-180.0, 180.0)},
+        ("height_deg",),
+        lambda p: outside.EccentricPotentiometer(
+            p["height_deg"] * DEGREE, one(p["phase_deg"]) * DEGREE
+        ),
+    ),
+    "compressor_beat": Kind(
+        lambda g, most: {"height_kpa": _log(g, 1.0, 6.0), "hertz": _log(g, 0.5, 3.0)},
+        ("height_kpa",),
+        lambda p: outside.CompressorBeat(p["height_kpa"] * 1e3, one(p["hertz"])),
+    ),
+    "drive_bow": Kind(
+        lambda g, most: {"bow_n": _sign(g) * _log(g, 2.0, 20.0), "most_n": most},
+        ("bow_n",),
+        lambda p: outside.BowedDrive(p["bow_n"], one(p["most_n"])),
+    ),
 }
 """Effects that no catalogue has, by name."""
 

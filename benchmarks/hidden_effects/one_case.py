@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.hidden_effects import records
-from benchmarks.hidden_effects.asking import Judge, asked, diagnosed
+from benchmarks.hidden_effects.asking import Judge, asked, diagnosed, unproposed
 from benchmarks.hidden_effects.blocks import Block
 
 
@@ -37,7 +37,9 @@ class Work:
         case = self.block.draw(self.seed, self.number)
         drawn = time.perf_counter()
         kept = self.folder / "data" if self.keep else None
-        answer = asked(case, self.number, self.judge, kept)
+        # Where no experiment follows, none need be proposed.
+        idle = self.judge is diagnosed and not self.block.rounds
+        answer = asked(case, self.number, unproposed if idle else self.judge, kept)
         answered = time.perf_counter()
         rounds = {}
         if self.block.rounds:

@@ -265,7 +265,11 @@ class Behind:
         Args:
             truth: readings with what is hidden, shape (trials, rows, 4).
             rival: readings with the rival at some size; none but the base if not given.
+        Returns:
+            Infinite where a rig runs away: nothing else does that.
         """
+        if not np.isfinite(truth).all() or (rival is not None and not np.isfinite(rival).all()):
+            return float("inf")
         change, columns, prior = self._flat(truth), self.columns, self.prior
         if rival is not None:
             columns = np.column_stack([columns, self._flat(rival)])

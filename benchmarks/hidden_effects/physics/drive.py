@@ -37,19 +37,21 @@ class CurrentLag(Hidden):
 
     def __init__(self, time: Array) -> None:
         """Take time constants of all lanes."""
-        self.time, self.held = time, np.zeros(0)
+        self.time, self.held, self.before = time, np.zeros(0), np.zeros(0)
 
     def loads(self, loads: Array, step: float) -> Array:
         """A first-order filter of the loads, at rest under the first ones."""
         if step == 0.0:
-            self.held = loads[0].copy()
+            self.held, self.before = loads[0].copy(), loads[0].copy()
             return loads
+        # Between two times the load is what it is half-way; so the lag is no half step shorter.
+        half_way = 0.5 * (loads + np.concatenate([self.before[None], loads[:-1]]))
         out = loads.copy()
         for i in np.flatnonzero(self.time > 1e-6):
             keep = float(np.exp(-step / self.time[i]))
             memory = [keep * self.held[i]]
-            out[:, i], _ = lfilter([1.0 - keep], [1.0, -keep], loads[:, i], zi=memory)
-        self.held = out[-1].copy()
+            out[:, i], _ = lfilter([1.0 - keep], [1.0, -keep], half_way[:, i], zi=memory)
+        self.held, self.before = out[-1].copy(), loads[-1].copy()
         return out
 
 

@@ -58,3 +58,63 @@ class Resonance(Hidden):
         out = list(signals)
         out[self.target] = out[self.target] + self.gain * (follows - moved)
         return out
+
+
+class TiltedLoadCell(Hidden):
+    """The load cell's gain grows with contraction, for the cable pulls at another angle."""
+
+    def __init__(self, share: Array) -> None:
+        """Take the change of gain a metre of contraction, of all lanes."""
+        self.share, self.rest = share, np.zeros(0)
+
+    def begin(self, moment: Moment) -> None:
+        """Calibrated where the trial begins with no load."""
+        self.rest = moment.resting.copy()
+
+    def sensed(self, signals: list[Array], step: float) -> list[Array]:
+        """Signals, the load with its contraction's gain."""
+        rest = self.rest if self.rest.size else signals[0][0]
+        gain = 1.0 + self.share * (signals[0] - rest)
+        return [signals[0], signals[1], gain * signals[2], signals[3]]
+
+
+class EccentricPotentiometer(Hidden):
+    """The potentiometer's disc turns about a point beside its centre: an error once a turn."""
+
+    def __init__(self, height: Array, phase: float) -> None:
+        """Take errors (rad) of all lanes, and the phase (rad)."""
+        self.height, self.phase = height, phase
+
+    def sensed(self, signals: list[Array], step: float) -> list[Array]:
+        """Signals, the angle with its error."""
+        error = self.height * np.sin(2.0 * signals[1] + self.phase)
+        return [signals[0], signals[1] + error, *signals[2:]]
+
+
+class CompressorBeat(Hidden):
+    """The supply's pressure swings as the compressor runs, and the regulator passes it on."""
+
+    def __init__(self, height: Array, hertz: float) -> None:
+        """Take swings (Pa) of all lanes, and their frequency (Hz)."""
+        self.height, self.hertz, self.passed = height, hertz, 0
+
+    def pressures(self, asked: Array, step: float) -> Array:
+        """Pressures asked for, and the swing, which begins with the trial."""
+        if step == 0.0:
+            self.passed = 0
+            return asked
+        times = step * (self.passed + np.arange(len(asked)))
+        self.passed += len(asked)
+        return asked + np.sin(2.0 * np.pi * self.hertz * times)[:, None] * self.height
+
+
+class BowedDrive(Hidden):
+    """The drive's load bends away from the straight line, as of a magnet near saturation."""
+
+    def __init__(self, bow: Array, most: float) -> None:
+        """Take the bow (N) of all lanes in the middle, and the load (N) where the line ends."""
+        self.bow, self.most = bow, most
+
+    def loads(self, loads: Array, step: float) -> Array:
+        """Loads, one and a half waves beside the line."""
+        return loads + self.bow * np.sin(3.0 * np.pi * loads / self.most)
