@@ -194,6 +194,8 @@ class Residuals:
         shape = (len(self._trials), count)
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
         with ThreadPoolExecutor(self.threads) as pool:
+            # A thread costs more than the work of a small trial does.
+            each = pool.map if self.threads > 1 else map
             for block in self._blocks(8 * number * count):
                 runs, spaces = [], self._spaces(block, count)
                 for i, space in zip(block, spaces, strict=True):
@@ -207,7 +209,7 @@ class Residuals:
                 logs = [self._trials[i] for i in block]
                 if self._begun:
                     spaces = list(map(self._met, spaces, logs))
-                found += pool.map(work, logs, spaces, zeros[block, : len(tried)], repeat(vectors))
+                found += each(work, logs, spaces, zeros[block, : len(tried)], repeat(vectors))
         return found
 
     def _met(self, space: Array, logged: Logged) -> Array:
