@@ -22,8 +22,8 @@ from pma_gym.discovery.records import floors_at_the_door, gaps, trial_records
 from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
 from pma_gym.discovery.selection import passes
-from pma_gym.discovery.slowness import leftover_share
-from pma_gym.discovery.verdict import shapeless_laws, suspicious, verdict_of
+from pma_gym.discovery.slowness import leftover, tones
+from pma_gym.discovery.verdict import shapeless_laws, suspicious, telling, verdict_of
 from pma_gym.discovery.verdict_words import sentence, steps, unidentified
 from pma_gym.discovery.where import localise
 from pma_gym.plant.model import Model, Note
@@ -38,11 +38,11 @@ DETERMINED = 0.7
 determined by the data."""
 
 
-def answer(found: Findings, tell: Progress) -> Diagnosis:
-    """The diagnosis."""
+def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
+    """The diagnosis, with the next experiment if one is to be proposed."""
     tell("putting the answer together", 0, 3)
     coarse = coarse_sensors(found.floors)
-    left = leftover_share(found)
+    left = leftover(found)
     laws = shapeless_laws(found, left)
     blind = tuple(
         look.suspect.name
@@ -72,19 +72,20 @@ def answer(found: Findings, tell: Progress) -> Diagnosis:
         parameters=parameters,
         gap=gaps(records),
         candidates=_candidates(found),
-        next_experiment=_following(found, verdict, blind),
+        next_experiment=_following(found, verdict, blind) if propose else None,
         model=model,
         given=found.given,
         not_identifiable=_not_identifiable(found, fit),
         blind=blind,
-        law=residual_law(laws[0]) if verdict == "unknown" and laws else None,
+        law=residual_law(laws[0]) if verdict == "unknown" and telling(found, laws) else None,
+        tones=tones(found) if verdict == "unknown" else {},
         floors=floors_at_the_door(found),
         trials=records,
         maps=maps,
         warnings=_warnings(found),
     )
     return replace(
-        diagnosis, sentence=sentence(diagnosis, left), steps=steps(found, diagnosis, left)
+        diagnosis, sentence=sentence(diagnosis, left.most), steps=steps(found, diagnosis, left.most)
     )
 
 

@@ -267,7 +267,9 @@ class Diagnosis:
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
         blind: effects that would not have shown in these data even at their usual size.
-        law: the residual law, where the verdict is `unknown` or there is more to see.
+        law: the residual law, where the verdict is `unknown` and one explains enough.
+        tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
+            rings, for those that do.
         floors: noise by signal at the door.
         trials: curves of each trial.
         maps: residuals over conditions.
@@ -289,6 +291,7 @@ class Diagnosis:
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
     blind: tuple[str, ...] = ()
     law: ResidualLaw | None = None
+    tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
     trials: tuple[TrialRecord, ...] = ()
     maps: tuple[Map, ...] = ()
@@ -350,6 +353,7 @@ class Diagnosis:
                 "high": self.law.high.tolist(),
                 "words": self.law.words,
             },
+            "tones": dict(self.tones),
             "floors": {
                 signal: {
                     "value": floor.value,

@@ -12,6 +12,10 @@ COARSER = 1.5
 """How many of the DAQ's steps make a step coarse."""
 
 NAME = "sensor_quantisation"
+MISS = 0.05
+"""Share of a step that a reading may miss a whole one by; over all steps between the least and the
+largest reading, of which there are at least as many as differ, that is what the step may be off."""
+
 CHANCE = 0.1
 """Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make
 the step; every other that differs from them has to keep to it."""
@@ -25,5 +29,6 @@ def coarse_sensors(floors: Sequence[Level]) -> tuple[NamedEffect, ...]:
             column = BY_QUANTITY[name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]
-            steps[f"{column.name}_step"] = Estimate(size, size, size, column.unit)
+            sure = MISS * size / max(floor.distinct - 1, 1)
+            steps[f"{column.name}_step"] = Estimate(size, size - sure, size + sure, column.unit)
     return (NamedEffect(NAME, (), max(CHANCE**others, 1e-300), steps),) if steps else ()

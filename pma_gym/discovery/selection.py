@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.errors import covariance
+from pma_gym.discovery.excess import memory
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.noise import Whitening, autoregression
@@ -35,9 +37,9 @@ COARSE_CHANGE = 0.5
 """The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
 noise, and follows the motion."""
 
-SECOND_SHARE = 0.12
+SECOND_SHARE, SURE_SHARE = 0.12, 0.02
 """Least share of the first effect's gain that another must bring: what a law of the catalogue
-misses of its real likeness is of that order."""
+misses of its real likeness is of that order; and the same where the residual is surely no noise."""
 
 BEGINNINGS = 3
 """How often the selection begins anew from a better refitted model."""
@@ -65,6 +67,7 @@ class Stage:
         looks: at every suspect.
         fits: of those that were fitted, by name, each together with what was there before.
         gate: the looks that passed.
+        missing: whether the residual says of itself that something is missing.
     """
 
     bench: Bench
@@ -73,6 +76,7 @@ class Stage:
     looks: tuple[Look, ...]
     fits: dict[str, Fitted]
     gate: tuple[Look, ...]
+    missing: bool
 
 
 @dataclass(frozen=True)
@@ -136,6 +140,7 @@ def select(
             break
     bench = replace(bench, noise=relearnt(bench, best, chosen))
     fit = _refit(bench, best, chosen, journal)
+    fit = replace(fit, covariance=covariance(bench, fit, chosen))
     return Selection(tuple(stages), chosen, fit, bench, refitted)
 
 
@@ -195,7 +200,9 @@ def _stage(
         lambda done: progress(step, done, len(rest)),
     )
     looks.sort(key=lambda each: -each.gain)
-    gate = tuple(each for each in looks if passes(bench, each))
+    # Where the residual itself rules chance out, a look need not.
+    missing = remembers(bench, before, chosen)
+    gate = tuple(each for each in looks if passes(bench, each, missing and not chosen))
     fits: dict[str, Fitted] = {}
     if gate:
         worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
@@ -204,13 +211,25 @@ def _stage(
             found = _fit(bench, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.suspect.name] = found
-    return Stage(bench, before, baseline, tuple(looks), fits, gate)
+    return Stage(bench, before, baseline, tuple(looks), fits, gate, missing)
 
 
-def passes(bench: Bench, each: Look) -> bool:
-    """Whether chance, or arithmetic, would not show as much."""
+def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
+    """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
     least = COARSE_CHANGE if bench.coarse else LEAST_CHANGE
-    return each.p_value <= ALARM and each.change >= least
+    return (missing or each.p_value <= ALARM) and each.change >= least
+
+
+def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
+    """Whether what a fit leaves is surely no noise, whatever effects there are.
+
+    Not beside a coarse sensor, whose rounding follows the motion.
+    """
+    if bench.coarse:
+        return False
+    left = residuals(bench.evidence(fit.model, chosen), fit)
+    rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))
+    return any(memory([part[c] for part in left], rate).sure for c in range(len(OUTPUTS)))
 
 
 def cost(fit: Fitted) -> float:
@@ -238,7 +257,8 @@ def _likeliest(stage: Stage, first: Stage) -> str | None:
         return None
     if stage is not first:
         least = min(first.fits.values(), key=cost)
-        if gain < SECOND_SHARE * (first.before.chi_square - least.chi_square):
+        share = SURE_SHARE if stage.missing else SECOND_SHARE
+        if gain < share * (first.before.chi_square - least.chi_square):
             return None
     return name
 

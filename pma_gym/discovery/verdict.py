@@ -4,12 +4,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.discovery.constancy import spread
+from pma_gym.discovery.constancy import spreads
 from pma_gym.discovery.diagnosis import Verdict
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.parameters import values
 from pma_gym.discovery.residual_laws import Drawn, drawn_laws
 from pma_gym.discovery.selection import LEAST_CHANGE
+from pma_gym.discovery.slowness import Left
 
 MOST_LEFT = 0.35
 """Share of what was slow in the residual that may be left by effects that explain it."""
@@ -21,8 +22,14 @@ BETTER, BETTER_BY = 1.15, 60.0
 """By how much such a law must explain more than the effects to say that they are not it: a factor
 on their gain in chi-square, and chi-square."""
 
-MOST_SPREAD = 0.4
-"""Most that an effect's size may scatter from trial to trial, as a share of it."""
+WORTH_DRAWING = 0.15
+"""Share of the chi-square beyond noise that such a law must explain to be drawn."""
+
+MOST_REMEMBERED = 0.1
+"""Most of what the residual remembered of itself that it may still remember, beyond chance."""
+
+MOST_SPREAD = 0.12
+"""Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
 
 MOST_RIVALS = 2
 """Most others that an effect may be confused with and still be named: groups of three."""
@@ -31,7 +38,7 @@ MUCH_EXPLAINED = 0.1
 """Share of chi-square that an effect could explain, from which on its not passing the gate means
 that there are too few data, not that the structure is right."""
 
-BLIND_SHARE = 0.6
+BLIND_SHARE = 0.3
 """Share of the catalogue that would not have shown, from which on silence says nothing."""
 
 MOVED_CHANGE = 0.1
@@ -44,19 +51,27 @@ def _gate(found: Findings) -> bool:
     return bool(found.selection.stages and found.selection.stages[0].gate)
 
 
-def shapeless_laws(found: Findings, left: float) -> list[Drawn]:
+def _missing(found: Findings) -> bool:
+    """Whether the residual says of itself that something is missing."""
+    return bool(found.selection.stages and found.selection.stages[0].missing)
+
+
+def shapeless_laws(found: Findings, left: Left) -> list[Drawn]:
     """Laws without a shape of their own, where the effects leave room for one."""
-    if not _gate(found) or (left < DOUBTFUL and not _scatters(found)):
+    if not (_gate(found) or _missing(found)):
+        return []
+    if left.most < DOUBTFUL and not _scatters(found):
         return []
     return drawn_laws(found.selection.bench, found.refitted)
 
 
 def _scatters(found: Findings) -> bool:
-    """Whether an effect that was selected is of another size in each trial."""
+    """Whether an effect that was selected is of another size by trial or by condition."""
     selection = found.selection
     return any(
-        spread(selection.bench, selection.fit, selection.chosen, place) > MOST_SPREAD
+        scatter > MOST_SPREAD
         for place in range(len(selection.chosen))
+        for scatter in spreads(selection.bench, selection.fit, selection.chosen, place).values()
     )
 
 
@@ -71,6 +86,16 @@ def _outdone(found: Findings, laws: Sequence[Drawn]) -> bool:
     return laws[0].gain > max(BETTER * gain, gain + BETTER_BY)
 
 
+def telling(found: Findings, laws: Sequence[Drawn]) -> bool:
+    """Whether the best law without a shape of its own explains enough to be drawn."""
+    if not laws:
+        return False
+    evidence = found.selection.bench.evidence(found.refitted.model)
+    count = sum(logged.count for logged in evidence.logged)
+    before = evidence.sums(found.refitted.values, np.empty(0)).chi_square
+    return laws[0].gain > max(BETTER_BY, WORTH_DRAWING * (before - count))
+
+
 def suspicious(found: Findings) -> bool:
     """Whether an effect could explain much, in too few data to rule chance out."""
     if _gate(found) or not found.looks:
@@ -81,7 +106,7 @@ def suspicious(found: Findings) -> bool:
 
 def verdict_of(
     found: Findings,
-    left: float,
+    left: Left,
     laws: Sequence[Drawn],
     blind: Sequence[str],
     coarse: bool,
@@ -91,7 +116,7 @@ def verdict_of(
 
     Args:
         found: what the steps found.
-        left: share of the slow residual that the effects leave.
+        left: what the effects leave of the residual.
         laws: laws without a shape of their own, the one that explains most first.
         blind: effects that would not have shown.
         coarse: whether a sensor keeps to coarse steps.
@@ -99,7 +124,10 @@ def verdict_of(
     """
     chosen = found.selection.chosen
     gate = _gate(found)
-    if gate and (left > MOST_LEFT or _scatters(found) or _outdone(found, laws)):
+    remains = left.slow > MOST_LEFT or left.remembered > MOST_REMEMBERED
+    if gate and (remains or _scatters(found) or _outdone(found, laws)):
+        return "unknown"
+    if not chosen and _missing(found):
         return "unknown"
     if gate and not chosen:
         return "undecidable"

@@ -51,8 +51,9 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
     if diagnosis.verdict == "unknown":
         return (
             f"Something is missing in model {name} that no effect of the catalogue carries: of "
-            f"what is slow in the residual of these {trials}, the best leaves {percent(left)}."
-        )
+            f"what is slow in the residual of these {trials}, the best leaves "
+            f"{percent(min(left, 1.0))}."
+        ) + _tones(diagnosis)
     if diagnosis.candidates and diagnosis.candidates[0].why == "added to the model":
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
         rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
@@ -69,6 +70,14 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
         f"These {trials} cannot tell whether model {name} misses anything: "
         f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
     ) + _propose(diagnosis)
+
+
+def _tones(diagnosis: Diagnosis) -> str:
+    rings = [
+        f"{signal_name(signal)} rings at {figure(hertz)} Hz"
+        for signal, hertz in diagnosis.tones.items()
+    ]
+    return f" What is left of {' and that of '.join(rings)}." if rings else ""
 
 
 def _propose(diagnosis: Diagnosis) -> str:

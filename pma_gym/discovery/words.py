@@ -248,6 +248,11 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
     steps = ["Look at the law below: its shape is what any explanation must have."] * bool(
         diagnosis.law
     )
+    steps += [
+        f"Look for what swings at {figure(hertz)} Hz and reaches the {signal_name(signal)}: a "
+        "loose frame, a hose, a supply, the mains beyond half the sampling rate."
+        for signal, hertz in diagnosis.tones.items()
+    ]
     return [
         *steps,
         "Write it as an effect of your own, one Python file, and diagnose again with "

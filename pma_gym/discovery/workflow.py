@@ -38,6 +38,7 @@ def diagnose(
     jobs: int = 1,
     journal: Path | None = None,
     progress: Progress | None = None,
+    propose: bool = True,
 ) -> Diagnosis:
     """Find what a model misses in measured trials.
 
@@ -51,6 +52,7 @@ def diagnose(
         journal: a folder in which finished fits are kept, from which an interrupted diagnosis goes
             on; None keeps nothing.
         progress: called with a step's name, what is done of it and its total.
+        propose: whether to look for the next experiment too, which takes seconds.
     Returns:
         The diagnosis; its amended model goes into `gym.make(..., model=...)`, into the benchmark,
         and into another diagnosis.
@@ -67,7 +69,7 @@ def diagnose(
         >>> diagnose([Plant("serres2008").simulate(asked)], "serres2008").verdict
         'agrees'
     """
-    return _Work(trials, model, seed, jobs, journal, progress).run(search=True)
+    return _Work(trials, model, seed, jobs, journal, progress, propose).run(search=True)
 
 
 def refit(
@@ -96,6 +98,7 @@ class _Work:
     jobs: int
     folder: Path | None
     watcher: Progress | None
+    propose: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
 
     def run(self, search: bool) -> Diagnosis:
@@ -134,7 +137,7 @@ class _Work:
             seed=self.seed,
         )
         found = self._timed("confirmation", lambda: self._confirmed(found))
-        diagnosis = self._timed("report", lambda: answer(found, self._tell))
+        diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 

@@ -15,7 +15,7 @@ class TorqueRipple(NamedTuple):
         Quantity("%", 0, 1, "servo motors' data sheets: at most 1 of the torque", 0.0, usual=1),
     ]
     periods: Annotated[
-        float, Quantity("1", 1, 60, "assumption: 24 a turn, slots or commutator bars", usual=24)
+        float, Quantity("1", 4, 60, "assumption: 24 a turn, slots or commutator bars", usual=24)
     ]
     phase: Annotated[
         float, Quantity("deg", -180, 180, "where the motor happens to stand: 0", usual=0)

@@ -1,0 +1,57 @@
+"""Standard errors that a model a little wrong does not make too small.
+
+The curvature of chi-square alone says how sure parameters are if nothing is left but noise. What is
+left of a real rig is slow too, and pulls at parameters for seconds together. So the pull of
+stretches of time is looked at, of a second and of whole trials (the sandwich of Huber and White, by
+clusters), and the largest error of the three counts.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.evidence import PIECE_S
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.suspects import Suspect
+
+Array = NDArray[np.float64]
+
+STRETCH_S = 1.0
+"""Length of a stretch of time (s)."""
+
+LEAST_TRIALS = 4
+"""Fewer trials than this say nothing of how parameters scatter between them."""
+
+
+def covariance(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Array:
+    """Covariance of a fit's parameters, shape (p, p), at the door.
+
+    Correlations are those of the curvature; errors are the largest that it, stretches or trials
+    give.
+    """
+    evidence = bench.evidence(fit.model, chosen)
+    pieces = evidence.pieces(fit.values, fit.steps)
+    if pieces is None:
+        return fit.covariance
+    known = np.isfinite(np.diag(fit.covariance))
+    pulls = pieces.products[:, 1:, 0][:, known]
+    inverse = fit.covariance[np.ix_(known, known)]
+    squares = np.diag(inverse).copy()
+    trials = len(bench.trials)
+    order = np.arange(len(pulls)) - np.searchsorted(pieces.trial, pieces.trial)
+    stretch = order // round(STRETCH_S / PIECE_S)
+    clusters = [pieces.trial * (stretch.max() + 1) + stretch]
+    if trials >= LEAST_TRIALS:
+        clusters.append(pieces.trial)
+    for cluster in clusters:
+        _, index = np.unique(cluster, return_inverse=True)
+        count = int(index.max()) + 1
+        summed = np.zeros((count, pulls.shape[1]))
+        np.add.at(summed, index, pulls)
+        moves = summed @ inverse
+        squares = np.maximum(squares, count / (count - 1.0) * np.sum(moves**2, axis=0))
+    found = fit.covariance.copy()
+    wider = np.ones(len(known))
+    wider[known] = np.sqrt(squares / np.diag(inverse))
+    return found * np.outer(wider, wider)
