@@ -4,6 +4,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,9 @@ from benchmarks.hidden_effects.verdicts import Outcome, compare, unanswered
 Z = 1.959964
 """Of a 95 % interval."""
 
+
+SIZES = (0.0, 0.25, 0.4, 0.7, 1.0, 1.5, 2.5, 100.0)
+"""Edges of the ranges of r that rates are counted in."""
 
 LEAST_ROUNDS = 2
 """Rounds that a mean counts to, at least: a way that ended before did not settle later."""
@@ -102,6 +106,7 @@ def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "verdicts": dict(Counter(outcome.verdict for outcome in some).most_common()),
         "confusion": _confusion(some),
         "by_effect": _by_effect(some),
+        "by_size": _by_size(some),
         "gap_closed": _gap_closed(name, some),
         "sizes": _sizes(some),
         "seconds": _seconds(some),
@@ -129,6 +134,22 @@ def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
     for outcome in some:
         found.setdefault(outcome.hidden, Counter())[outcome.said] += 1
     return {name: dict(said.most_common()) for name, said in sorted(found.items())}
+
+
+def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """How often effects alone were named, named or their group, and detected, by ranges of r."""
+    alone = [outcome for outcome in some if len(outcome.truth) == 1 and outcome.ratio is not None]
+    rows = []
+    for low, high in pairwise(SIZES):
+        those = [each for each in alone if low <= (each.ratio or 0.0) < high]
+        if those:
+            counted = {
+                "named": rate(each.right for each in those),
+                "named or its group": rate(each.near for each in those),
+                "detected": rate(each.detected for each in those),
+            }
+            rows.append({"low": low, "high": high, **counted})
+    return rows
 
 
 def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:

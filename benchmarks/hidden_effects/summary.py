@@ -103,6 +103,8 @@ def _own(figures: dict[str, Any]) -> list[Block]:
     blocks: list[Block] = [Paragraph(words), _confusion(figures["confusion"])]
     if figures["by_effect"]:
         blocks.append(_by_effect(figures["by_effect"]))
+    if len(figures["by_size"]) > 1:
+        blocks.append(_by_size(figures["by_size"]))
     if figures["sizes"]["by_parameter"]:
         blocks.append(_sizes(figures["sizes"]["by_parameter"]))
     if figures["by_kind"]:
@@ -133,6 +135,15 @@ def _by_effect(effects: dict[str, Any]) -> TextTable:
         [name, *(percent(figures[kind]) for kind in kinds)] for name, figures in effects.items()
     ]
     return TextTable("By effect", ["hidden", *kinds], rows)
+
+
+def _by_size(ranges: list[dict[str, Any]]) -> TextTable:
+    kinds = ["named", "named or its group", "detected"]
+    rows = [
+        [f"{each['low']:g} to {each['high']:g}", *(percent(each[kind]) for kind in kinds)]
+        for each in ranges
+    ]
+    return TextTable("By size r of what is hidden", ["r", *kinds], rows)
 
 
 def _sizes(parameters: dict[str, Any]) -> TextTable:

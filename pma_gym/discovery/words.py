@@ -211,10 +211,13 @@ def what_to_do(diagnosis: Diagnosis) -> list[str]:
 
 
 def _use_effect(diagnosis: Diagnosis) -> list[str]:
-    steps = [
-        "Use the amended model, `model.toml` beside this page: "
-        '`gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
-    ]
+    steps = ["Use the amended model, `model.toml` beside this page"]
+    # The environments' tasks are a muscle's.
+    steps[0] += (
+        ': `gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
+        if diagnosis.model.plant == "station"
+        else ': `Plant(load_model("model.toml")).simulate(trial)`.'
+    )
     for effect in diagnosis.effects:
         if effect.confused_with:
             rivals = effect_names(effect.confused_with, "or")
