@@ -13,6 +13,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
+from benchmarks.measured.blind import Proposal, Undecidable, undecidable
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
@@ -41,11 +42,15 @@ five."""
 UNSEEN_KPA = (200.0, 275.0, 350.0, 450.0, 550.0)
 """Pressures on which every step is judged."""
 
-LOADS_N = (150.0, 450.0, 900.0)
-"""Loads of I3 that are diagnosed; all twelve are judged on."""
+LOADS_N = (150.0, 450.0, 900.0), None
+"""Loads of I3 that are diagnosed, at first and when nothing more shows in these: all twelve, which
+are judged on too."""
 
-REPEATS = (1, 3)
-"""Repeats that are diagnosed: the first, rested, and the last, worked; all three are judged on."""
+REPEATS = (1, 3), None
+"""Repeats that are diagnosed: the first, rested, and the last, worked; then all three."""
+
+FITTED_N, FITTED_REPEATS = (75.0, 150.0, 300.0, 450.0, 675.0, 900.0), (1, 3)
+"""Loads and repeats that the models are fitted to that are judged."""
 
 I2_EVERY = 12
 """Every how many rows of I2 are diagnosed: they tell no more than how the pressure reads."""
@@ -63,6 +68,8 @@ class Measured:
         steps: models with one effect more at a time.
         folds: rms errors of all effects with every pressure left out once, by figure.
         floors: scatter between repeats, by figure.
+        blind: effects that I2 and I3 cannot tell beside the amended model.
+        proposals: experiments that would show them.
         reverse: what explains the misfit of the identified station in tables 21-30, round by round.
         held: models against the validation under triangular pressure.
         seconds: computing time of the whole job (s).
@@ -73,6 +80,8 @@ class Measured:
     steps: list[Step]
     folds: dict[str, float]
     floors: dict[str, float]
+    blind: list[Undecidable]
+    proposals: list[Proposal]
     reverse: list[list[Explanation]]
     held: list[Held]
     seconds: float
@@ -98,10 +107,10 @@ def run_measured(
     """
     console, begun = console or Console(), time.perf_counter()
     folder, given = out / "stages", load_model(GIVEN)
-    data = diagnosed(DIAGNOSED_KPA)
+    few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
     with _bar(console) as tell:
         found, amended = rounds(
-            data,
+            (few, more),
             given,
             folder,
             seed,
@@ -115,7 +124,7 @@ def run_measured(
             given,
             amended,
             effects,
-            (data, *judged),
+            (diagnosed(DIAGNOSED_KPA), *judged),
             folder,
             jobs,
             lambda done, total: tell("effect by effect", done, total),
@@ -129,12 +138,26 @@ def run_measured(
             jobs,
             lambda done, total: tell("pressures left out", done, total),
         )
+        final = load_model(folder / f"step_{len(stepped) - 1}.toml")
+        blind, proposals = undecidable(
+            final, few, jobs, seed, lambda done, total: tell("what cannot be told", done, total)
+        )
         reverse = _reverse(folder, lambda done, total: tell("the reverse", done, total))
-    final = load_model(folder / f"step_{len(stepped) - 1}.toml")
     models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
     held = held_against(models, given)
     seconds = time.perf_counter() - begun
-    result = Measured(found, stepped, left_out, floors(), reverse, held, seconds, _settings(seed))
+    result = Measured(
+        found,
+        stepped,
+        left_out,
+        floors(),
+        blind,
+        proposals,
+        reverse,
+        held,
+        seconds,
+        _settings(seed),
+    )
     write_text(out / "model.toml", stepped[-1].model)
     write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
     write_text(out / "measured.html", measured_page(result))
@@ -157,9 +180,13 @@ def _reverse(folder: Path, progress: Callable[[int, int], None]) -> list[list[Ex
     return found
 
 
-def diagnosed(pressures_kpa: Sequence[float]) -> Dataset:
-    """The trials of some pressures that are diagnosed."""
-    return measured_dataset(pressures_kpa, LOADS_N, REPEATS, I2_EVERY)
+def diagnosed(
+    pressures_kpa: Sequence[float],
+    loads_n: Sequence[float] | None = FITTED_N,
+    repeats: Sequence[int] | None = FITTED_REPEATS,
+) -> Dataset:
+    """The trials of some pressures, loads and repeats that are diagnosed, or fitted to."""
+    return measured_dataset(pressures_kpa, loads_n, repeats, I2_EVERY)
 
 
 def judged_at(pressures_kpa: Sequence[float]) -> Dataset:
@@ -187,7 +214,7 @@ def write_trials(folder: Path) -> int:
     Returns:
         How many trials.
     """
-    data = diagnosed(DIAGNOSED_KPA)
+    data = diagnosed(DIAGNOSED_KPA, None, None)
     lines = [f'title = "{data.title}"', f'model = "{data.model}"']
     for each in data.trials:
         write_text(folder / each.name, encode_trial(each.trial, each.name).decode())

@@ -6,11 +6,13 @@ import numpy as np
 
 from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.tables import (
+    BLIND_HEADER,
     COLUMNS,
     HELD_HEADER,
     REPLAY_HEADER,
     REVERSE_HEADER,
     TARGET_MM,
+    blind_rows,
     error_rows,
     experiment_words,
     held_rows,
@@ -60,7 +62,7 @@ def _blocks(result: "Measured") -> list[Block]:
         ),
         TextTable(
             "The diagnoses, one after the other",
-            ("round", "verdict", "added", "p", "explains as much"),
+            ("round", "trials", "verdict", "added", "p", "explains as much"),
             round_rows(result.rounds),
             words=3,
         ),
@@ -77,7 +79,16 @@ def _blocks(result: "Measured") -> list[Block]:
         title = f"{label}: mean absolute error ({unit}, slope in {unit}/s)"
         blocks.append(TextTable(title, REPLAY_HEADER, replay_rows(result, phase)))
     blocks.append(Heading("What these tables cannot tell"))
-    blocks += [Paragraph(words) for words in experiment_words(result.rounds)]
+    blocks.append(
+        TextTable(
+            "Effects that these tables would not show at their usual size, beside the amended "
+            "model",
+            BLIND_HEADER,
+            blind_rows(result),
+            words=2,
+        )
+    )
+    blocks += [Paragraph(words) for words in experiment_words(result)]
     blocks += _reverse_blocks(result)
     return blocks
 

@@ -134,10 +134,10 @@ def _with(model: Model, found: Explanation) -> Model:
     return model.replace(found.values)
 
 
-def alike(found: Sequence[Explanation]) -> list[str]:
+def alike(found: Sequence[Explanation]) -> list[Explanation]:
     """Explanations that cannot be told from the best."""
     least = min(each.left_out_mm for each in found)
-    return [each.name for each in found if each.left_out_mm <= LIKE * least]
+    return [each for each in found if each.left_out_mm <= LIKE * least]
 
 
 def _reaches(suspect: Suspect) -> bool:

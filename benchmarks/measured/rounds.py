@@ -13,8 +13,11 @@ from pma_gym.discovery.journal import digest
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.model import Model, dump_model, load_model
 
-MOST_ROUNDS = 5
+MOST_ROUNDS = 6
 """Most diagnoses, one after the other."""
+
+MOST_RIVALS = 8
+"""How many candidates of a round are kept."""
 
 ADDED = "added to the model"
 """What a diagnosis says of a candidate that is in its amended model."""
@@ -27,10 +30,10 @@ class Round:
     """One diagnosis.
 
     Attributes:
+        trials: how many trials it saw.
         verdict: its verdict.
         sentence: its answer in words.
         effects: effects that it added, in order.
-        confused_with: others that explain as much, by effect.
         p_values: family-wise, by effect.
         rivals: the candidates that came next: name, gain in log-likelihood, p-value, reason.
         blind: effects that these trials would not show at their usual size.
@@ -39,10 +42,10 @@ class Round:
         seconds: by step.
     """
 
+    trials: int
     verdict: str
     sentence: str
     effects: tuple[str, ...]
-    confused_with: Mapping[str, Sequence[str]]
     p_values: Mapping[str, float]
     rivals: Sequence[Sequence[Any]]
     blind: tuple[str, ...]
@@ -52,7 +55,7 @@ class Round:
 
 
 def rounds(
-    data: Dataset,
+    data: Sequence[Dataset],
     given: Model,
     folder: Path,
     seed: int,
@@ -60,10 +63,10 @@ def rounds(
     progress: Callable[[int], Progress],
     most: int = MOST_ROUNDS,
 ) -> tuple[list[Round], Model]:
-    """Diagnose until nothing more is found.
+    """Diagnose until nothing more is found, first in few trials, then in more.
 
     Args:
-        data: the trials.
+        data: sets of trials, the smallest first: what is large shows in few, and is found sooner.
         given: the model to begin with.
         folder: where finished rounds and fits are kept, from which an interrupted job goes on.
         seed: of simulated chance.
@@ -75,12 +78,13 @@ def rounds(
     """
     found: list[Round] = []
     model = given
-    while len(found) < most:
-        number = len(found) + 1
-        each, model = _round(data, model, folder, seed, jobs, progress(number), number)
-        found.append(each)
-        if not each.effects:
-            break
+    for some in data:
+        while len(found) < most:
+            number = len(found) + 1
+            each, model = _round(some, model, folder, seed, jobs, progress(number), number)
+            found.append(each)
+            if not each.effects:
+                break
     return found, model
 
 
@@ -103,14 +107,14 @@ def _round(
     diagnosis = diagnose(
         data, model, seed=seed, jobs=jobs, journal=folder / "journal", progress=progress
     )
-    found = round_of(diagnosis)
+    found = round_of(diagnosis, len(data))
     write_text(amended, dump_model(diagnosis.model if found.effects else model))
     write_text(stage, json.dumps({"asked": asked, **asdict(found)}, indent=1))
     # As it is read again, so that a job that goes on ends as one that was not interrupted.
     return found, load_model(amended)
 
 
-def round_of(diagnosis: Diagnosis) -> Round:
+def round_of(diagnosis: Diagnosis, trials: int) -> Round:
     """What a diagnosis found.
 
     A diagnosis that says `unknown`, because a law without a shape of its own explains even more,
@@ -123,14 +127,14 @@ def round_of(diagnosis: Diagnosis) -> Round:
     ordered += [name for name in added if name not in named]
     experiment = diagnosis.next_experiment
     return Round(
+        trials=trials,
         verdict=diagnosis.verdict,
         sentence=diagnosis.sentence,
         effects=tuple(ordered) if kept else (),
-        confused_with={name: tuple(each.confused_with) for name, each in named.items()},
         p_values={each.name: each.p_value for each in diagnosis.candidates if each.name in added},
         rivals=[
             (each.name, each.delta_log_likelihood, each.p_value, each.why)
-            for each in diagnosis.candidates[:8]
+            for each in diagnosis.candidates[:MOST_RIVALS]
         ],
         blind=tuple(diagnosis.blind),
         next_experiment=None

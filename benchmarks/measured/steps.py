@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from benchmarks.files import write_text
-from benchmarks.measured.held_out import FIGURES, Rig, limit_errors, rms, worked
+from benchmarks.measured.held_out import AT_LOAD, FIGURES, Rig, limit_errors, rms, worked
 from benchmarks.measured.replays import Replay, replays
 from pma_gym.data.dataset import Dataset
 from pma_gym.discovery.journal import digest
@@ -64,7 +64,7 @@ def steps(
     for number, name in enumerate(names):
         progress(number, len(names))
         some = tuple(effects[: max(number - 1, 0)])
-        asked = digest(trials, amended, f"steps 1 {name} {some}")
+        asked = digest(trials, amended, f"steps 2 {name} {some}")
         kept = _kept(folder / f"step_{number}.json", asked)
         if kept is None:
             model = given if name == AS_GIVEN else _fitted(rig, some, amended)
@@ -96,8 +96,8 @@ def folds(
         jobs: threads.
         progress: called with what is done and the total.
     """
-    squares = {name: 0.0 for name in FIGURES}
-    counts = dict.fromkeys(FIGURES, 0)
+    names = (*FIGURES, AT_LOAD)
+    squares, counts = dict.fromkeys(names, 0.0), dict.fromkeys(names, 0)
     for number, group in enumerate(groups):
         progress(number, len(groups))
         fitted, judged = data_of(group)
@@ -106,7 +106,7 @@ def folds(
             squares[name] += float(errors @ errors)
             counts[name] += len(errors)
     progress(len(groups), len(groups))
-    return {name: (squares[name] / counts[name]) ** 0.5 for name in FIGURES}
+    return {name: (squares[name] / counts[name]) ** 0.5 for name in names}
 
 
 def _fitted(rig: Rig, effects: Sequence[str], begun: Model) -> Model:

@@ -18,11 +18,15 @@ TARGET_MM = 1.0
 
 COLUMNS = (
     ("extension_mm", "extension (mm)"),
+    ("extension_at_load_mm", "at measured load (mm)"),
     ("rotation_deg", "rotation (deg)"),
     ("return_mm", "return (mm)"),
     ("return_deg", "return rotation (deg)"),
 )
 """Figures and their headings."""
+
+WIDTH = 120
+"""Columns of text where there is no terminal."""
 
 Rows = list[tuple[str, ...]]
 
@@ -37,12 +41,20 @@ def round_rows(found: Sequence[Round]) -> Rows:
     rows = []
     for number, each in enumerate(found, 1):
         if not each.effects:
-            rows.append((str(number), each.verdict, "nothing", "", ""))
+            rows.append((str(number), str(each.trials), each.verdict, "nothing", "", ""))
         for name in each.effects:
-            others = ", ".join(readable(other) for other in each.confused_with.get(name, ()))
+            others = ", ".join(map(readable, equals(each, name)))
             chance = f"{each.p_values[name]:.2g}" if name in each.p_values else ""
-            rows.append((str(number), each.verdict, readable(name), chance, others))
+            rows.append(
+                (str(number), str(each.trials), each.verdict, readable(name), chance, others)
+            )
     return rows
+
+
+def equals(found: Round, name: str) -> list[str]:
+    """Effects that explain a round's trials as well as one that it added."""
+    words = f"explains these data as well as {name}"
+    return [other for other, _, _, why in found.rivals if why == words]
 
 
 def error_rows(result: "Measured") -> Rows:
@@ -102,19 +114,26 @@ MOST_SHOWN = 8
 def reverse_words(result: "Measured") -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
     for found in result.reverse:
-        before = next(each.left_out_mm for each in found if each.name == NOTHING)
-        best, others = found[0], [name for name in alike(found) if name != found[0].name]
-        if best.name == NOTHING or best.left_out_mm > GAIN * before:
+        plain = next(each for each in found if each.name == NOTHING)
+        best, others = found[0], [each for each in alike(found) if each is not found[0]]
+        if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
             yield (
-                f"Nothing further explains a tenth of the {before:.2f} mm that are left at "
-                "pressures left out."
+                f"Nothing further explains a tenth of the {plain.left_out_mm:.2f} mm that are left "
+                "at pressures left out."
             )
             continue
-        told = f" Not told from it: {', '.join(map(readable, others))}." if others else ""
+        told = ", ".join(_costs(each, plain) for each in others)
         yield (
-            f"{readable(best.name)} explains it best: {before:.2f} mm before, "
-            f"{best.left_out_mm:.2f} mm at pressures left out.{told}"
+            f"Of {plain.left_out_mm:.2f} mm, {_costs(best, plain)} leaves {best.left_out_mm:.2f} "
+            "mm at pressures left out, the least."
+            + (f" As good within 15 %: {told}." if told else "")
         )
+
+
+def _costs(each: Explanation, plain: Explanation) -> str:
+    """Its name, and whether it is bought with an error elsewhere."""
+    spoils = each.displacement_mm > 1.1 * plain.displacement_mm
+    return readable(each.name) + (" (but worse in displacement)" if spoils else "")
 
 
 def held_rows(result: "Measured") -> Rows:
@@ -134,33 +153,50 @@ def held_rows(result: "Measured") -> Rows:
 
 HELD_HEADER = (
     *("figure", "model", "stroke (mm)", "measured (mm)"),
-    *("from the dissertation's model, rms (mm)", "that model from the measurement, rms (mm)"),
+    *("from serres2008, rms (mm)", "serres2008 printed, rms (mm)"),
 )
 
 REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
 
 
-def experiment_words(found: Sequence[Round]) -> list[str]:
-    """What these data could not show, and what to measure, in words."""
-    last = found[-1]
-    words = [
-        f"Blind: at its usual size, {', '.join(map(readable, last.blind)) or 'no effect'} would "
-        "not show in these trials."
-    ]
-    for number, each in enumerate(found, 1):
+def experiment_words(result: "Measured") -> list[str]:
+    """What to measure next, in words."""
+    words = []
+    for number, each in enumerate(result.rounds, 1):
         following = each.next_experiment
         if following is not None:
-            separates = ", ".join(readable(name) for name in following["separates"])
+            separates = " and ".join(readable(name) for name in following["separates"])
             words.append(
-                f"Round {number} proposes: {following['protocol']} (to tell {separates} apart, "
-                f"expected odds {following['expected_odds']:.3g})."
+                f"Round {number} proposes, to tell {separates} apart: {following['protocol']}."
             )
+    for number, each in enumerate(result.proposals, 1):
+        shows = ", ".join(map(readable, each.shows))
+        words.append(
+            f"Experiment {number} ({each.minutes:.2g} min): {each.protocol}. It would show {shows}."
+        )
     return words
+
+
+def blind_rows(result: "Measured") -> Rows:
+    """Effects that these tables cannot tell, and which experiment would."""
+    return [
+        (
+            readable(each.name),
+            "undecidable",
+            "at no size" if each.shows_from is None else f"{each.shows_from:.2g}",
+            "none of these" if each.experiment is None else str(each.experiment),
+        )
+        for each in sorted(result.blind, key=lambda e: e.shows_from or 1e99)
+    ]
+
+
+BLIND_HEADER = ("effect", "verdict", "shows from, times its usual size", "shown by experiment")
 
 
 def print_measured(result: "Measured", console: Console) -> None:
     """All of it as tables."""
-    header = ("round", "verdict", "added", "p", "explains as much")
+    console = console if console.is_terminal else Console(file=console.file, width=WIDTH)
+    header = ("round", "trials", "verdict", "added", "p", "explains as much")
     _print(console, "Diagnoses of I2 and I3", header, round_rows(result.rounds))
     names = tuple(label for _, label in COLUMNS)
     title = "Table I3 at pressures that took no part: rms error, from the commands alone"
@@ -176,7 +212,8 @@ def print_measured(result: "Measured", console: Console) -> None:
     for line in reverse_words(result):
         console.print(line, highlight=False)
     _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))
-    for line in (*experiment_words(result.rounds), *verdict_words(result)):
+    _print(console, "What I2 and I3 cannot tell", BLIND_HEADER, blind_rows(result))
+    for line in (*experiment_words(result), *verdict_words(result)):
         console.print(line, highlight=False)
 
 
