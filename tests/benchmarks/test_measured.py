@@ -1,16 +1,23 @@
 """The dissertation's tables as trials, their diagnosis in rounds, and the reverse."""
 
+from io import StringIO
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from benchmarks.measured import rounds as of_rounds
+from benchmarks.measured.blind import Proposal, Undecidable
 from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, worked
-from benchmarks.measured.job import DIAGNOSED_KPA, UNSEEN_KPA, diagnosed, write_trials
-from benchmarks.measured.reverse import Summary
-from benchmarks.measured.rounds import ADDED, rounds
+from benchmarks.measured.job import DIAGNOSED_KPA, UNSEEN_KPA, Measured, diagnosed, write_trials
+from benchmarks.measured.pages import measured_page
+from benchmarks.measured.reverse import NOTHING, Explanation, Summary
+from benchmarks.measured.rounds import ADDED, Round, rounds
+from benchmarks.measured.steps import Step
+from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
 from benchmarks.measured.trials import measured_dataset
+from benchmarks.measured.triangles import TRIANGLES, Held
 from pma_gym.data.dataset import read_dataset
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial_files import TrialWarning
@@ -161,3 +168,62 @@ def test_a_pulley_of_another_size_is_found_in_the_summaries():
     found = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
     assert found.values[path] == pytest.approx(28.0, abs=0.05)
     assert found.left_out_mm < 0.05
+
+
+def test_strokes_of_the_printed_validation():
+    """1.94 mm is 17 % of 11.1 to 11.8 mm; table 2's model moves (F_ce - L) / K, 11.9 mm."""
+    low, high = TRIANGLES[0].stroke_mm
+    assert low < 1.94 / 0.17 < high
+    contraction = 1e3 * TRIANGLES[0].contraction(load_model("serres2008"))
+    still = [
+        (2.91 * p + 44.6 - 150.0) / (32.7 - 0.0321 * p) for p in (150.0, 250.0)
+    ]  # mm, without lag, damping and friction
+    assert still[0] - 0.1 < contraction.min()
+    assert contraction.max() < still[1] + 0.1
+    assert np.ptp(contraction) > 0.8 * (still[1] - still[0])
+
+
+def step(name, effects, error):
+    figures = {key: error for key, _ in COLUMNS}
+    phases = [
+        {"phase": phase, "slope": 0.1, "intercept": 0.2, "mean": error, "mean_signed": -error,
+         "rmse": 0.3, "trials": 9}
+        for phase in ("displacement", "I", "II", "III")
+    ]  # fmt: skip
+    return Step(name, effects, figures, figures, phases, "")
+
+
+def test_the_page_and_the_tables_say_what_was_found():
+    explained = [
+        Explanation("rotor.radius_mm", {"rotor.radius_mm": 29.7}, 1.0, 1.1, 0.5, 1.2),
+        Explanation("creep", {}, 1.1, 1.2, 0.9, 1.3),
+        Explanation(NOTHING, {}, 2.4, 2.4, 0.5, 2.8),
+    ]
+    found = Measured(
+        rounds=[
+            Round(47, "effect", "It is creep.", ("creep",), {"creep": 0.001},
+                  [("hysteresis", 5.0, 0.001, "explains these data as well as creep")],
+                  (), None, {}),
+            Round(47, "agrees", "Nothing more.", (), {}, [], (), None, {}),
+        ],
+        steps=[step("as given", (), 9.9), step("creep", ("creep",), 0.7)],
+        folds={key: 0.8 for key, _ in COLUMNS},
+        floors={key: 0.6 for key, _ in COLUMNS},
+        blind=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
+        proposals=[Proposal("pressure steps", ("regulator_delay",), 0.2)],
+        reverse=[explained],
+        held=[Held(28, "station", 17.2, (11.1, 11.8), 1.7, 1.94)],
+        seconds=1.0,
+        settings={"model": "serres2008"},
+    )  # fmt: skip
+    said = StringIO()
+    print_measured(found, Console(file=said))
+    page = measured_page(found)
+    for text in (said.getvalue(), page):
+        assert "target 1 mm: met" in text
+        assert "regulator delay" in text
+        assert "undecidable" in text
+        assert "hysteresis" in text
+    words = " ".join(reverse_words(found))
+    assert "rotor.radius mm leaves 1.10 mm" in words
+    assert "creep (but worse in displacement)" in words
