@@ -16,6 +16,10 @@ MISS = 0.05
 """Share of a step that a reading may miss a whole one by; over all steps between the least and the
 largest reading, of which there are at least as many as differ, that is what the step may be off."""
 
+HIDDEN = 1.0
+"""How many steps of noise (standard deviation) hide a step: from half of one on, what rounding adds
+to a reading is noise like any other. What is known of a noise has the rounding in it."""
+
 CHANCE = 0.1
 """Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make
 the step; every other that differs from them has to keep to it."""
@@ -25,7 +29,7 @@ def coarse_sensors(floors: Sequence[Level]) -> tuple[NamedEffect, ...]:
     """One effect with the steps of all coarse sensors; none where there are none."""
     steps, others = {}, 0
     for name, floor in zip(OUTPUTS, floors, strict=True):
-        if floor.step > COARSER * floor.expected_step:
+        if floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN):
             column = BY_QUANTITY[name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from pma_gym.data.dataset import NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.floors import initial_floors
+from pma_gym.discovery.floors import Level, initial_floors
 from pma_gym.discovery.noise import (
     FIRST_REST_S,
     REST_S,
@@ -19,6 +19,7 @@ from pma_gym.discovery.noise import (
     step_between,
     white_noise,
 )
+from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.plant import sensors
 from pma_gym.plant.logged import Logged
 from tests.discovery.laboratory import LEVELS, STATION, measured
@@ -201,3 +202,12 @@ def test_noise_of_a_few_readings_comes_from_repeats():
     level = initial_floors(STATION, read, named)[0]
     assert level.source == "repeats"
     assert level.level == pytest.approx(0.6e-3, rel=0.1)
+
+
+@pytest.mark.parametrize(("level", "coarse"), [(0.3e3, True), (2.3e3, False)])
+def test_a_step_that_noise_hides_makes_no_sensor_coarse(level, coarse):
+    """Whole kPa in a file are nothing to a signal that scatters by more."""
+    known = Level(level, "repeats", {}, 1e3, 0.479e3, 40)
+    fine = Level(1.0, "rest segments", {}, 0.0, 1.0, 40)
+    found = coarse_sensors([fine, fine, fine, known])
+    assert [each.name for each in found] == (["sensor_quantisation"] if coarse else [])
