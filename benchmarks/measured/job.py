@@ -42,15 +42,14 @@ five."""
 UNSEEN_KPA = (200.0, 275.0, 350.0, 450.0, 550.0)
 """Pressures on which every step is judged."""
 
-LOADS_N = (150.0, 450.0, 900.0), None
-"""Loads of I3 that are diagnosed, at first and when nothing more shows in these: all twelve, which
-are judged on too."""
+FITTED_N, FITTED_REPEATS = (75.0, 150.0, 300.0, 450.0, 675.0, 900.0), (1, 3)
+"""Loads and repeats of I3 that the models are fitted to that are judged; all are judged on."""
+
+LOADS_N = (150.0, 450.0, 900.0), FITTED_N
+"""Loads that are diagnosed, at first and when nothing more shows in these."""
 
 REPEATS = (1, 3), None
 """Repeats that are diagnosed: the first, rested, and the last, worked; then all three."""
-
-FITTED_N, FITTED_REPEATS = (75.0, 150.0, 300.0, 450.0, 675.0, 900.0), (1, 3)
-"""Loads and repeats that the models are fitted to that are judged."""
 
 I2_EVERY = 12
 """Every how many rows of I2 are diagnosed: they tell no more than how the pressure reads."""
@@ -214,7 +213,7 @@ def write_trials(folder: Path) -> int:
     Returns:
         How many trials.
     """
-    data = diagnosed(DIAGNOSED_KPA, None, None)
+    data = diagnosed(DIAGNOSED_KPA, LOADS_N[-1], REPEATS[-1])
     lines = [f'title = "{data.title}"', f'model = "{data.model}"']
     for each in data.trials:
         write_text(folder / each.name, encode_trial(each.trial, each.name).decode())

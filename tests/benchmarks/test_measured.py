@@ -90,7 +90,7 @@ def test_written_trials_are_read_again(tmp_path):
     count = write_trials(tmp_path / "trials")
     with pytest.warns(TrialWarning, match="not measured"):
         data = read_dataset(tmp_path / "trials")
-    assert len(data) == count == 6 * 36 + 36 + 5
+    assert len(data) == count == 6 * 18 + 18 + 5
     assert data.model == "serres2008"
     one = named(data, "I3_150kPa_150N_3.csv")
     assert one.repeat_of == "I3_150kPa_150N_1.csv"
