@@ -113,16 +113,16 @@ def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
     """
     loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
     found = _errors(model, loaded, [each.trial for each in loaded])
-    at_load = _errors(model, loaded, [_at_measured_load(each.trial) for each in loaded])
+    at_load = _errors(model, loaded, [_at_measured_load(each.trial, model) for each in loaded])
     return {**found, AT_LOAD: at_load["extension_mm"]}
 
 
-def _at_measured_load(trial: Trial) -> Trial:
+def _at_measured_load(trial: Trial, model: Model) -> Trial:
     """A trial of I3 whose drive gives the load that was measured in place of the usual one."""
-    volts = trial.commands["motor_voltage"]
-    load = trial.measurements["load"][LOADED] * volts / volts.max()
-    commands = {"load_command": load, "regulator_voltage": trial.commands["regulator_voltage"]}
-    return Trial(trial.time, commands, trial.measurements)
+    volts, drive = trial.commands["motor_voltage"], model.parameters["drive"]
+    needed = (trial.measurements["load"][LOADED] - drive.offset) / drive.gain
+    scaled = np.clip(needed, 0.0, 10.0) * volts / volts.max()
+    return Trial(trial.time, {**trial.commands, "motor_voltage": scaled}, trial.measurements)
 
 
 def _errors(
