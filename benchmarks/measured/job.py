@@ -71,7 +71,7 @@ class Measured:
         proposals: experiments that would show them.
         reverse: what explains the misfit of the identified station in tables 21-30, round by round.
         held: models against the validation under triangular pressure.
-        seconds: computing time of the whole job (s).
+        seconds: how long this run took (s), without stages kept from an earlier one.
         settings: what was diagnosed.
     """
 

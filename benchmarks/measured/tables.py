@@ -231,7 +231,7 @@ def verdict_words(result: "Measured") -> Iterator[str]:
         f"Rotation: {first.unseen['rotation_deg']:.2f} deg as given, "
         f"{last.unseen['rotation_deg']:.2f} deg; repeats {result.floors['rotation_deg']:.2f} deg."
     )
-    yield f"Computed in {result.seconds:.0f} s."
+    yield f"This run took {result.seconds:.0f} s; stages kept from an earlier one are not counted."
 
 
 def _label(name: str) -> str:
