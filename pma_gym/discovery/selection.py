@@ -223,9 +223,10 @@ def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
 def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
     """Whether what a fit leaves is surely no noise, whatever effects there are.
 
-    Not beside a coarse sensor, whose rounding follows the motion.
+    Not beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts are
+    taken from readings, so that what is left remembers their noise.
     """
-    if bench.coarse:
+    if bench.coarse or bench.given.plant == "slide":
         return False
     left = residuals(bench.evidence(fit.model, chosen), fit)
     rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))

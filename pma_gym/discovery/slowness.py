@@ -41,9 +41,11 @@ def leftover(found: Findings) -> Left:
     before = _slow(found, begun)
     evidence = selection.bench.evidence(selection.fit.model, selection.chosen)
     after = _slow(found, residuals(evidence, selection.fit))
-    # What may be chance before has no share afterwards; of a few readings no memory is known.
+    # What may be chance before has no share afterwards. Of a few readings no memory is known, and
+    # a slide's starts are taken from readings, whose noise it remembers.
     seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
-    there = (before[1] > 0.0) | np.array(seldom)
+    free = found.given.plant == "slide"
+    there = (before[1] > 0.0) | np.array(seldom) | free
     shares = [
         float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0
         for then, now in zip(before, after, strict=True)

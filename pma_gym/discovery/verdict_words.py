@@ -6,6 +6,7 @@ from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
+from pma_gym.discovery.verdict import BLIND_SHARE
 from pma_gym.discovery.words import (
     effect_name,
     effect_names,
@@ -61,7 +62,7 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
             f"Model {name} misses something, but these {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
     best = diagnosis.candidates[0] if diagnosis.candidates else None
-    if best is not None and len(diagnosis.blind) < 0.5 * len(diagnosis.candidates):
+    if best is not None and len(diagnosis.blind) <= BLIND_SHARE * len(diagnosis.candidates):
         return (
             f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
             f"in too little of these {trials} to rule chance out"
