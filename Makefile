@@ -8,7 +8,7 @@ PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 
-EXTRAS = rl,discovery,mpc,view,files,symbolic,docs,dev
+EXTRAS = rl,discovery,mpc,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
 CORE = $(VENV)/.core-installed
 FULL = $(VENV)/.all-installed

@@ -1,5 +1,6 @@
 """Draws the pictures of README and documentation: `python docs/pictures.py`."""
 
+import json
 import os
 import re
 import tempfile
@@ -9,6 +10,7 @@ import gymnasium as gym
 import matplotlib.image
 
 import pma_gym  # noqa: F401 - registers the environments
+from benchmarks.hidden_effects.pictures import naming_picture
 from controllers import SerresReplay
 from pma_gym.data.dataset import read_dataset
 from pma_gym.discovery import diagnose
@@ -56,6 +58,16 @@ def draw_diagnosis() -> None:
         (IMAGES / f"diagnosis-{name}.png").write_bytes(picture)
 
 
+def draw_hidden_effects() -> None:
+    """How often an effect was named by its size, from the figures beside the documentation."""
+    kept = Path(__file__).parent / "figures"
+    blocks = json.loads((kept / "hidden-effects.json").read_text("utf-8"))["blocks"]
+    ranges = [*blocks["faint"]["by_size"], *blocks["single"]["by_size"]]
+    bound = json.loads((kept / "bound.json").read_text("utf-8"))["effects"]
+    (IMAGES / "diagnosis-naming.png").write_bytes(naming_picture(ranges, bound))
+
+
 if __name__ == "__main__":
     draw_station()
     draw_diagnosis()
+    draw_hidden_effects()

@@ -20,8 +20,11 @@ COLUMNS = (
     "a spurious second",
     "alarm, nothing hidden",
     "effect claimed, parameters off",
+    "unknown, outside the catalogue",
+    "a false name, outside the catalogue",
 )
-"""The first five over cases of block single, the others over those that hide no effect."""
+"""The first five over cases of block single, two over those that hide no effect, two over those
+that hide one which no catalogue has."""
 
 
 def compared(folder: Path, ways: Sequence[str]) -> dict[str, Any]:
@@ -51,6 +54,7 @@ def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:
     single = [each for each in some if each.block.startswith("single")]
     nothing = [each for each in some if each.block == "nothing"]
     parameters = [each for each in some if each.block == "parameters"]
+    outside = [each for each in some if each.block == "unknown"]
     hits = (
         [each.detected for each in single],
         [each.right for each in single],
@@ -59,6 +63,8 @@ def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:
         [each.spurious for each in single],
         [each.detected for each in nothing],
         [each.detected for each in parameters],
+        [each.verdict == "unknown" for each in outside],
+        [each.verdict == "effect" for each in outside],
     )
     seconds = [each.seconds for each in some if each.seconds is not None]
     return {

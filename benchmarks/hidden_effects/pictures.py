@@ -1,0 +1,54 @@
+"""Plots of what was named: against the size of the effect, beside the best that any test could."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from pma_gym.pages.figures import legend_below, picture, png
+
+NAMED, GROUP, DETECTED, BOUND = "#0072B2", "#009E73", "#D55E00", "#000000"
+"""Okabe and Ito's palette, as in the pictures of a diagnosis."""
+
+KINDS = (
+    ("named", NAMED, "o"),
+    ("named or its group", GROUP, "s"),
+    ("detected", DETECTED, "^"),
+)
+
+
+def naming_picture(
+    ranges: Sequence[Mapping[str, Any]], bound: Mapping[str, Any] | None = None
+) -> bytes:
+    """Rates over the size r of what is hidden, with Wilson's intervals, as PNG.
+
+    Args:
+        ranges: `by_size` of blocks of one hidden effect, see `scoring.count`.
+        bound: `effects` of `bound`'s JSON, whose mean over effects is drawn beside them.
+    """
+    with picture(6.4, 3.6) as drawn:
+        panel = drawn.subplots()
+        for shift, (kind, colour, marker) in zip((0.96, 1.0, 1.04), KINDS, strict=True):
+            rows = [each for each in ranges if each[kind]["n"]]
+            # A range is drawn at its middle by ratios; the first begins at 0.
+            at = [shift * np.sqrt(max(each["low"], 0.1) * min(each["high"], 4.0)) for each in rows]
+            rates = np.array([each[kind]["rate"] for each in rows])
+            below = rates - [each[kind]["low"] for each in rows]
+            above = np.array([each[kind]["high"] for each in rows]) - rates
+            bars = np.maximum(np.array([below, above]), 0.0)
+            panel.errorbar(
+                at, 100.0 * rates, 100.0 * bars, fmt=marker, color=colour, label=kind, capsize=3
+            )
+        if bound:
+            told = np.mean([each["told"] for each in bound.values()], axis=0)
+            ratios = next(iter(bound.values()))["r"]
+            style = {"color": BOUND, "linestyle": (0, (4, 2))}
+            panel.plot(ratios, 100.0 * told, label="best possible against one rival", **style)
+        panel.set_xscale("log")
+        panel.set_xticks([0.1, 0.2, 0.3, 0.5, 1.0, 2.0], ["0.1", "0.2", "0.3", "0.5", "1", "2"])
+        panel.minorticks_off()
+        panel.set_ylim(0.0, 103.0)
+        panel.set_xlabel("size r of the effect over the noise, after a refit without it")
+        panel.set_ylabel("cases (%)")
+        legend_below(drawn, panel.get_legend_handles_labels()[0], 4)
+        return png(drawn)
