@@ -20,6 +20,15 @@ from generators.environments import (
 )
 from generators.equations import equations, ports, written
 from generators.files import calibrations, columns, raw_columns, tables
+from generators.hidden_effects import (
+    hidden_bound,
+    hidden_cases,
+    hidden_misses,
+    hidden_rates,
+    hidden_rounds,
+    hidden_sizes,
+    hidden_ways,
+)
 from generators.models import differences, identification, misfit, parameters, shipped
 from generators.source import misprints, rates, verdicts, wrong_in_print
 from generators.suite import controllers, example, targets, trials, tuning
@@ -35,6 +44,8 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(misprints, rates, verdicts, wrong_in_print),
         *(controllers, example, targets, trials, tuning),
         *(suites, deals, occasional),
+        *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
+        *(hidden_ways, hidden_bound),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

@@ -37,6 +37,10 @@ DETERMINED = 0.7
 """A parameter whose standard error is a larger share of what was assumed of it beforehand is not
 determined by the data."""
 
+SILENT = 0.2
+"""Share of the catalogue that would not have shown, from which on an experiment that would show it
+is proposed although nothing seems to be missing."""
+
 
 def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
     """The diagnosis, with the next experiment if one is to be proposed."""
@@ -242,7 +246,8 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
                 for rival in equal
             ]
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
-    if verdict == "undecidable" and found.looks:
+    silent = verdict in ("parameters", "agrees") and len(blind) > SILENT * len(found.suspects)
+    if (verdict == "undecidable" or silent) and found.looks:
         dim = [look.suspect for look in found.looks if look.suspect.name in blind]
         if suspicious(found):
             dim = [look.suspect for look in found.looks[:3]]

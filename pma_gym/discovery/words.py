@@ -276,7 +276,11 @@ def _run_next(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     assert following is not None
     protocol = following.protocol[:1].lower() + following.protocol[1:]
-    return (
-        f"Run `next.csv` on the rig ({protocol}; {duration(following.minutes)}), "
-        "save its log into the data set under a name of its own, and diagnose again."
+    run = (
+        f"`next.csv` on the rig ({protocol}; {duration(following.minutes)}), save its log into the "
+        "data set under a name of its own, and diagnose again."
     )
+    if diagnosis.verdict in ("parameters", "agrees"):
+        shown = effect_names(following.separates, "or")
+        return f"These trials would not have shown {shown}. To rule that out, run {run}"
+    return f"Run {run}"

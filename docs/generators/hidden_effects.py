@@ -1,0 +1,111 @@
+"""Results of the diagnosis on hidden effects, from the figures that were kept of the runs."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from benchmarks.hidden_effects.summary import report_blocks
+from benchmarks.hidden_effects.tables import listed, percent
+from benchmarks.hidden_effects.ways.compared import COLUMNS
+from benchmarks.hidden_effects.ways.registry import WAYS
+from generators.text import code, table
+from pma_gym.pages.document import TextTable, to_markdown
+
+FIGURES = Path(__file__).parents[1] / "figures"
+
+
+def _read(name: str) -> dict[str, Any]:
+    return json.loads((FIGURES / f"{name}.json").read_text("utf-8"))
+
+
+def hidden_rates() -> str:
+    """Every figure with its target, block by block."""
+    tables = [each for each in report_blocks(_read("hidden-effects")) if _is_table(each)]
+    return to_markdown(tables[:1], {}, "")
+
+
+def hidden_cases(block: str) -> str:
+    """What was hidden in a block and what was said otherwise."""
+    confusion = _read("hidden-effects")["blocks"][block]["confusion"]
+    rows = [
+        [code(hidden), sum(said.values()), said.get(hidden, 0), _others(said, hidden)]
+        for hidden, said in confusion.items()
+    ]
+    return table(["Hidden", "Cases", "Named so", "Said otherwise"], rows, (1, 2))
+
+
+def hidden_sizes(block: str) -> str:
+    """Errors of fitted sizes of a block, and how often intervals cover the truth."""
+    sizes = _read("hidden-effects")["blocks"][block]["sizes"]["by_parameter"]
+    rows = [
+        [code(name), f"{100 * each['median_error']:.1f} %", percent(each["covered"])]
+        for name, each in sizes.items()
+    ]
+    return table(["Parameter", "Median error", "Intervals cover"], rows, (1,))
+
+
+def hidden_rounds() -> str:
+    """How soon proposed and random experiments settle what data could not tell."""
+    rounds = _read("hidden-effects")["blocks"]["undecidable"]["rounds"]
+    counts = list(rounds["proposed"]["settled"])
+    rows = [
+        [
+            way,
+            *(percent(rounds[way]["settled"][count]) for count in counts),
+            f"{rounds[way]['mean_rounds']:.2f}",
+            percent(rounds[way]["wrong"]),
+        ]
+        for way in ("proposed", "random")
+    ]
+    header = ["Experiment", *(f"Settled within {count}" for count in counts)]
+    return table([*header, "Mean rounds", "Named wrongly"], rows)
+
+
+def hidden_misses() -> str:
+    """Every case in which the diagnosis did not say what it should."""
+    rows = [
+        [name, miss["number"], miss["hidden"], "" if miss["r"] is None else f"{miss['r']:.2f}"]
+        + [miss["said"]]
+        for name, block in _read("hidden-effects")["blocks"].items()
+        for miss in block["misses"]
+    ]
+    return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3))
+
+
+def hidden_ways() -> str:
+    """The diagnosis, itself with one part off, and simpler ways on the same cases."""
+    ways = _read("ways")["ways"]
+    shown = [name for name in COLUMNS if any(each["rates"][name]["n"] for each in ways.values())]
+    rows = [
+        [WAYS[way].title, *(_hits(each["rates"][name]) for name in shown), _seconds(each)]
+        for way, each in ways.items()
+    ]
+    return table(["Way", *shown, "s a case"], rows, range(1, len(shown) + 2))
+
+
+def hidden_bound() -> str:
+    """How far effects are from nothing and from their nearest rival, and what that allows."""
+    shown = (0.1, 0.3, 0.5, 1.0)
+    rows = []
+    for name, each in sorted(_read("bound")["effects"].items()):
+        told = [f"{100 * each['told'][each['r'].index(r)]:.0f}" for r in shown]
+        distances = [f"{each['d_nothing']:.0f}", f"{each['d_rival']:.1f}"]
+        rows.append([code(name), each["n"], *distances, code(each["rivals"][0]), *told])
+    header = ["Hidden", "Cases", "d to nothing", "d to the nearest rival", "Rival"]
+    return table([*header, *(f"told, r = {r:g} (%)" for r in shown)], rows, (1, 2, 3, *range(5, 9)))
+
+
+def _is_table(part: object) -> bool:
+    return isinstance(part, TextTable)
+
+
+def _others(said: dict[str, int], hidden: str) -> str:
+    return listed({name: count for name, count in said.items() if name != hidden})
+
+
+def _hits(figure: dict[str, Any]) -> str:
+    return f"{figure['hits']} of {figure['n']}" if figure["n"] else ""
+
+
+def _seconds(each: dict[str, Any]) -> str:
+    return "" if each["seconds"] is None else f"{each['seconds']:.1f}"
