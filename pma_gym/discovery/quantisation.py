@@ -25,11 +25,16 @@ CHANCE = 0.1
 the step; every other that differs from them has to keep to it."""
 
 
+def is_coarse(floor: Level) -> bool:
+    """Whether a signal's readings keep to steps that neither the DAQ nor noise explains."""
+    return floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN)
+
+
 def coarse_sensors(floors: Sequence[Level]) -> tuple[NamedEffect, ...]:
     """One effect with the steps of all coarse sensors; none where there are none."""
     steps, others = {}, 0
     for name, floor in zip(OUTPUTS, floors, strict=True):
-        if floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN):
+        if is_coarse(floor):
             column = BY_QUANTITY[name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]

@@ -9,6 +9,7 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.excess import memory, tone
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.noise import slow_part, sparse
+from pma_gym.discovery.quantisation import is_coarse
 from pma_gym.discovery.selection import residuals
 from pma_gym.plant.plant import OUTPUTS
 
@@ -77,6 +78,7 @@ def _slow(found: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float6
         parts = [part[channel] for part in left]
         shares[0, channel] = slow_part(parts, rate, floor.level) / floor.level**2
         kept = memory(parts, rate)
-        if kept.sure:
+        # What a coarse sensor loses between its steps follows the motion, and no effect carries it.
+        if kept.sure and not is_coarse(floor):
             shares[1, channel] = kept.share * kept.variance / floor.level**2
     return shares
