@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.hidden_effects.scoring import rate
 from pma_gym.pages.figures import legend_below, picture, png
 
 NAMED, GROUP, DETECTED, BOUND = "#0072B2", "#009E73", "#D55E00", "#000000"
@@ -17,19 +18,32 @@ KINDS = (
 )
 
 
+def pooled(ranges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Rates of several blocks over the same ranges of r, as of one."""
+    found = []
+    for ends in sorted({(each["low"], each["high"]) for each in ranges}):
+        some = [each for each in ranges if (each["low"], each["high"]) == ends]
+        row: dict[str, Any] = {"low": ends[0], "high": ends[1]}
+        for kind, _, _ in KINDS:
+            hits, count = (sum(each[kind][name] for each in some) for name in ("hits", "n"))
+            row[kind] = rate([True] * hits + [False] * (count - hits))
+        found.append(row)
+    return found
+
+
 def naming_picture(
     ranges: Sequence[Mapping[str, Any]], bound: Mapping[str, Any] | None = None
 ) -> bytes:
     """Rates over the size r of what is hidden, with Wilson's intervals, as PNG.
 
     Args:
-        ranges: `by_size` of blocks of one hidden effect, see `scoring.count`.
+        ranges: `by_size` of blocks of one hidden effect, see `scoring.count`; they are pooled.
         bound: `effects` of `bound`'s JSON, whose mean over effects is drawn beside them.
     """
     with picture(6.4, 3.6) as drawn:
         panel = drawn.subplots()
         for shift, (kind, colour, marker) in zip((0.96, 1.0, 1.04), KINDS, strict=True):
-            rows = [each for each in ranges if each[kind]["n"]]
+            rows = [each for each in pooled(ranges) if each[kind]["n"]]
             # A range is drawn at its middle by ratios; the first begins at 0.
             at = [shift * np.sqrt(max(each["low"], 0.1) * min(each["high"], 4.0)) for each in rows]
             rates = np.array([each[kind]["rate"] for each in rows])
