@@ -6,12 +6,27 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
+def _eigen(matrix: Array) -> tuple[Array, Array]:
+    """Eigenvalues, ascending, and eigenvectors of a symmetric matrix.
+
+    Divide and conquer, LAPACK's fastest way, now and then gives up on a harmless matrix; its QR
+    iteration takes over there.
+    """
+    try:
+        return np.linalg.eigh(matrix)
+    except np.linalg.LinAlgError:
+        # Imported here as below.
+        from scipy.linalg import eigh
+
+        return eigh(matrix, driver="ev")
+
+
 def least(gradient: Array, curvature: Array, damping: float, low: Array, high: Array) -> Array:
     """Where 2 g.x + x.(A + damping diag A) x is least between bounds that 0 lies between."""
     scale = np.sqrt(np.diag(curvature))
     scale = np.where(scale > 0.0, scale, 1.0)
     matrix = curvature / np.outer(scale, scale) + damping * np.eye(len(scale))
-    values, vectors = np.linalg.eigh(matrix)
+    values, vectors = _eigen(matrix)
     known = values > 1e-12 * values[-1]
     roots, across = np.sqrt(values[known]), vectors[:, known].T
     right = -(across @ (gradient / scale)) / roots
@@ -30,7 +45,7 @@ def inverse(curvature: Array) -> Array:
     """Inverse; infinite on the diagonal for what has no influence, or none that is its own."""
     scale = np.sqrt(np.diag(curvature))
     scale = np.where(scale > 0.0, scale, 1.0)
-    values, vectors = np.linalg.eigh(curvature / np.outer(scale, scale))
+    values, vectors = _eigen(curvature / np.outer(scale, scale))
     known = values > 1e-10 * np.max(values, initial=0.0)
     found = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
     np.fill_diagonal(

@@ -245,3 +245,19 @@ def test_a_state_that_is_no_number_does_not_hold_up_the_rest():
     runs = [Run(when, motor, regulator, True, plant.table, start, zero) for start in starts]
     assert simulate_all(plant.program, runs) < 20 * 3841
     assert np.isnan(runs[1].states).all() and np.isfinite(runs[0].states).all()
+
+
+def test_a_matrix_that_lapack_gives_up_on_is_solved_all_the_same(monkeypatch):
+    generator = np.random.default_rng(5)
+    rows = generator.standard_normal((30, 6))
+    curvature, gradient = rows.T @ rows, generator.standard_normal(6)
+    room = np.full(6, -1e3), np.full(6, 1e3)
+    step, covariance = least(gradient, curvature, 0.0, *room), inverse(curvature)
+
+    def gives_up(matrix):
+        raise np.linalg.LinAlgError("Eigenvalues did not converge")
+
+    monkeypatch.setattr(np.linalg, "eigh", gives_up)
+    np.testing.assert_allclose(least(gradient, curvature, 0.0, *room), step, rtol=1e-9)
+    np.testing.assert_allclose(inverse(curvature), covariance, rtol=1e-9)
+    np.testing.assert_allclose(curvature @ step, -gradient, rtol=1e-9)
