@@ -76,7 +76,9 @@ def explained(conditions: Array, left: Array, trial: Array, seed: int) -> float:
     every = left / scale
     few = np.linspace(0, len(left) - 1, min(MOST_TICKS, len(left))).astype(int)
     width = 2.0 * np.ones(conditions.shape[1])
-    kernel = ConstantKernel(0.3, (1e-3, 1e2)) * RBF(width, (0.2, 1e2)) + WhiteKernel(0.7)
+    # Scikit-learn takes a width a column and no optimizer, as it says, but not as its types do.
+    smooth = RBF(width, (0.2, 1e2))  # type: ignore[arg-type]
+    kernel = ConstantKernel(0.3, (1e-3, 1e2)) * smooth + WhiteKernel(0.7)
     process = GaussianProcessRegressor(kernel, random_state=seed)
     with warnings.catch_warnings():
         # A condition that does not matter has a width at its bound.
@@ -86,6 +88,6 @@ def explained(conditions: Array, left: Array, trial: Array, seed: int) -> float:
     for one in np.unique(trial):
         out = trial == one
         seen = few[~out[few]]
-        fixed = GaussianProcessRegressor(learnt, optimizer=None)
+        fixed = GaussianProcessRegressor(learnt, optimizer=None)  # type: ignore[arg-type]
         missed[out] = every[out] - fixed.fit(conditions[seen], every[seen]).predict(conditions[out])
     return float(1.0 - np.mean(missed**2))
