@@ -117,8 +117,8 @@ def _round(
 def round_of(diagnosis: Diagnosis, trials: int) -> Round:
     """What a diagnosis found.
 
-    A diagnosis that says `unknown`, because a law without a shape of its own explains even more,
-    has added effects to its model all the same: these count. One that cannot decide has not.
+    A diagnosis that says `unknown`, because what it added leaves too much, has added effects to its
+    model all the same: these count. One that cannot decide has not.
     """
     added = [each.name for each in diagnosis.candidates if each.why == ADDED]
     named = {each.name: each for each in diagnosis.effects}

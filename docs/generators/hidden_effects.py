@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.summary import report_blocks
-from benchmarks.hidden_effects.tables import listed, percent
 from benchmarks.hidden_effects.ways.compared import COLUMNS
 from benchmarks.hidden_effects.ways.registry import WAYS
 from generators.text import code, table
@@ -20,45 +19,36 @@ def _read(name: str) -> dict[str, Any]:
 
 def hidden_rates() -> str:
     """Every figure with its target, block by block."""
-    tables = [each for each in report_blocks(_read("hidden-effects")) if _is_table(each)]
+    every = report_blocks(_read("hidden-effects"))
+    tables = [each for each in every if isinstance(each, TextTable)]
     return to_markdown(tables[:1], {}, "")
 
 
 def hidden_cases(block: str) -> str:
-    """What was hidden in a block and what was said otherwise."""
-    confusion = _read("hidden-effects")["blocks"][block]["confusion"]
-    rows = [
-        [code(hidden), sum(said.values()), said.get(hidden, 0), _others(said, hidden)]
-        for hidden, said in confusion.items()
-    ]
-    return table(["Hidden", "Cases", "Named so", "Said otherwise"], rows, (1, 2))
+    """What was hidden in a block and what was said."""
+    return _own(block, "What was hidden")
 
 
 def hidden_sizes(block: str) -> str:
     """Errors of fitted sizes of a block, and how often intervals cover the truth."""
-    sizes = _read("hidden-effects")["blocks"][block]["sizes"]["by_parameter"]
-    rows = [
-        [code(name), f"{100 * each['median_error']:.1f} %", percent(each["covered"])]
-        for name, each in sizes.items()
-    ]
-    return table(["Parameter", "Median error", "Intervals cover"], rows, (1,))
+    return _own(block, "Fitted sizes")
 
 
 def hidden_rounds() -> str:
     """How soon proposed and random experiments settle what data could not tell."""
-    rounds = _read("hidden-effects")["blocks"]["undecidable"]["rounds"]
-    counts = list(rounds["proposed"]["settled"])
-    rows = [
-        [
-            way,
-            *(percent(rounds[way]["settled"][count]) for count in counts),
-            f"{rounds[way]['mean_rounds']:.2f}",
-            percent(rounds[way]["wrong"]),
-        ]
-        for way in ("proposed", "random")
+    return _own("undecidable", "Rounds")
+
+
+def _own(block: str, title: str) -> str:
+    """The table of a block whose title begins so, as the report has it."""
+    document = _read("hidden-effects")
+    alone = {**document, "blocks": {block: document["blocks"][block]}}
+    found = [
+        each
+        for each in report_blocks(alone)
+        if isinstance(each, TextTable) and each.title.startswith(title)
     ]
-    header = ["Experiment", *(f"Settled within {count}" for count in counts)]
-    return table([*header, "Mean rounds", "Named wrongly"], rows)
+    return to_markdown(found, {}, "")
 
 
 def hidden_misses() -> str:
@@ -93,14 +83,6 @@ def hidden_bound() -> str:
         rows.append([code(name), each["n"], *distances, code(each["rivals"][0]), *told])
     header = ["Hidden", "Cases", "d to nothing", "d to the nearest rival", "Rival"]
     return table([*header, *(f"told, r = {r:g} (%)" for r in shown)], rows, (1, 2, 3, *range(5, 9)))
-
-
-def _is_table(part: object) -> bool:
-    return isinstance(part, TextTable)
-
-
-def _others(said: dict[str, int], hidden: str) -> str:
-    return listed({name: count for name, count in said.items() if name != hidden})
 
 
 def _hits(figure: dict[str, Any]) -> str:

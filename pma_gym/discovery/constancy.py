@@ -32,9 +32,16 @@ def spreads(
     """How much the size of an effect scatters beyond its errors, as a share of it.
 
     Every group of pieces is given a size of its own, to first order, with all parameters refitted.
-    Groups are trials, and quarters by pressure, contraction and load as
-    simulated. 0 where fewer than three groups show the effect, or
-    where chance would scatter as much.
+
+    Args:
+        bench: the trials.
+        fit: of a model with effects.
+        chosen: the effects.
+        place: of the one that is asked about.
+    Returns:
+        The scatter over trials, and over quarters of the pieces by contraction, load and pressure
+        as simulated, by name; 0 where fewer than three groups show the effect, or where chance
+        would scatter as much. Empty where the model cannot be simulated.
     """
     evidence = bench.evidence(fit.model, chosen)
     pieces = evidence.pieces(fit.values, fit.steps)

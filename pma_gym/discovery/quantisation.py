@@ -17,8 +17,8 @@ MISS = 0.05
 largest reading, of which there are at least as many as differ, that is what the step may be off."""
 
 HIDDEN = 1.0
-"""How many steps of noise (standard deviation) hide a step: from half of one on, what rounding adds
-to a reading is noise like any other. What is known of a noise has the rounding in it."""
+"""Noise hides a step if its standard deviation, rounding included, is this many steps or more: what
+rounding adds to such readings is noise like any other."""
 
 CHANCE = 0.1
 """Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make

@@ -135,7 +135,9 @@ def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
     data = measured_dataset((150.0,), (75.0,), steps=0)
 
     def run():
-        silent = lambda *_: None  # noqa: E731
+        def silent(*_):
+            """No progress."""
+
         return rounds((data,), load_model("serres2008"), tmp_path, 0, 1, lambda _: silent)
 
     found, model = run()
