@@ -63,8 +63,7 @@ def draw_hidden_effects() -> None:
     kept = Path(__file__).parent / "figures"
     blocks = json.loads((kept / "hidden-effects.json").read_text("utf-8"))["blocks"]
     ranges = [*blocks["faint"]["by_size"], *blocks["single"]["by_size"]]
-    bound = json.loads((kept / "bound.json").read_text("utf-8"))["effects"]
-    (IMAGES / "diagnosis-naming.png").write_bytes(naming_picture(ranges, bound))
+    (IMAGES / "diagnosis-naming.png").write_bytes(naming_picture(ranges))
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Plots of what was named: against the size of the effect, beside the best that any test could."""
+"""Plots of what was named, against the size of the effect."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.hidden_effects.scoring import rate
 from pma_gym.pages.figures import legend_below, picture, png
 
-NAMED, GROUP, DETECTED, BOUND = "#0072B2", "#009E73", "#D55E00", "#000000"
+NAMED, GROUP, DETECTED = "#0072B2", "#009E73", "#D55E00"
 """Okabe and Ito's palette, as in the pictures of a diagnosis."""
 
 KINDS = (
@@ -31,14 +31,11 @@ def pooled(ranges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     return found
 
 
-def naming_picture(
-    ranges: Sequence[Mapping[str, Any]], bound: Mapping[str, Any] | None = None
-) -> bytes:
+def naming_picture(ranges: Sequence[Mapping[str, Any]]) -> bytes:
     """Rates over the size r of what is hidden, with Wilson's intervals, as PNG.
 
     Args:
         ranges: `by_size` of blocks of one hidden effect, see `scoring.count`; they are pooled.
-        bound: `effects` of `bound`'s JSON, whose mean over effects is drawn beside them.
     """
     with picture(6.4, 3.6) as drawn:
         panel = drawn.subplots()
@@ -53,16 +50,11 @@ def naming_picture(
             panel.errorbar(
                 at, 100.0 * rates, 100.0 * bars, fmt=marker, color=colour, label=kind, capsize=3
             )
-        if bound:
-            told = np.mean([each["told"] for each in bound.values()], axis=0)
-            ratios = next(iter(bound.values()))["r"]
-            style = {"color": BOUND, "linestyle": (0, (4, 2))}
-            panel.plot(ratios, 100.0 * told, label="best possible against one rival", **style)
         panel.set_xscale("log")
         panel.set_xticks([0.1, 0.2, 0.3, 0.5, 1.0, 2.0], ["0.1", "0.2", "0.3", "0.5", "1", "2"])
         panel.minorticks_off()
         panel.set_ylim(0.0, 103.0)
         panel.set_xlabel("size r of the effect over the noise, after a refit without it")
         panel.set_ylabel("cases (%)")
-        legend_below(drawn, panel.get_legend_handles_labels()[0], 4)
+        legend_below(drawn, panel.get_legend_handles_labels()[0], 3)
         return png(drawn)
