@@ -8,7 +8,7 @@ PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 
-EXTRAS = rl,discovery,mpc,view,files,symbolic,ways,docs,dev
+EXTRAS = rl,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
 CORE = $(VENV)/.core-installed
 FULL = $(VENV)/.all-installed
@@ -78,7 +78,7 @@ $(BIN)/pip:
 
 $(CORE): $(REQUIREMENTS) | $(BIN)/pip
 	@echo "Installing the core into $(VENV) (about a minute)"
-	@$(INSTALL) -e '.[mpc]' || $(EXPLAIN)
+	@$(INSTALL) -e '.[mpc,policies]' || $(EXPLAIN)
 	@touch $@
 
 $(FULL): $(REQUIREMENTS) | $(CORE)
