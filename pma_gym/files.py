@@ -3,6 +3,7 @@
 import os
 import secrets
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 
@@ -56,11 +57,27 @@ def replace_file(path: Path, content: bytes) -> None:
         path: the file; its folder exists.
         content: all of it.
     """
+    replace_files({path: content})
+
+
+def replace_files(contents: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: a disk that fails or fills up leaves all the old ones.
+
+    Only between the final steps, which write nothing, could new and old ones stand side by side.
+
+    Args:
+        contents: all of each file, the last one to be replaced last; their folders exist.
+    """
     # In the same folder, for only there is the final step a rename.
-    partial = path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial")
+    partials = {
+        path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial"): path for path in contents
+    }
     try:
-        partial.write_bytes(content)
-        os.replace(partial, path)
+        for partial, path in partials.items():
+            partial.write_bytes(contents[path])
+        for partial, path in partials.items():
+            os.replace(partial, path)
     except BaseException:
-        partial.unlink(missing_ok=True)
+        for partial in partials:
+            partial.unlink(missing_ok=True)
         raise
