@@ -19,10 +19,10 @@ from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model
 from pma_gym.envs.record import START, Record
 from pma_gym.kernels.crew import Crew
-from pma_gym.plant.model import load_model
+from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
-from pma_gym.tasks import RANDOMISATIONS, Events, Task
+from pma_gym.tasks import Events, Task
 
 WIDTH = 16
 """Environments that share a block, one lane each."""
@@ -212,17 +212,28 @@ class Engine:
         """Draw the stations of episodes; their vectors, or None if all are nominal."""
         if self._shares_table:
             return None
-        draw = RANDOMISATIONS[self.options.randomisation]
+        draw = self.options.draw
         rows = []
         for index in indices.tolist():
             key = self._keys[index].astype(np.uint64)
             seed = int(key[0]) | int(key[1]) << 32
             bits = np.random.Philox(key=seed, counter=[0, 0, 0, int(self._episodes[index])])
-            self.models[index] = draw(self.nominal.model, np.random.Generator(bits))
+            self.models[index] = self._checked(draw(self.nominal.model, np.random.Generator(bits)))
             rows.append(vector(self.models[index], self.nominal.tolerance))
             block, lane = divmod(index, self.width)
             self._tables[block, :, lane] = self._table_of(rows[-1])
         return np.array(rows)
+
+    def _checked(self, drawn: Model) -> Model:
+        """A drawn station, if the compiled one can be it."""
+        if list(drawn.effects) != list(self.nominal.model.effects):
+            odd = sorted(set(drawn.effects) ^ set(self.nominal.model.effects))
+            raise ValueError(
+                "a randomisation must give a model with the effects of the one that it is given, "
+                f"in their order; these differ: {', '.join(odd) or 'their order'}; give both all "
+                "of them, neutral where a station has them not"
+            )
+        return drawn
 
     def _settled(
         self,

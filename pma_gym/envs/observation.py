@@ -42,7 +42,7 @@ class ObservationTable:
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
         self._span = protocol.span
         self._preview = options.preview
-        self._history, self._delay = options.history, options.observation_delay
+        self._history, self.delay = options.history, options.observation_delay
         self._quantity = protocol.quantity
 
     def describe(self) -> str:
@@ -78,7 +78,7 @@ class ObservationTable:
             reference: reference (m or rad) so many control steps ahead.
             action: the last action, -1 to 1.
         """
-        delay = self._delay
+        delay = self.delay
 
         def position(steps: int) -> Any:  # noqa: ANN401
             return heard_position(self._quantity, lambda part: reading(part, steps))

@@ -16,6 +16,7 @@ from pma_gym.tasks import (
     RANDOMISATIONS,
     REWARDS,
     Disturbances,
+    Randomisation,
     Task,
     named_task,
 )
@@ -44,7 +45,9 @@ class Options:
         observation_delay_s: how late the sensors are heard (s), whole control steps.
         history: how many earlier readings of the position the observation holds.
         reward: name of a reward in `pma_gym.tasks.REWARDS`.
-        randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`.
+        randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`; or, for stations
+            of one's own, a function of the nominal model and a generator that gives a model with
+            the same effects (it does not survive JSON).
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
     """
@@ -58,7 +61,7 @@ class Options:
     observation_delay_s: float = 0.0
     history: int = 0
     reward: str = "absolute"
-    randomisation: str = "none"
+    randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
 
@@ -66,6 +69,12 @@ class Options:
     def disturbing(self) -> Disturbances:
         """Sizes of what disturbs."""
         return DISTURBANCES[self.disturbances]
+
+    @property
+    def draw(self) -> Randomisation:
+        """What gives the station of an episode."""
+        chosen = self.randomisation
+        return RANDOMISATIONS[chosen] if isinstance(chosen, str) else chosen
 
     @property
     def period(self) -> float:
@@ -100,7 +109,8 @@ def parse_options(given: Mapping[str, Any]) -> Options:
         if not isinstance(getattr(options, name), bool):
             raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
     check_named("reward", options.reward, REWARDS)
-    check_named("randomisation", options.randomisation, RANDOMISATIONS)
+    if not callable(options.randomisation):
+        check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
     check_pressure(options.pressure_kpa)
     return options

@@ -22,6 +22,7 @@ from pma_gym.envs.options import (
     parse_options,
     parse_task,
 )
+from pma_gym.envs.record import PARTS
 from pma_gym.envs.summary import summaries
 from pma_gym.tasks import Task, limit_in_words
 
@@ -275,6 +276,20 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         }
         found["extrapolated"] = found["extrapolated"] != 0.0
         return found
+
+    def readings(self) -> NDArray[np.float64]:
+        """What the sensors say now, as controllers hear it (SI), shape (4, num_envs).
+
+        Extension (m), rotation (rad), load (N), pressure (Pa), as late as `observation_delay_s`
+        makes them: of each environment what `PMAEnv.reading` has.
+        """
+        late = self.options.observation_delay
+        return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
+
+    @property
+    def pressures(self) -> NDArray[np.float64]:
+        """Gauge pressure that every episode began at (Pa), shape (num_envs,)."""
+        return self.engine.pressures.copy()
 
     def close_extras(self, **kwargs: Any) -> None:
         """Send the threads home."""

@@ -125,7 +125,10 @@ def _quantity(model: Model, path: str) -> Quantity:
     return model.effects[effect].quantities[model.effects[effect].names_at_the_door()[door]]
 
 
-RANDOMISATIONS: dict[str, Callable[[Model, np.random.Generator], Model]] = {
+Randomisation = Callable[[Model, np.random.Generator], Model]
+"""Gives the station of an episode, from the nominal model and a generator of its own."""
+
+RANDOMISATIONS: dict[str, Randomisation] = {
     "none": nominal_station,
     "intervals": station_within_intervals,
     "varied": varied_station,
