@@ -1,0 +1,161 @@
+"""Controllers that a network computes: policies from a file, and those that are shipped."""
+
+import math
+from pathlib import Path
+
+from controllers.controller import Reference
+from controllers.designs import loop_name, task_kind
+from controllers.network import Network
+from controllers.pilot import Pilot
+from controllers.policy_document import PolicyError
+from controllers.policy_file import PolicyFile, load_policy_file
+from pma_gym.envs import Reading, Station
+
+POLICIES = Path(__file__).with_name("policies")
+"""Folder of the shipped policies, each called `{kind of task}-{loop}-{algorithm}`."""
+
+SHOWN = 3
+"""How many entries that differ a message names; the others it counts."""
+
+
+class Policy:
+    """A trained policy on the station that it was trained for.
+
+    Args:
+        path: its file, see `controllers.policy_file`.
+        anywhere: whether it may run at another control rate or delay than it was trained with, to
+            see what becomes of it. What it sees must be the same all the same.
+
+    Attributes:
+        name: its name in the file.
+        file: the PolicyFile.
+    Raises:
+        PolicyError: a file that cannot be used.
+    """
+
+    def __init__(self, path: Path | str, *, anywhere: bool = False) -> None:
+        """Read and check the file."""
+        self.file = load_policy_file(path)
+        self.name, self.anywhere = self.file.name, anywhere
+        self._network = Network(self.file.weights)
+        self._pilot = Pilot(self.file.view, self.file.form)
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Prepare for a trial.
+
+        Raises:
+            PolicyError: a station that it was not trained for; names every difference.
+        """
+        refused = differences(self.file, station, self.anywhere)
+        if refused:
+            raise PolicyError(
+                f"policy {self.name} was not trained for this station: {'; '.join(refused)}. Give "
+                "the environment what it was trained for, or take a policy of this task and loop; "
+                "at another rate or delay it runs as Policy(path, anywhere=True)"
+            )
+        self._pilot.reset(reference, station)
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Voltage (V, 0-10) to hold for the next control period."""
+        entries = self._pilot.see(observation, time)
+        return self._pilot.volts(float(self._network(entries)[0]))
+
+
+class ShippedPolicy:
+    """The shipped policy of an algorithm for the task and loop at hand, whatever they are.
+
+    Args:
+        algorithm: `ppo`, `sac`, `td3`, `tqc`: how the file's name ends.
+        folder: where the files are.
+
+    Attributes:
+        name: the algorithm's name.
+    """
+
+    def __init__(self, algorithm: str, folder: Path = POLICIES) -> None:
+        """Note where to look; files are read when a station asks for them."""
+        self.name, self._folder = algorithm, folder
+        self._policies: dict[str, Policy] = {}
+        self._policy: Policy | None = None
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Take the policy for the station, and prepare it for a trial.
+
+        Raises:
+            PolicyError: none is shipped for this kind of task and loop; names those that are.
+        """
+        self._policy = None
+        policy = self._chosen(station)
+        policy.reset(reference, station)
+        self._policy = policy
+
+    def act(self, observation: Reading, time: float) -> float:
+        """Voltage (V, 0-10) to hold for the next control period.
+
+        Raises:
+            RuntimeError: it was not reset.
+        """
+        if self._policy is None:
+            raise RuntimeError(f"policy {self.name} has no trial: call reset() before act()")
+        return self._policy.act(observation, time)
+
+    def _chosen(self, station: Station) -> Policy:
+        # Gains of the nearest loop serve; a network's weights hold for the loop that made them.
+        name = f"{task_kind(station)}-{loop_name(station)}-{self.name}"
+        if name not in self._policies:
+            shipped = [path.stem for path in shipped_policies(self._folder)]
+            if name not in shipped:
+                raise PolicyError(
+                    f"no policy {name} is shipped (kind of task, loop, algorithm), only "
+                    f"{', '.join(shipped) or 'none at all'}; take a task, control rate and delay "
+                    "of these"
+                )
+            self._policies[name] = Policy(self._folder / f"{name}.json")
+        return self._policies[name]
+
+
+def shipped_policies(folder: Path = POLICIES) -> list[Path]:
+    """The shipped policies' .json files by name; none where there is no such folder."""
+    return sorted(folder.glob("*.json"))
+
+
+def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> list[str]:
+    """What makes a station another one than a policy was trained for, in words.
+
+    Args:
+        file: the policy.
+        station: the station.
+        anywhere: whether control rate and delays may differ.
+    """
+    found = []
+    kind = task_kind(station)
+    if kind != file.task:
+        found.append(f"the task's kind is {kind}, trained for {file.task}")
+    trained = file.environment["kwargs"]
+    if not anywhere:
+        for what, came, wanted, unit in (
+            ("control rate", 1.0 / station.period, trained["control_rate_hz"], "Hz"),
+            ("action delay", station.action_delay, trained["action_delay_s"], "s"),
+            ("observation delay", station.observation_delay, trained["observation_delay_s"], "s"),
+        ):
+            if not math.isclose(came, wanted, rel_tol=1e-6, abs_tol=1e-6):
+                found.append(f"the {what} is {came:g} {unit}, trained for {wanted:g} {unit}")
+    return found + _other_rows(file, station)
+
+
+def _other_rows(file: PolicyFile, station: Station) -> list[str]:
+    """Entries of the observation that are others, and their count if it is another."""
+    rows, known = file.view.rows(station, file.form.base), file.observation
+    found = []
+    if len(rows) != len(known):
+        found.append(f"the observation has {len(rows)} entries, trained for {len(known)}")
+    others = [
+        f"entry {i} of the observation is {came[0]} (1.0 = {came[1]}), trained for {wanted[0]} "
+        f"(1.0 = {wanted[1]})"
+        for i, (came, wanted) in enumerate(zip(rows, known, strict=False))
+        if came != wanted
+    ]
+    found += others[:SHOWN]
+    if len(others) > SHOWN:
+        found.append(f"and {len(others) - SHOWN} more entries differ")
+    return found
