@@ -7,6 +7,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from benchmarks.training.commands import register as register_training
+
 # Figures are drawn to files; each process computes on its own core.
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -464,6 +466,9 @@ def hidden_effects_report(
         print(text)
     else:
         write_text(out, text)
+
+
+register_training(app)
 
 
 def _listed(text: str) -> list[str]:

@@ -1,4 +1,4 @@
-"""Who is scored: a controller of the registry, or a class in somebody's own file."""
+"""Who is scored: a controller of the registry, a class in somebody's own file, or a policy."""
 
 import difflib
 import importlib.util
@@ -11,6 +11,11 @@ from types import ModuleType
 
 from controllers import CONTROLLERS
 from controllers.controller import Controller
+from controllers.policy import Policy, ShippedPolicy, shipped_policies
+from controllers.policy_file import policy_pair
+
+POLICY_FILES = (".json", ".safetensors")
+"""Endings of a policy's two files."""
 
 
 class ControllerError(ValueError):
@@ -24,17 +29,39 @@ class Contender:
     Attributes:
         name: what the results call it; the class for one of one's own.
         title: what the report calls it; for a class of one's own, its attribute `name`.
-        path: file of its class; empty for one of `controllers.CONTROLLERS`.
+        path: file of its class or of its policy, or folder of policies; empty for one of
+            `controllers.CONTROLLERS`.
+        algorithm: of the policies in a folder; else empty.
     """
 
     name: str
     title: str = ""
     path: str = ""
+    algorithm: str = ""
 
     @property
     def source(self) -> str:
         """What names it on the command line."""
+        if self.is_policy:
+            return f"{self.path}:{self.algorithm}" if self.algorithm else self.path
         return f"{self.path}:{self.name}" if self.path else self.name
+
+    @property
+    def is_policy(self) -> bool:
+        """Whether it is a policy from a file, or from a folder of them."""
+        return bool(self.algorithm) or self.path.endswith(POLICY_FILES)
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds of task that it can do; all if empty."""
+        if self.algorithm:
+            files = shipped_policies(Path(self.path))
+            return frozenset(
+                path.stem.partition("-")[0]
+                for path in files
+                if path.stem.endswith(f"-{self.algorithm}")
+            )
+        return frozenset((Policy(self.path).file.task,)) if self.is_policy else frozenset()
 
     @property
     def label(self) -> str:
@@ -54,6 +81,10 @@ class Contender:
                 f"no controller {self.name!r}; there are {', '.join(CONTROLLERS)}, or give "
                 f"path/to/file.py:ClassName{hint}"
             )
+        if self.algorithm:
+            return ShippedPolicy(self.algorithm, Path(self.path))
+        if self.is_policy:
+            return Policy(self.path)
         factory = _class_of(self) if self.path else CONTROLLERS[self.name]
         try:
             controller = factory()
@@ -70,7 +101,7 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
     """Controllers from a list as the command line has it: `pid,path/to/mine.py:MyController`.
 
     Args:
-        text: names or files with a class, separated by commas.
+        text: names, files with a class, policies, separated by commas.
         known: controllers whose titles are kept.
     Raises:
         ControllerError: one that cannot be made; each is tried.
@@ -83,12 +114,34 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
         path, colon, name = item.rpartition(":")
         if item.endswith(".py") or (colon and not name):
             raise ControllerError(f"{item} names no class; write {item.rstrip(':')}:ClassName")
-        contender = Contender(name, path=path) if colon else titled.get(item, Contender(item))
+        contender = _policy(item) or (
+            Contender(name, path=path) if colon else titled.get(item, Contender(item))
+        )
         made = contender.make()
-        if contender.path:
+        if contender.path and not contender.title:
             contender = replace(contender, title=_own_name(made))
         contenders.append(contender)
     return contenders
+
+
+def _policy(item: str) -> Contender | None:
+    """A policy's file, or a folder of policies with their algorithm (`folder:ppo`); else None.
+
+    Raises:
+        ControllerError: the folder has no policy of that algorithm.
+    """
+    if item.endswith(POLICY_FILES):
+        words, _ = policy_pair(item)
+        return Contender(words.stem, path=str(words))
+    path, colon, algorithm = item.rpartition(":")
+    if not colon or not Path(path).is_dir():
+        return None
+    folder = Path(path)
+    contender = Contender(f"{folder.name}-{algorithm}", path=path, algorithm=algorithm)
+    if not contender.kinds:
+        has = ", ".join(file.stem for file in shipped_policies(folder)) or "no policy at all"
+        raise ControllerError(f"{folder} has no policy of {algorithm!r}; it has {has}")
+    return replace(contender, title=f"{algorithm}, {folder.name}")
 
 
 def _own_name(controller: Controller) -> str:

@@ -15,6 +15,7 @@ from benchmarks.comparison.stations import DrawnStation, draw_station
 from benchmarks.comparison.target import Target, parse_target
 from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
+from controllers.designs import KINDS
 from pma_gym.envs.options import parse_options
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EVERY_TASK, named_task
@@ -170,7 +171,16 @@ class FrozenSuite:
         for entry in self.entries:
             if entry.contender.source == contender.source:
                 return entry
-        return Entry(contender)
+        kinds = contender.kinds
+        able = (task for task in self.tasks if kind_of(task) in kinds)
+        return Entry(contender, tuple(able) if kinds else ())
+
+
+def kind_of(task: str) -> str:
+    """Kind of a task of a suite."""
+    found = named_task(task)
+    assert found is not None
+    return KINDS[found.protocol.quantity]
 
 
 @lru_cache(maxsize=1024)

@@ -1,0 +1,178 @@
+"""Checkpoints of a training: tensors and numbers, written whole or not at all.
+
+Nothing in them executes when it is loaded: weights, optimisers' states and replayed transitions
+travel as safetensors, counts as JSON.
+"""
+
+import json
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from safetensors.torch import load_file, save_file
+from stable_baselines3.common.base_class import BaseAlgorithm
+
+from benchmarks.training.averaging import WeightAverage
+
+COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
+"""What a model counts."""
+
+
+class CheckpointError(RuntimeError):
+    """A checkpoint that cannot be saved or used; the message says why and what remains."""
+
+
+def save_checkpoint(
+    folder: Path,
+    number: int,
+    model: BaseAlgorithm,
+    average: WeightAverage | None,
+    told: Mapping[str, Any],
+) -> None:
+    """Save all that the next leg of a training depends on; the last one stays until this is whole.
+
+    Args:
+        folder: of the checkpoints.
+        number: of legs that are done.
+        model: what is trained.
+        average: its averaged weights.
+        told: what else is to be remembered, as JSON.
+    Raises:
+        CheckpointError: it could not be written; the one before is still there.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    partial, final = folder / ".partial", folder / f"{number:06d}"
+    try:
+        shutil.rmtree(partial, ignore_errors=True)
+        partial.mkdir()
+        tensors, numbers = _state(model)
+        if average is not None and average.weights is not None:
+            tensors |= {f"average.{i}": one for i, one in enumerate(average.weights)}
+        save_file(
+            {key: one.contiguous().clone() for key, one in tensors.items()},
+            partial / "state.safetensors",
+        )
+        content = json.dumps({"numbers": numbers, "told": dict(told)}, indent=1)
+        (partial / "state.json").write_text(content, encoding="utf-8")
+        shutil.rmtree(final, ignore_errors=True)
+        partial.rename(final)
+    except OSError as error:
+        shutil.rmtree(partial, ignore_errors=True)
+        kept = latest(folder)
+        stays = f"the one of leg {kept[0]} stays in {kept[1]}" if kept else "there is none before"
+        raise CheckpointError(
+            f"checkpoint {number} cannot be saved in {folder}: {error.strerror or error}; {stays}; "
+            "make room or allow writing, then run the same command again: it goes on from there"
+        ) from error
+    for old in sorted(folder.glob("[0-9]*"))[:-2]:
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def latest(folder: Path) -> tuple[int, Path] | None:
+    """Number and folder of the newest checkpoint, if there is one."""
+    found = sorted(path for path in folder.glob("[0-9]*") if (path / "state.json").is_file())
+    return (int(found[-1].name), found[-1]) if found else None
+
+
+def told(path: Path) -> dict[str, Any]:
+    """What a checkpoint remembers besides its tensors.
+
+    Raises:
+        CheckpointError: it is damaged.
+    """
+    try:
+        return json.loads((path / "state.json").read_text(encoding="utf-8"))["told"]
+    except (OSError, ValueError, KeyError) as error:
+        raise _damaged(path, error) from error
+
+
+def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | None) -> None:
+    """Put a model where a checkpoint was.
+
+    Raises:
+        CheckpointError: it is damaged, or of another model.
+    """
+    try:
+        tensors = load_file(path / "state.safetensors")
+        numbers = json.loads((path / "state.json").read_text(encoding="utf-8"))["numbers"]
+        _restore(model, tensors, numbers)
+        means = [
+            tensors[f"average.{i}"] for i in range(sum(k.startswith("average.") for k in tensors))
+        ]
+        if average is not None and means:
+            average.weights = means
+    except Exception as error:
+        raise _damaged(path, error) from error
+
+
+def _damaged(path: Path, error: Exception) -> CheckpointError:
+    return CheckpointError(
+        f"checkpoint {path} cannot be used ({type(error).__name__}: {error}); delete that folder "
+        "to go on from the one before"
+    )
+
+
+def _state(model: BaseAlgorithm) -> tuple[dict[str, torch.Tensor], dict[str, Any]]:
+    """All that a model has learned and counts, as tensors and JSON."""
+    tensors: dict[str, torch.Tensor] = {}
+    numbers: dict[str, Any] = {
+        "counters": {n: getattr(model, n) for n in COUNTERS if hasattr(model, n)}
+    }
+    for name, state in model.get_parameters().items():
+        if "optimizer" in name:
+            numbers[name] = state["param_groups"]
+            for i, values in state["state"].items():
+                tensors |= {f"{name}.{i}.{key}": value for key, value in values.items()}
+        else:
+            tensors |= {f"{name}.{key}": value for key, value in state.items()}
+    for name in _variables(model):
+        tensors[f"variable.{name}"] = getattr(model, name).data
+    buffer = getattr(model, "replay_buffer", None)
+    if buffer is not None:
+        numbers["replayed"] = [int(buffer.pos), bool(buffer.full)]
+        for name in _replayed(buffer):
+            kept = getattr(buffer, name)
+            tensors[f"replayed.{name}"] = torch.from_numpy(
+                kept if buffer.full else kept[: buffer.pos]
+            )
+    return tensors, numbers
+
+
+def _variables(model: BaseAlgorithm) -> list[str]:
+    """Names of the tensors that a model learns outside its networks (SAC's temperature)."""
+    return [name for name in ("log_ent_coef",) if getattr(model, name, None) is not None]
+
+
+def _replayed(buffer: Any) -> list[str]:  # noqa: ANN401
+    names = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+    return [name for name in names if isinstance(getattr(buffer, name, None), np.ndarray)]
+
+
+def _restore(
+    model: BaseAlgorithm, tensors: dict[str, torch.Tensor], numbers: dict[str, Any]
+) -> None:
+    states: dict[str, Any] = {}
+    for name, state in model.get_parameters().items():
+        if "optimizer" not in name:
+            states[name] = {key: tensors[f"{name}.{key}"] for key in state}
+            continue
+        values: dict[int, dict[str, torch.Tensor]] = {}
+        for key, tensor in tensors.items():
+            if key.startswith(f"{name}."):
+                index, _, what = key.removeprefix(f"{name}.").partition(".")
+                values.setdefault(int(index), {})[what] = tensor
+        states[name] = {"state": values, "param_groups": numbers[name]}
+    model.set_parameters(states, exact_match=True)
+    for name in _variables(model):
+        getattr(model, name).data.copy_(tensors[f"variable.{name}"])
+    for name, value in numbers["counters"].items():
+        setattr(model, name, value)
+    if "replayed" in numbers:
+        buffer: Any = model.replay_buffer  # type: ignore[attr-defined]
+        buffer.pos, buffer.full = numbers["replayed"]
+        for name in _replayed(buffer):
+            kept = tensors[f"replayed.{name}"].numpy()
+            getattr(buffer, name)[: len(kept)] = kept

@@ -1,0 +1,68 @@
+"""The commands about policies: `train`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command()(train)
+
+
+def train(
+    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc.")],
+    task: Annotated[str, typer.Option(help="displacement, rotation or isotonic.")],
+    preset: Annotated[
+        str, typer.Option(help="Name of a preset, or path of a .yml file of one's own.")
+    ] = "increment",
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same policy.")] = 0,
+    steps: Annotated[
+        int | None, typer.Option(min=1, help="Control steps; the preset's if not given.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder; results/training/PRESET-ALGO/TASK-SEED if not given."),
+    ] = None,
+    device: Annotated[str, typer.Option(help="Of PyTorch: cpu, cuda.")] = "cpu",
+    threads: Annotated[int, typer.Option(min=1, help="Of PyTorch and the environments.")] = 1,
+    patience: Annotated[
+        int, typer.Option(min=0, help="End after so many validations without progress; 0: never.")
+    ] = 0,
+) -> None:
+    """Train a policy on stations that no suite has; an interrupted training goes on."""
+    from rich.console import Console
+
+    try:
+        from benchmarks.training.checkpoint import CheckpointError
+        from benchmarks.training.job import ordered, run_train
+        from benchmarks.training.preset import PresetError
+    except ImportError as error:
+        print(
+            f"error: training needs Stable-Baselines3 ({error}); install it: "
+            "pip install -c constraints.txt -e '.[rl]'",
+            file=sys.stderr,
+        )
+        raise typer.Exit(2) from None
+    folder = out or Path("results") / "training" / f"{Path(preset).stem}-{algo}" / f"{task}-{seed}"
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise PresetError(f"--out {folder} is a file; name a folder")
+        order = ordered(algo, task, preset, seed, steps, device, threads, patience)
+        run_train(order, folder, Console())
+    except PresetError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    except CheckpointError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(1) from None
+    except KeyboardInterrupt:
+        print(
+            f"Interrupted; run it again, it goes on from {folder / 'checkpoints'}", file=sys.stderr
+        )
+        raise typer.Exit(INTERRUPTED) from None

@@ -1,0 +1,100 @@
+"""`python -m benchmarks train`: from a preset to a policy file, with progress, to go on later."""
+
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from benchmarks.training.preset import PresetError, load_preset
+from benchmarks.training.product import policy_name, policy_of
+from benchmarks.training.run import Order, Point, Trained, train
+from benchmarks.training.validation import unit_of
+from controllers.policy_file import save_policy_file
+from pma_gym.envs import ENVIRONMENTS
+
+ENVIRONMENT_OF = {task: name for name, task in ENVIRONMENTS.items()}
+"""Id of the environment of a task."""
+
+
+def ordered(
+    algorithm: str,
+    task: str,
+    preset: str,
+    seed: int,
+    steps: int | None,
+    device: str,
+    threads: int,
+    patience: int,
+) -> Order:
+    """A checked order.
+
+    Raises:
+        PresetError: an unknown task, preset or algorithm, or a device that is absent.
+    """
+    from benchmarks.training.learner import check_device
+
+    if task not in ENVIRONMENT_OF:
+        raise PresetError(f"task must be one of {', '.join(ENVIRONMENT_OF)}, got {task!r}")
+    found = load_preset(preset, algorithm, ENVIRONMENT_OF[task])
+    check_device(device)
+    if steps is not None:
+        found = found.changed(steps=steps)
+    return Order(found, seed, device, threads, patience)
+
+
+def run_train(order: Order, out: Path, console: Console) -> Path:
+    """Train, and write the policy.
+
+    Args:
+        order: what is to be trained.
+        out: folder of the policy, its checkpoints and logs.
+        console: where progress is shown.
+    Returns:
+        The policy's .json file.
+    Raises:
+        CheckpointError: see `train`.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    unit = unit_of(order.preset.task)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console, transient=True) as progress:
+        bar = progress.add_task(policy_name(order.preset), total=order.preset.steps)
+
+        def told(steps: int, point: Point | None) -> None:
+            progress.update(bar, completed=min(steps, order.preset.steps))
+            if point is not None:
+                progress.console.print(_line(point, unit))
+
+        trained = train(order, out, told)
+    path = save_policy_file(policy_of(order, trained), out / policy_name(order.preset))
+    console.print(_closing(trained, unit, path))
+    return path
+
+
+def _line(point: Point, unit: str) -> str:
+    broken = f", {point.broken} episodes broke a limit" if point.broken else ""
+    at = f"{point.steps:9d} steps {point.wall_s:6.0f} s"
+    return f"{at}   validation {point.error:.4g} {unit}{broken}"
+
+
+def _closing(trained: Trained, unit: str, path: Path) -> str:
+    course = trained.course
+    rate = trained.model.num_timesteps / course.wall_s
+    early = " (ended at a plateau)" if course.stopped else ""
+    return (
+        f"{trained.final.error:.4g} {unit} on validation stations after {course.wall_s:.0f} s, "
+        f"{rate:.0f} steps/s with validation{early}\nPolicy: {path}"
+    )

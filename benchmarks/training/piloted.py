@@ -1,0 +1,157 @@
+"""The batched environment as a policy meets it: entries of its view in, its actions out."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+
+from controllers.form import HIGHEST_V, Form
+from controllers.pilots import Pilots
+from controllers.view import View
+from pma_gym.envs import PMAVectorEnv, Station
+from pma_gym.envs.observation import BOUND
+from pma_gym.plant.model import load_model
+
+
+class PilotedVecEnv(VecEnv):
+    """`PMAVectorEnv` behind a view and a form, for Stable-Baselines3.
+
+    Args:
+        count: how many environments.
+        task: name of the task.
+        view: what the policy sees; `tracking`.
+        form: what its action does.
+        told: name of the model that controllers are told.
+        staggered: cut each environment's first episode at a random length, so that a rollout has
+            all parts of a trial in it.
+        options: as `PMAVectorEnv`.
+
+    Attributes:
+        envs: the PMAVectorEnv.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        task: str,
+        view: View,
+        form: Form,
+        told: str = "station",
+        staggered: bool = False,
+        **options: Any,
+    ) -> None:
+        """Make the environments and who pilots them."""
+        self.envs = PMAVectorEnv(count, task, autoreset_mode=AutoresetMode.DISABLED, **options)
+        chosen, model = self.envs.options, load_model(told)
+
+        def station(pressure: float) -> Station:
+            late = chosen.action_delay * chosen.period, chosen.observation_delay * chosen.period
+            return Station(model, self.envs.task, pressure, chosen.period, *late)
+
+        self.pilots = Pilots(count, view, form, station)
+        self.render_mode = None
+        self._staggered = staggered
+        self._length = self.envs.task.steps(chosen.control_rate_hz)
+        self._left = np.zeros(count, np.int64)
+        self._nothing: list[dict[str, Any]] = [{} for _ in range(count)]
+        self._actions = np.zeros((count, 1), np.float32)
+        self._returns = np.zeros(count)
+        self._all = np.arange(count)
+        super().__init__(
+            count,
+            spaces.Box(-BOUND, BOUND, (self.pilots.entries,), np.float32),
+            spaces.Box(-1.0, 1.0, (1,), np.float32),
+        )
+
+    def reset(self) -> VecEnvObs:
+        """Begin an episode in every environment, with the seeds that `seed` was given."""
+        self.envs.reset(seed=self._seeds if self._seeds[0] is not None else None)
+        self._left[:] = np.iinfo(np.int64).max
+        if self._staggered:
+            generator = np.random.default_rng(self._seeds[0])
+            self._left[:] = generator.integers(1, self._length + 1, self.num_envs)
+        self._reset_seeds()
+        self._returns[:] = 0.0
+        self.pilots.begin(self._all, self.envs.pressures)
+        return self.pilots.see(self.envs.readings(), self._all)
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions of the next step."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Step; an environment whose episode ends returns the next one's first entries."""
+        volts = self.pilots.volts(self._actions[:, 0])
+        commands = volts[:, None] * (2.0 / HIGHEST_V) - 1.0
+        _, rewards, terminated, truncated, info = self.envs.step(commands)
+        self._returns += rewards
+        self._left -= 1
+        entries = self.pilots.see(self.envs.readings())
+        over = terminated | truncated | (self._left == 0)
+        infos = self._nothing.copy()
+        if over.any():
+            which = np.flatnonzero(over)
+            for i in which.tolist():
+                infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
+            self._begin_again(which, over)
+            entries[which] = self.pilots.see(self.envs.readings(), which)
+        return entries, rewards.astype(np.float32), over, infos
+
+    def _last(
+        self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
+    ) -> dict[str, Any]:
+        """What is told of an environment whose episode ends; errors unless it was cut."""
+        name = f"rmse_by_phase_{self.envs.task.protocol.unit}"
+        told: dict[str, Any] = {
+            "terminal_observation": entries,
+            "TimeLimit.truncated": not broken,
+            "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
+        }
+        if name in info and info[f"_{name}"][i]:
+            phases = info[name]
+            told[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
+        return told
+
+    def _begin_again(self, which: NDArray[np.int64], over: NDArray[np.bool_]) -> None:
+        self.envs.reset(options={"reset_mask": over})
+        self._returns[which] = 0.0
+        self._left[which] = np.iinfo(np.int64).max
+        self.pilots.begin(which, self.envs.pressures[which])
+
+    def close(self) -> None:
+        """Free the environments."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute, the same for each environment."""
+        value = getattr(self, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(
+        self,
+        attr_name: str,
+        value: Any,  # noqa: ANN401 - as the base class has it
+        indices: VecEnvIndices = None,
+    ) -> None:
+        """Refused: the environments share one engine."""
+        raise AttributeError(f"{attr_name} cannot be set: make the environments anew")
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method of the `PMAVectorEnv` once; its result for each environment asked for."""
+        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """Whether an environment is wrapped; Monitor's `episode` is in the infos without it."""
+        return [False for _ in self._get_indices(indices)]

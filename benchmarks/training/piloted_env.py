@@ -1,0 +1,86 @@
+"""One environment behind a view and a form, for any library that takes Gymnasium environments."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from benchmarks.training.stations import Stations
+from controllers.form import Form
+from controllers.pilot import Pilot
+from controllers.view import View
+from pma_gym.envs import PMAEnv
+from pma_gym.envs.observation import BOUND
+
+
+class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[Any], NDArray[Any]]):
+    """As `PilotedVecEnv`, one of it: what the presets name as `env_wrapper`.
+
+    Args:
+        env: an environment of pma_gym; with `stations` or `options` it is made anew.
+        view: arguments of the View.
+        form: arguments of the Form.
+        stations: suite whose training stations episodes are on; empty for the environment's own.
+        options: options in place of the environment's.
+
+    Example:
+        >>> env = PilotedEnv(
+        ...     gym.make("pma_gym/IsokineticDisplacement-v0", pressure_kpa=300),
+        ...     view={"kind": "tracking", "preview": 2, "history": 1},
+        ...     form={"kind": "increment", "authority_v": 0.5},
+        ... )
+        >>> observation, _ = env.reset(seed=1)
+        >>> observation.shape == env.observation_space.shape
+        True
+    """
+
+    def __init__(
+        self,
+        env: gym.Env[Any, Any],
+        view: Mapping[str, Any],
+        form: Mapping[str, Any],
+        stations: str = "",
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Make the pilot, and the environment anew if it is to be another."""
+        inner = env.unwrapped
+        if not isinstance(inner, PMAEnv):
+            raise TypeError(f"env must be one of pma_gym, got {type(inner).__name__}")
+        if stations or options:
+            inner = _made(inner, stations, options or {})
+        super().__init__(inner)
+        self.rig = inner
+        self.pilot = Pilot(View.of(view), Form.of({"base": None} | dict(form)))
+        told = inner.station
+        entries = len(self.pilot.view.rows(told, self.pilot.form.base))
+        self.observation_space = spaces.Box(-BOUND, BOUND, (entries,), np.float32)
+        self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin a trial."""
+        _, info = self.rig.reset(seed=seed, options=options)
+        self.pilot.reset(self.rig.reference, self.rig.station)
+        return self.pilot.see(self.rig.reading, self.rig.time), info
+
+    def step(
+        self, action: NDArray[Any]
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """Command what the action asks for."""
+        volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
+        _, reward, terminated, truncated, info = self.rig.step(self.rig.action(volts))
+        entries = self.pilot.see(self.rig.reading, self.rig.time)
+        return entries, reward, terminated, truncated, info
+
+
+def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:
+    """The environment with other options."""
+    chosen = dict(options)
+    if stations:
+        drawn = Stations(stations)
+        chosen |= {"randomisation": drawn, "model": drawn.structure}
+    return PMAEnv(env.task, env.render_mode, **chosen)

@@ -1,0 +1,74 @@
+"""Stations that policies are trained and validated on: draws that no suite has."""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from benchmarks.comparison.recipe import Recipe
+from benchmarks.comparison.stations import draw_station
+from benchmarks.comparison.suite import frozen_suite
+from benchmarks.suite import SuiteError
+from pma_gym.plant.model import Model, load_model
+
+TRAINING = 128
+"""How many stations a policy is trained on."""
+
+VALIDATION_FIRST, VALIDATION = 10_000, 64
+"""Number of the first station that policies are validated on, and how many there are."""
+
+OPERATOR = {"operator": {"share": 1.0}}
+"""What an environment with an operator adds to its model."""
+
+
+class Stations:
+    """A randomisation: each episode gets one of some stations of a suite's recipe.
+
+    They are drawn with the recipe's training seed, so none is a station of the suite.
+
+    Args:
+        suite: name of the suite whose recipe it is.
+        first: number of the first one.
+        count: how many.
+    """
+
+    def __init__(self, suite: str, first: int = 0, count: int = TRAINING) -> None:
+        self.recipe = training_recipe(suite)
+        self._first, self._count = first, count
+
+    @property
+    def structure(self) -> Model:
+        """The nominal model with every effect that a station may have, neutral."""
+        model = load_model(self.recipe.model)
+        return model.with_effects({effect.name: {} for effect in self.recipe.effects})
+
+    def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
+        """The station of an episode."""
+        number = self._first + int(generator.integers(self._count))
+        return _station(self.recipe, number, "operator" in nominal.parameters)
+
+
+def training_recipe(suite: str) -> Recipe:
+    """A suite's recipe with its training seed in place of its own.
+
+    Raises:
+        SuiteError: no such suite, or one that draws no stations.
+    """
+    recipe = frozen_suite(suite).recipe
+    if recipe is None:
+        raise SuiteError(f"suite {suite} draws no stations; train on those of robust")
+    if recipe.training_seed == recipe.seed:
+        raise SuiteError(f"suite {suite}: training_seed must differ from seed, both are the same")
+    return _trained(recipe)
+
+
+@lru_cache(maxsize=8)
+def _trained(recipe: Recipe) -> Recipe:
+    return replace(recipe, seed=recipe.training_seed)
+
+
+@lru_cache(maxsize=4096)
+def _station(recipe: Recipe, number: int, operated: bool) -> Model:
+    if operated:
+        return _station(recipe, number, False).with_effects(OPERATOR)
+    return draw_station(recipe, number).model

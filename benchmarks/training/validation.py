@@ -1,0 +1,76 @@
+"""How well a policy follows on stations that it was not trained on."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from stable_baselines3.common.vec_env import VecEnv
+
+from benchmarks.comparison.errors import Measure, measures, task_of
+from benchmarks.comparison.statistics import interquartile_mean
+from pma_gym.units import SI_FACTORS
+
+SEED = 4_000_000
+"""Seed of the first validation episode."""
+
+
+class Validation(NamedTuple):
+    """Errors over validation episodes, in the task's unit.
+
+    Attributes:
+        error: interquartile mean of the RMSE (mm or deg), of the phases that the suites' first
+            measure of the task has: in rotation I and II.
+        broken: how many episodes broke a physical limit; such a one has the error of the range.
+        reward: mean reward of an episode.
+    """
+
+    error: float
+    broken: int
+    reward: float
+
+
+def measure_of(task: str) -> Measure:
+    """The suites' first measure of a task."""
+    return measures([task])[0]
+
+
+def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
+    """Let a policy drive one episode in every environment, without exploring.
+
+    Args:
+        model: with `predict(observations, deterministic=True)`, as Stable-Baselines3 has it.
+        envs: as `validation_environments` makes them.
+        task: name of the task.
+    """
+    envs.seed(SEED)
+    observations: Any = envs.reset()
+    measure = measure_of(task)
+    errors = np.full(envs.num_envs, np.nan)
+    rewards, broken = np.zeros(envs.num_envs), 0
+    while np.isnan(errors).any():
+        actions, _ = model.predict(observations, deterministic=True)
+        observations, gained, over, infos = envs.step(actions)
+        running = np.isnan(errors)
+        rewards[running] += gained[running]
+        for i in np.flatnonzero(over & running).tolist():
+            failed = not infos[i]["TimeLimit.truncated"]
+            broken += failed
+            errors[i] = measure.of_row(_row(task, infos[i], failed))
+    return Validation(float(interquartile_mean(errors)), broken, float(rewards.mean()))
+
+
+def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
+    """An episode's end as a row of a suite's journal."""
+    unit = task_of(task).protocol.unit
+    phases = {} if failed else info[f"rmse_by_phase_{unit}"]
+    return {
+        "task": task,
+        "failure": "a limit" if failed else "",
+        "phases": {name: {"rmse": value} for name, value in phases.items()},
+    }
+
+
+def unit_of(task: str) -> str:
+    """Unit of a task's errors, mm or deg."""
+    unit = task_of(task).protocol.unit
+    assert unit in SI_FACTORS
+    return unit
