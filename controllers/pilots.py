@@ -113,7 +113,7 @@ class Pilots:
 
     def volts(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
         """Voltages (V) of actions, shape (count,) both; beyond -1 to 1 they are held there."""
-        held = np.clip(actions.astype(np.float64), -1.0, 1.0)
+        held = np.clip(actions, -1.0, 1.0)
         wanted = self.form.wanted(held, self._volts[:, 0], self._base_volts)
         if self.view.history:
             self._actions[:, 1:] = self._actions[:, :-1]

@@ -86,7 +86,7 @@ class PilotedVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step; an environment whose episode ends returns the next one's first entries."""
-        volts = self.pilots.volts(self._actions[:, 0])
+        volts = self.pilots.volts(self._actions[:, 0].astype(np.float64))
         commands = volts[:, None] * (2.0 / HIGHEST_V) - 1.0
         _, rewards, terminated, truncated, info = self.envs.step(commands)
         self._returns += rewards

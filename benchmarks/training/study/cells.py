@@ -1,0 +1,96 @@
+"""What a study trains: algorithms, loops and tasks, and what is left out in turn."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from benchmarks.training.job import ENVIRONMENT_OF
+from benchmarks.training.preset import Preset, load_preset
+from controllers.form import MIDDLE_V, Form
+
+HEADLINE = "ppo"
+"""Algorithm with the most seeds."""
+
+HEADLINE_SEEDS, OTHER_SEEDS = 10, 5
+"""Training seeds of the headline algorithm and of everything else."""
+
+ABLATION_STEPS = 1_000_000
+"""Control steps of the trainings that leave something out, and of their like with all of it."""
+
+
+class Cell(NamedTuple):
+    """Trainings that differ in their seed alone.
+
+    Attributes:
+        group: what results call it; a folder.
+        title: what reports call it.
+        algorithm: one of `ALGORITHMS`.
+        preset: name of the preset.
+        task: displacement or rotation.
+        seeds: how many.
+        change: what is changed of the preset; "" for nothing.
+        steps: control steps; 0 for the preset's.
+    """
+
+    group: str
+    title: str
+    algorithm: str
+    preset: str
+    task: str
+    seeds: int
+    change: str = ""
+    steps: int = 0
+
+    @property
+    def resolved(self) -> Preset:
+        """The preset as it is trained."""
+        preset = load_preset(self.preset, self.algorithm, ENVIRONMENT_OF[self.task])
+        if self.steps:
+            preset = preset.changed(steps=self.steps)
+        return CHANGES[self.change](preset) if self.change else preset
+
+
+CHANGES: dict[str, Callable[[Preset], Preset]] = {
+    "no preview": lambda p: p.changed(view=replace(p.view, preview=0)),
+    "no history": lambda p: p.changed(view=replace(p.view, history=0)),
+    "no randomisation": lambda p: p.changed(stations=""),
+    "no averaging": lambda p: p.changed(average_share=0.0),
+    "direct form": lambda p: p.changed(form=Form("direct", MIDDLE_V)),
+}
+"""What may be changed of a preset, by name."""
+
+
+def cells() -> list[Cell]:
+    """All of the study, what others build on first."""
+    found = []
+    for task in ("displacement", "rotation"):
+        for preset in ("increment", "increment-late"):
+            group = f"{HEADLINE}-increment"
+            found.append(Cell(group, "PPO", HEADLINE, preset, task, HEADLINE_SEEDS))
+    for algorithm in ("sac", "td3", "tqc"):
+        for task in ("displacement", "rotation"):
+            title = algorithm.upper()
+            found.append(
+                Cell(f"{algorithm}-increment", title, algorithm, "increment", task, OTHER_SEEDS)
+            )
+    found += ablations("displacement")
+    return found
+
+
+def ablations(task: str) -> list[Cell]:
+    """The headline's training, shorter, with all knowledge and with each piece left out."""
+
+    def cell(name: str, title: str, preset: str = "increment", change: str = "") -> Cell:
+        group = f"ablation-{name}"
+        return Cell(group, title, HEADLINE, preset, task, OTHER_SEEDS, change, ABLATION_STEPS)
+
+    return [
+        cell("whole", "all of it"),
+        cell("preview", "no preview", change="no preview"),
+        cell("history", "no history", change="no history"),
+        cell("randomisation", "nominal station alone", change="no randomisation"),
+        cell("averaging", "weights not averaged", change="no averaging"),
+        cell("direct", "voltage in place of its change", change="direct form"),
+        cell("residual", "residual on feed-forward + PID", "residual"),
+        cell("plain", "the environment's own observation, voltage", "plain"),
+    ]

@@ -1,0 +1,92 @@
+"""Policies of a study on the frozen suites, as any controller is judged there."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+
+from benchmarks.comparison.errors import Measure, Record, measures
+from benchmarks.comparison.job import run_comparison
+from benchmarks.comparison.journal import JOURNAL, read_rows
+from benchmarks.comparison.suite import FrozenSuite, frozen_suite
+from benchmarks.contender import parse_contenders
+from benchmarks.training.study.pooled import Pool
+
+SUITES = ("nominal", "robust", "hard")
+"""Suites that policies are judged by."""
+
+
+def seed_folders(group: Path) -> list[Path]:
+    """Folders of a group's seeds, in order."""
+    return sorted(group.glob("seed-*"), key=lambda path: int(path.name.partition("-")[2]))
+
+
+def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path:
+    """Run every seed's policies through a suite; what ran before stays.
+
+    Args:
+        group: folder of the seeds.
+        algorithm: of the policies.
+        suite: name of the suite.
+        jobs: processes.
+        console: where to print.
+    Returns:
+        The folder of the results.
+    """
+    frozen = frozen_suite(suite)
+    names = ",".join(f"{folder}:{algorithm}" for folder in seed_folders(group))
+    entries = [frozen.entry(one) for one in parse_contenders(names)]
+    entries = [
+        entry._replace(only=_able(frozen, entry.only, group, algorithm)) for entry in entries
+    ]
+    out = group / f"suite-{suite}"
+    run_comparison(frozen, entries, out, jobs, console)
+    return out
+
+
+def _able(suite: FrozenSuite, tasks: Sequence[str], group: Path, algorithm: str) -> tuple[str, ...]:
+    """Those of some tasks whose kind has a policy of the suite's loop."""
+    loop = suite_loop(suite)
+    first = seed_folders(group)[0]
+    return tuple(
+        task for task in tasks if (first / f"{_kind(task)}-{loop}-{algorithm}.json").exists()
+    )
+
+
+def suite_loop(suite: FrozenSuite) -> str:
+    """Name of a suite's loop."""
+    from controllers.designs import loop_name
+    from pma_gym.envs import PMAEnv
+
+    environment = PMAEnv("displacement", pressure_kpa=300.0, **suite.environment)
+    environment.reset(seed=0)
+    return loop_name(environment.station)
+
+
+def _kind(task: str) -> str:
+    from benchmarks.comparison.suite import kind_of
+
+    return kind_of(task)
+
+
+def pools(results: Path, suite: str, seeds: Sequence[str]) -> dict[str, Pool]:
+    """Pooled errors by measure.
+
+    Args:
+        results: folder of a run.
+        suite: name of its suite.
+        seeds: names of the contenders.
+    """
+    frozen = frozen_suite(suite)
+    rows = read_rows(results / JOURNAL)
+    record = Record.of(frozen, [row for row in rows if row["controller"] in seeds])
+    found: dict[str, Pool] = {}
+    for measure in measures(frozen.tasks):
+        if _complete(record, measure, seeds):
+            found[measure.name] = Pool(record.errors(measure))
+    return found
+
+
+def _complete(record: Record, measure: Measure, seeds: Sequence[str]) -> bool:
+    whole = {entry.contender.name for entry in record.whole(measure.tasks)}
+    return set(seeds) <= whole
