@@ -1,0 +1,61 @@
+"""`python -m benchmarks.training.study`: trains the study's policies, judges them, reports."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+OUT = Path("results/training/study")
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+Out = Annotated[Path, typer.Option(help="Folder of the study.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+Groups = Annotated[str, typer.Option(help="Groups by commas; all if empty.")]
+
+
+@app.command()
+def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
+    """Train what has no policy yet; an interrupted study goes on."""
+    from benchmarks.training.study.cells import cells
+    from benchmarks.training.study.runs import Run, runs, train_all
+    from controllers.policy_file import PolicyFile
+
+    chosen = [cell for cell in cells() if not groups or cell.group in groups.split(",")]
+    todo = runs(chosen, out)
+
+    def told(done: Run, policy: PolicyFile, number: int, count: int) -> None:
+        scores = policy.training["scores"]["validation"]
+        print(
+            f"{number}/{count} {done.cell.group} {policy.name} seed {done.seed}: "
+            f"{scores['error']:.4g} {scores['unit']} in {policy.training['wall_s']:.0f} s",
+            flush=True,
+        )
+
+    try:
+        print(f"{train_all(todo, jobs, told)} trained, {len(todo)} in all")
+    except KeyboardInterrupt:
+        print("Interrupted; run it again, it goes on where it stopped", file=sys.stderr)
+        raise typer.Exit(130) from None
+
+
+@app.command()
+def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "") -> None:
+    """Run every seed's policies through the suites; what ran before stays."""
+    from rich.console import Console
+
+    from benchmarks.training.study.cells import cells
+    from benchmarks.training.study.judged import SUITES
+    from benchmarks.training.study.judged import judge as judge_group
+
+    algorithms = {cell.group: cell.algorithm for cell in cells()}
+    for group, algorithm in algorithms.items():
+        if groups and group not in groups.split(","):
+            continue
+        for suite in suites.split(",") if suites else SUITES:
+            judge_group(out / group, algorithm, suite, jobs, Console())
+
+
+if __name__ == "__main__":
+    app()
