@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 OUT = Path("results/training/study")
+FIGURES = Path("docs/figures/policies.json")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
@@ -46,15 +47,48 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
     from rich.console import Console
 
     from benchmarks.training.study.cells import cells
-    from benchmarks.training.study.judged import SUITES
+    from benchmarks.training.study.judged import SUITES, judge_pid
     from benchmarks.training.study.judged import judge as judge_group
 
+    if not groups:
+        judge_pid(out, jobs, Console())
     algorithms = {cell.group: cell.algorithm for cell in cells()}
     for group, algorithm in algorithms.items():
         if groups and group not in groups.split(","):
             continue
         for suite in suites.split(",") if suites else SUITES:
             judge_group(out / group, algorithm, suite, jobs, Console())
+
+
+@app.command()
+def report(
+    out: Out = OUT,
+    figures: Annotated[Path, typer.Option(help="JSON file of all figures.")] = FIGURES,
+    ship: Annotated[bool, typer.Option(help="Also put the best policies where they ship.")] = False,
+) -> None:
+    """Collect all figures, draw the curves, try the best policies where none was trained."""
+    import json
+
+    from benchmarks.files import write_text
+    from benchmarks.training.study.figures import pid_errors, study_figures
+    from benchmarks.training.study.judged import SHIPPED_GROUP
+    from benchmarks.training.study.pictures import write_curves
+    from benchmarks.training.study.robustness import robustness
+    from benchmarks.training.study.ship import best_policies
+    from benchmarks.training.study.ship import ship as ship_policies
+
+    found = study_figures(out)
+    found["pid"] = pid_errors(out)
+    best = {path.stem.rpartition("-")[0]: path for path in best_policies(out / SHIPPED_GROUP)}
+    found["robustness"] = {
+        task: robustness(task, {"ppo": best[f"{task}-100hz"]})
+        for task in ("displacement", "rotation")
+    }
+    write_text(figures, json.dumps(found, indent=1) + "\n")
+    write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
+    if ship:
+        for path in ship_policies(out / SHIPPED_GROUP, found["groups"][SHIPPED_GROUP]):
+            print(path)
 
 
 if __name__ == "__main__":

@@ -12,6 +12,12 @@ from benchmarks.comparison.suite import FrozenSuite, frozen_suite
 from benchmarks.contender import parse_contenders
 from benchmarks.training.study.pooled import Pool
 
+SHIPPED_GROUP = "ppo-increment"
+"""Group whose best policies ship."""
+
+PID_FOLDER = "pid"
+"""Folder of the PID's results, which learning curves are compared with."""
+
 SUITES = ("nominal", "robust", "hard")
 """Suites that policies are judged by."""
 
@@ -42,6 +48,13 @@ def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) 
     out = group / f"suite-{suite}"
     run_comparison(frozen, entries, out, jobs, console)
     return out
+
+
+def judge_pid(out: Path, jobs: int, console: Console) -> None:
+    """Run the PID through suite `robust`, what curves are compared with."""
+    frozen = frozen_suite("robust")
+    entries = [frozen.entry(one) for one in parse_contenders("pid")]
+    run_comparison(frozen, entries, out / PID_FOLDER, jobs, console)
 
 
 def _able(suite: FrozenSuite, tasks: Sequence[str], group: Path, algorithm: str) -> tuple[str, ...]:
