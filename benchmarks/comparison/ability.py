@@ -1,5 +1,7 @@
 """Whether a drawn station can do the tasks at all: else it would say nothing about controllers."""
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,7 +38,7 @@ def inability(model: Model, recipe: Recipe) -> str:
     """
     if model.parameters["drive"].offset > 0.0:
         return "its drive pulls at 0 V"
-    damped = _damping(model) / _damping(load_model(recipe.model))
+    damped = _damping(model) / _nominal_damping(recipe)
     if damped < LEAST_DAMPING:
         return f"its damping is {damped:.2g} of the nominal one at {LOWEST_PRESSURE / 1e3:g} kPa"
     plant, ramps = Plant(model), dict[tuple[float, float], Ramp]()
@@ -54,6 +56,11 @@ def inability(model: Model, recipe: Recipe) -> str:
             if why:
                 return f"{name} at {pressure_kpa:g} kPa: {why}"
     return ""
+
+
+@lru_cache(maxsize=4)
+def _nominal_damping(recipe: Recipe) -> float:
+    return _damping(load_model(recipe.model))
 
 
 def _damping(model: Model) -> float:

@@ -94,6 +94,12 @@ class _Search:
         # Motor and regulator command, x0.
         self.inputs = np.stack([motor, regulator, np.zeros(len(motor))], axis=1).astype(float)
         self.state = np.zeros((len(motor), len(self.names)))
+        numbers = plant.vector if self.vectors is None else self.vectors
+        self._stride = 0 if self.vectors is None else self.vectors.shape[1]
+        # A search asks for thousands of rates: looking its addresses up takes as long as they do.
+        self._state_at, self._numbers_at = self.state.ctypes.data, numbers.ctypes.data
+        self._numbers = numbers
+        self._columns: dict[str, dict[str, np.ndarray]] = {}
         self.unbalanced = ""
 
     @property
@@ -112,11 +118,10 @@ class _Search:
         if zero is not None:
             inputs = inputs.copy()
             inputs[:, 2] = zero
-        numbers = self.plant.vector if self.vectors is None else self.vectors
-        stride = 0 if self.vectors is None else self.vectors.shape[1]
         out = np.empty_like(self.state)
-        states, commands, vectors = (a.ctypes.data for a in (self.state, inputs, numbers))
-        self.plant.program.derivative(len(out), states, commands, vectors, stride, out.ctypes.data)
+        commands, at = inputs.ctypes.data, out.ctypes.data
+        given = self._state_at, commands, self._numbers_at, self._stride
+        self.plant.program.derivative(len(out), *given, at)
         return out[:, self.names[name]]
 
     def relax(self, name: str, of: str = "", about: np.ndarray | float = 0.0) -> None:
@@ -169,7 +174,9 @@ class _Search:
 
     def parameters(self, effect: str) -> dict[str, np.ndarray]:
         """An effect's parameters, one each or one for all."""
-        return _columns(self.plant, self.vectors, effect)
+        if effect not in self._columns:
+            self._columns[effect] = _columns(self.plant, self.vectors, effect)
+        return self._columns[effect]
 
     def force(self, contraction: np.ndarray) -> np.ndarray:
         """Force of the muscle (N) at a contraction (m), without the cable, shape (n,)."""
