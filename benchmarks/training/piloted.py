@@ -17,7 +17,6 @@ from pma_gym.envs import PMAVectorEnv, Station
 from pma_gym.envs.observation import BOUND
 from pma_gym.plant.model import load_model
 
-
 LEAST_REWARD, BROKEN_REWARD = -10.0, -100.0
 """Least reward of a step that is learned from, and of one that breaks a limit.
 
