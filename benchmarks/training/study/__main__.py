@@ -54,7 +54,8 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
         judge_pid(out, jobs, Console())
     algorithms = {cell.group: cell.algorithm for cell in cells()}
     for group, algorithm in algorithms.items():
-        if groups and group not in groups.split(","):
+        wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
+        if not wanted:
             continue
         for suite in suites.split(",") if suites else SUITES:
             judge_group(out / group, algorithm, suite, jobs, Console())
@@ -70,8 +71,8 @@ def report(
     import json
 
     from benchmarks.files import write_text
-    from benchmarks.training.study.figures import pid_errors, study_figures
-    from benchmarks.training.study.judged import SHIPPED_GROUP
+    from benchmarks.training.study.figures import pid_errors, study_figures, variation
+    from benchmarks.training.study.judged import PID_FOLDER, SHIPPED_GROUP
     from benchmarks.training.study.pictures import write_curves
     from benchmarks.training.study.robustness import robustness
     from benchmarks.training.study.ship import best_policies
@@ -79,6 +80,7 @@ def report(
 
     found = study_figures(out)
     found["pid"] = pid_errors(out)
+    found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
     best = {path.stem.rpartition("-")[0]: path for path in best_policies(out / SHIPPED_GROUP)}
     found["robustness"] = {
         task: robustness(task, {"ppo": best[f"{task}-100hz"]})

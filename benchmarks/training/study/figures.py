@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.comparison.journal import JOURNAL, read_rows
 from benchmarks.comparison.statistics import interquartile_mean
 from benchmarks.training.study.cells import Cell, cells
 from benchmarks.training.study.judged import PID_FOLDER, SUITES, pools, seed_folders
@@ -46,12 +47,14 @@ def _group(folder: Path, members: list[Cell]) -> dict[str, Any]:
     first = members[0]
     names = [f"{seed.name}-{first.algorithm}" for seed in seeds]
     judged: dict[str, Any] = {}
+    smooth: dict[str, Any] = {}
     for suite in SUITES:
         results = folder / f"suite-{suite}"
         if results.is_dir():
             judged[suite] = {
                 measure: _pooled(pool) for measure, pool in pools(results, suite, names).items()
             }
+            smooth[suite] = variation(results)
     policies = {
         path.stem: [
             load_policy_file(seed / path.name) for seed in seeds if (seed / path.name).exists()
@@ -63,8 +66,18 @@ def _group(folder: Path, members: list[Cell]) -> dict[str, Any]:
         "algorithm": first.algorithm,
         "seeds": len(seeds),
         "judged": judged,
+        "variation_v_per_s": smooth,
         "trained": {name: _trained(files) for name, files in policies.items()},
     }
+
+
+def variation(results: Path) -> dict[str, float]:
+    """Median total variation of the voltage a second (V/s) by task, in a run's cases."""
+    by_task: dict[str, list[float]] = {}
+    for row in read_rows(results / JOURNAL):
+        if not row["failure"]:
+            by_task.setdefault(row["task"], []).append(row["variation_v_per_s"])
+    return {task: float(np.median(values)) for task, values in by_task.items()}
 
 
 def _pooled(pool: Pool) -> dict[str, Any]:

@@ -27,7 +27,7 @@ def seed_folders(group: Path) -> list[Path]:
     return sorted(group.glob("seed-*"), key=lambda path: int(path.name.partition("-")[2]))
 
 
-def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path:
+def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path | None:
     """Run every seed's policies through a suite; what ran before stays.
 
     Args:
