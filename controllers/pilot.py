@@ -20,6 +20,12 @@ from controllers.view import (
 )
 from pma_gym.envs import Reading, Station
 
+DIVERGED = (
+    "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
+    "with a lower learning rate, or take another policy"
+)
+"""What is said of an action that is no number: which of many, and the action."""
+
 
 class Pilot:
     """One trial, seen and driven as a policy sees and drives it.
@@ -109,10 +115,7 @@ class Pilot:
             ValueError: an action that is no number; the trial stays as it was.
         """
         if not math.isfinite(action):
-            raise ValueError(
-                f"the policy's action must be a finite number, got {action}; its weights have "
-                "diverged: train it with a lower learning rate, or take another policy"
-            )
+            raise ValueError(DIVERGED.format("", action))
         held = min(max(action, -1.0), 1.0)
         wanted = self.form.wanted(held, self._before, self._voltage)
         self._before = min(max(wanted, 0.0), HIGHEST_V)
