@@ -1,5 +1,6 @@
 """What stands between a policy and a station: readings become entries, actions become volts."""
 
+import math
 from collections import deque
 
 import numpy as np
@@ -18,6 +19,12 @@ from controllers.view import (
     steps_of,
 )
 from pma_gym.envs import Reading, Station
+
+DIVERGED = (
+    "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
+    "with a lower learning rate, or take another policy"
+)
+"""What is said of an action that is no number: which of many, and the action."""
 
 
 class Pilot:
@@ -67,7 +74,12 @@ class Pilot:
         Args:
             reading: what the sensors say.
             time: since the trial began (s).
+        Raises:
+            ValueError: a reading that is no number; the trial stays as it was.
         """
+        # A sum of numbers is a number: one question instead of five.
+        if not math.isfinite(sum(reading)):
+            raise ValueError(_no_number(reading, time))
         step = min(round(time / self._period), self._last)
         self._voltage = 0.0 if self.base is None else self.base.act(reading, time)
         if self.view.kind == "environment":
@@ -97,7 +109,13 @@ class Pilot:
         )
 
     def volts(self, action: float) -> float:
-        """Voltage (V) of an action; beyond -1 to 1 it is held there."""
+        """Voltage (V) of an action; beyond -1 to 1 it is held there.
+
+        Raises:
+            ValueError: an action that is no number; the trial stays as it was.
+        """
+        if not math.isfinite(action):
+            raise ValueError(DIVERGED.format("", action))
         held = min(max(action, -1.0), 1.0)
         wanted = self.form.wanted(held, self._before, self._voltage)
         self._before = min(max(wanted, 0.0), HIGHEST_V)
@@ -106,6 +124,11 @@ class Pilot:
             self._volts.append(self._before)
             self._volts.popleft()
         return self._before
+
+
+def _no_number(reading: Reading, time: float) -> str:
+    bad = [f"{k} is {v}" for k, v in reading._asdict().items() if not math.isfinite(v)]
+    return f"every reading must be a number, at {time:g} s {', '.join(bad)}; check the sensor"
 
 
 def rest_voltage(station: Station) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.form import HIGHEST_V, MIDDLE_V, Form
-from controllers.pilot import base_of, rest_voltage
+from controllers.pilot import DIVERGED, base_of, rest_voltage
 from controllers.view import Scales, View, ahead, clipped, start_entry, steps_of
 from pma_gym.envs import Reading, Station
 
@@ -112,7 +112,15 @@ class Pilots:
             self._base_volts[i] = self._bases[i].act(reading, now)
 
     def volts(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Voltages (V) of actions, shape (count,) both; beyond -1 to 1 they are held there."""
+        """Voltages (V) of actions, shape (count,) both; beyond -1 to 1 they are held there.
+
+        Raises:
+            ValueError: an action that is no number; the trials stay as they were.
+        """
+        finite = np.isfinite(actions)
+        if not finite.all():
+            first = int(np.argmin(finite))
+            raise ValueError(DIVERGED.format(f" that of trial {first}", actions[first]))
         held = np.clip(actions, -1.0, 1.0)
         wanted = self.form.wanted(held, self._volts[:, 0], self._base_volts)
         if self.view.history:

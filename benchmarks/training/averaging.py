@@ -24,21 +24,22 @@ class WeightAverage(BaseCallback):
 
     Attributes:
         weights: the average of each of the policy's parameters; None before it began.
+        seen: control steps at which it was updated last.
     """
 
     def __init__(self, share: float, total: int | None = None) -> None:
         super().__init__()
         self.share, self.total = share, total
         self.weights: list[torch.Tensor] | None = None
-        self._seen = 0
+        self.seen = 0
 
     def _on_step(self) -> bool:
         return True
 
     def _on_rollout_start(self) -> None:
         total = self.total or int(self.model._total_timesteps)
-        since, self._seen = self.model.num_timesteps - self._seen, self.model.num_timesteps
-        if self._seen < (1.0 - SPANS * self.share) * total:
+        since, self.seen = self.model.num_timesteps - self.seen, self.model.num_timesteps
+        if self.seen < (1.0 - SPANS * self.share) * total:
             return
         now = [parameter.data for parameter in self.model.policy.parameters()]
         if self.weights is None:
@@ -48,10 +49,6 @@ class WeightAverage(BaseCallback):
         for mean, one in zip(self.weights, now, strict=True):
             mean.lerp_(one, weight)
 
-    def resumed_at(self, steps: int) -> None:
-        """Count on from so many control steps."""
-        self._seen = steps
-
 
 @contextmanager
 def averaged(model: BaseAlgorithm, average: WeightAverage | None) -> Iterator[None]:
@@ -60,13 +57,14 @@ def averaged(model: BaseAlgorithm, average: WeightAverage | None) -> Iterator[No
         yield
         return
     now = [parameter.data.clone() for parameter in model.policy.parameters()]
-    _set(model, average.weights)
+    set_weights(model, average.weights)
     try:
         yield
     finally:
-        _set(model, now)
+        set_weights(model, now)
 
 
-def _set(model: BaseAlgorithm, weights: list[torch.Tensor]) -> None:
+def set_weights(model: BaseAlgorithm, weights: list[torch.Tensor]) -> None:
+    """Give each of a policy's parameters a value."""
     for parameter, one in zip(model.policy.parameters(), weights, strict=True):
         parameter.data.copy_(one)

@@ -5,13 +5,15 @@ travel as safetensors, counts as JSON.
 """
 
 import json
+import re
 import shutil
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
+from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from stable_baselines3.common.base_class import BaseAlgorithm
 
@@ -49,8 +51,10 @@ def save_checkpoint(
         shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir()
         tensors, numbers = _state(model)
-        if average is not None and average.weights is not None:
-            tensors |= {f"average.{i}": one for i, one in enumerate(average.weights)}
+        if average is not None:
+            # The last rollout of a leg is averaged when the next leg begins.
+            numbers["averaged_at"] = average.seen
+            tensors |= {f"average.{i}": one for i, one in enumerate(average.weights or ())}
         save_file(
             {key: one.contiguous().clone() for key, one in tensors.items()},
             partial / "state.safetensors",
@@ -59,33 +63,44 @@ def save_checkpoint(
         (partial / "state.json").write_text(content, encoding="utf-8")
         shutil.rmtree(final, ignore_errors=True)
         partial.rename(final)
-    except OSError as error:
+    # What fails while tensors are written is no OSError.
+    except (OSError, SafetensorError) as error:
         shutil.rmtree(partial, ignore_errors=True)
         kept = latest(folder)
+        why = getattr(error, "strerror", None) or error
         stays = f"the one of leg {kept[0]} stays in {kept[1]}" if kept else "there is none before"
         raise CheckpointError(
-            f"checkpoint {number} cannot be saved in {folder}: {error.strerror or error}; {stays}; "
+            f"checkpoint {number} cannot be saved in {folder}: {why}; {stays}; "
             "make room or allow writing, then run the same command again: it goes on from there"
         ) from error
-    for old in sorted(folder.glob("[0-9]*"))[:-2]:
+    for old in _numbered(folder)[:-2]:
         shutil.rmtree(old, ignore_errors=True)
 
 
 def latest(folder: Path) -> tuple[int, Path] | None:
     """Number and folder of the newest checkpoint, if there is one."""
-    found = sorted(path for path in folder.glob("[0-9]*") if (path / "state.json").is_file())
+    found = [path for path in _numbered(folder) if (path / "state.json").is_file()]
     return (int(found[-1].name), found[-1]) if found else None
 
 
-def told(path: Path) -> dict[str, Any]:
+def _numbered(folder: Path) -> list[Path]:
+    """Checkpoints by number; what somebody put beside them is none."""
+    return sorted(path for path in folder.glob("*") if re.fullmatch("[0-9]{6}", path.name))
+
+
+def told(path: Path, keys: Collection[str]) -> dict[str, Any]:
     """What a checkpoint remembers besides its tensors.
 
+    Args:
+        path: of the checkpoint.
+        keys: what there must be.
     Raises:
         CheckpointError: it is damaged.
     """
     try:
-        return json.loads((path / "state.json").read_text(encoding="utf-8"))["told"]
-    except (OSError, ValueError, KeyError) as error:
+        found = json.loads((path / "state.json").read_text(encoding="utf-8"))["told"]
+        return {key: found[key] for key in keys}
+    except (OSError, ValueError, KeyError, TypeError) as error:
         raise _damaged(path, error) from error
 
 
@@ -104,6 +119,8 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | N
         ]
         if average is not None and means:
             average.weights = means
+        if average is not None:
+            average.seen = int(numbers["averaged_at"])
     except Exception as error:
         raise _damaged(path, error) from error
 

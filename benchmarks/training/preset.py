@@ -5,15 +5,18 @@ its action does are the arguments of the wrapper `benchmarks.training.piloted_en
 that the zoo trains the same thing.
 """
 
-import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.training.settings import mapping, nearest, network, real, setting, whole
+from benchmarks.training.stations import training_recipe
 from controllers.form import Form
+from controllers.pilot import base_of
 from controllers.view import View
 from pma_gym.envs import ENVIRONMENTS
+from pma_gym.envs.options import parse_options, parse_task
 
 PRESETS = Path(__file__).with_name("presets")
 """Folder of the presets."""
@@ -24,32 +27,14 @@ ALGORITHMS = ("ppo", "sac", "td3", "tqc")
 WRAPPER = "benchmarks.training.piloted_env.PilotedEnv"
 """The only wrapper that a preset may name."""
 
-NUMBERS = {
-    "batch_size",
-    "buffer_size",
-    "clip_range",
-    "ent_coef",
-    "gae_lambda",
-    "gamma",
-    "gradient_steps",
-    "learning_rate",
-    "learning_starts",
-    "max_grad_norm",
-    "n_epochs",
-    "n_steps",
-    "policy_delay",
-    "target_kl",
-    "target_noise_clip",
-    "target_policy_noise",
-    "tau",
-    "top_quantiles_to_drop_per_net",
-    "train_freq",
-    "vf_coef",
-}
-"""Settings of the algorithms that are numbers; "lin_0.001" falls linearly to 0, "auto" is SB3's."""
+WRAPPED = {"view": True, "form": True, "stations": False, "options": False}
+"""Its arguments, and whether they must be there."""
 
-NETWORK = {"net_arch", "log_std_init", "n_critics", "n_quantiles"}
-"""Settings of the network."""
+AVERAGE = "benchmarks.training.averaging.WeightAverage"
+"""The only callback that a preset may name."""
+
+AVERAGED = {"share": True}
+"""Its arguments, and whether they must be there."""
 
 
 class PresetError(ValueError):
@@ -143,7 +128,7 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
     if algorithm not in ALGORITHMS:
         raise PresetError(
             f"algo must be one of {', '.join(ALGORITHMS)}, got {algorithm!r}"
-            f"{_nearest(algorithm, ALGORITHMS)}"
+            f"{nearest(algorithm, ALGORITHMS)}"
         )
     path = Path(name) if name.endswith((".yml", ".yaml")) else PRESETS / name / f"{algorithm}.yml"
     if not path.is_file():
@@ -153,7 +138,7 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
             raise PresetError(f"preset {name!r} has no {algorithm}; it has {has}")
         raise PresetError(
             f"no preset {name!r}: there are {', '.join(names)}, or give the path of a .yml file"
-            f"{_nearest(name, names)}"
+            f"{nearest(name, names)}"
         )
     try:
         document = yaml.safe_load(path.read_text(encoding="utf-8"))
@@ -167,104 +152,93 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
             path.stem if name.endswith(("yml", "yaml")) else name,
             algorithm,
             environment,
-            dict(document[environment]),
+            document[environment],
         )
     except (TypeError, ValueError, KeyError) as error:
         raise PresetError(f"{path}, {environment}: {error}") from error
 
 
-def _parsed(name: str, algorithm: str, environment: str, given: dict[str, Any]) -> Preset:
+def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Preset:
+    given = mapping("the entry", entry)
+    for key in ("env_wrapper", "n_envs", "n_timesteps"):
+        if key not in given:
+            raise ValueError(f"{key} is missing")
     if given.pop("policy", "MlpPolicy") != "MlpPolicy":
         raise ValueError("policy must be MlpPolicy: other networks cannot be shipped")
     if given.pop("normalize", False):
         raise ValueError("normalize is not supported: the view has scales of its own")
-    wrapper = _wrapper(given.pop("env_wrapper"))
-    average = _average(given.pop("callback", None))
-    network = given.pop("policy_kwargs", {})
-    if not isinstance(network, Mapping) or not set(network) <= NETWORK:
-        raise ValueError(
-            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {network!r}; "
-            "text that the zoo would evaluate is not read here"
-        )
-    noise = given.pop("noise_std", 0.0)
     if given.pop("noise_type", "normal") != "normal":
         raise ValueError("noise_type must be normal")
-    environments, steps = _whole(given, "n_envs"), _whole(given, "n_timesteps")
-    for key, value in given.items():
-        _check_setting(key, value)
-    return Preset(
+    wrapper = _arguments("env_wrapper", given.pop("env_wrapper"), WRAPPER, WRAPPED)
+    average = _average(given.pop("callback", None))
+    layers, noise = (
+        network(given.pop("policy_kwargs", {})),
+        real("noise_std", given.pop("noise_std", 0.0)),
+    )
+    environments, steps = (whole(key, given.pop(key)) for key in ("n_envs", "n_timesteps"))
+    found = Preset(
         name,
         algorithm,
         environment,
-        View.of(wrapper.pop("view")),
-        Form.of({"base": None} | wrapper.pop("form")),
-        str(wrapper.pop("stations", "")),
-        dict(wrapper.pop("options", {})),
+        View.of(mapping("view", wrapper["view"])),
+        Form.of({"base": None} | mapping("form", wrapper["form"])),
+        str(wrapper.get("stations", "")),
+        mapping("options", wrapper.get("options", {})),
         environments,
         steps,
         average,
-        given,
-        dict(network),
+        {key: setting(algorithm, key, value) for key, value in given.items()},
+        layers,
         float(noise),
     )
+    _check_environment(found)
+    return found
 
 
-def _wrapper(given: object) -> dict[str, Any]:
-    """Arguments of the wrapper."""
-    if not isinstance(given, list) or len(given) != 1 or list(given[0]) != [WRAPPER]:
-        raise ValueError(f"env_wrapper must be a list of {WRAPPER} alone, got {given!r}")
-    arguments = dict(given[0][WRAPPER])
-    strange = sorted(set(arguments) - {"view", "form", "stations", "options"})
-    if strange or not {"view", "form"} <= set(arguments):
+def _check_environment(preset: Preset) -> None:
+    """Refuse what no environment could be made of, before anything is made."""
+    options = {key: value for key, value in preset.options.items() if key != "task"}
+    doubled = sorted({"model", "randomisation"} & set(options))
+    if preset.stations and doubled:
         raise ValueError(
-            f"{WRAPPER} takes view, form, stations and options; got {', '.join(arguments)}"
+            f"stations give the environment its {' and '.join(doubled)} already: leave out the "
+            "option or the stations"
         )
-    return arguments
+    parse_task(preset.task, parse_options(options))
+    if preset.stations:
+        training_recipe(preset.stations)
+    if preset.view.kind == "environment" and preset.form.kind != "direct":
+        raise ValueError(
+            f"the environment's own view goes with a direct form, got {preset.form.kind}; take a "
+            "tracking view or a direct form"
+        )
+    if preset.form.base:
+        base_of(preset.form)
 
 
-AVERAGE = "benchmarks.training.averaging.WeightAverage"
-"""The only callback that a preset may name."""
+def _arguments(what: str, given: object, only: str, known: Mapping[str, bool]) -> dict[str, Any]:
+    """Arguments of the only wrapper or callback that a preset may name."""
+    if (
+        not isinstance(given, list)
+        or len(given) != 1
+        or not isinstance(given[0], Mapping)
+        or list(given[0]) != [only]
+    ):
+        raise ValueError(f"{what} must be a list of {only} alone, got {given!r}")
+    found = mapping(only, given[0][only])
+    needed = {key for key, must in known.items() if must}
+    if not needed <= set(found) <= set(known):
+        raise ValueError(
+            f"{only} takes {', '.join(known)}, of which {', '.join(sorted(needed))} must be there; "
+            f"got {', '.join(map(str, found)) or 'nothing'}"
+        )
+    return found
 
 
 def _average(given: object) -> float:
     if given is None:
         return 0.0
-    if not isinstance(given, list) or len(given) != 1 or list(given[0]) != [AVERAGE]:
-        raise ValueError(f"callback must be a list of {AVERAGE} alone, got {given!r}")
-    share = given[0][AVERAGE]["share"]
-    if not isinstance(share, float) or not 0.0 < share <= 1.0:
+    share = real(f"share of {AVERAGE}", _arguments("callback", given, AVERAGE, AVERAGED)["share"])
+    if not 0.0 < share <= 1.0:
         raise ValueError(f"share of {AVERAGE} must lie above 0, up to 1, got {share!r}")
-    return share
-
-
-def _whole(given: dict[str, Any], name: str) -> int:
-    value = given.pop(name)
-    if isinstance(value, bool) or not isinstance(value, int | float) or value != int(value):
-        raise ValueError(f"{name} must be a whole number, got {value!r}")
-    if value < 1:
-        raise ValueError(f"{name} must be at least 1, got {value!r}")
-    return int(value)
-
-
-def _check_setting(key: str, value: object) -> None:
-    if key not in NUMBERS:
-        raise ValueError(f"unknown setting {key!r}{_nearest(key, NUMBERS)}")
-    if isinstance(value, str):
-        linear = value.removeprefix("lin_").removeprefix("auto_")
-        if value == "auto" or linear != value and _is_number(linear):
-            return
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f'{key} must be a number, "lin_" and a number, or "auto"; got {value!r}')
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _nearest(name: str, known: object) -> str:
-    close = difflib.get_close_matches(name, list(known), n=1, cutoff=0.5)  # type: ignore[call-overload]
-    return f"; did you mean {close[0]!r}?" if close else ""
+    return float(share)

@@ -7,6 +7,7 @@ leg's number. So a training that was killed goes on from its last checkpoint to 
 import json
 import time
 from collections.abc import Callable, Mapping
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -18,7 +19,7 @@ from stable_baselines3.common.callbacks import BaseCallback, CallbackList
 from stable_baselines3.common.logger import configure
 from stable_baselines3.common.utils import set_random_seed
 
-from benchmarks.training.averaging import WeightAverage, averaged
+from benchmarks.training.averaging import WeightAverage, averaged, set_weights
 from benchmarks.training.checkpoint import (
     CheckpointError,
     latest,
@@ -156,11 +157,13 @@ def train(order: Order, out: Path, told_of: Told) -> Trained:
     """
     preset = order.preset
     torch.set_num_threads(order.threads)
-    envs = training_environments(preset, order.threads)
-    checks = validation_environments(preset, order.threads)
-    try:
+    with (
+        closing(training_environments(preset, order.threads)) as envs,
+        closing(validation_environments(preset, order.threads)) as checks,
+        closing(configure(str(out / "log"), _formats())) as log,
+    ):
         model = learner(preset, envs, leg_seed(order.seed, 0), order.device)
-        model.set_logger(configure(str(out / "log"), _formats()))
+        model.set_logger(log)
         average = None
         if preset.average_share:
             average = WeightAverage(preset.average_share, preset.steps)
@@ -168,19 +171,11 @@ def train(order: Order, out: Path, told_of: Told) -> Trained:
         ends = leg_ends(preset, int(envs.envs.task.steps(preset.rate_hz)))  # type: ignore[attr-defined]
         while course.legs < len(ends) and not course.stopped:
             _leg(order, ends[course.legs], model, average, course, checks, told_of)
-            content = {"order": order.to_json(), "course": _as_json(course)}
+            content = {"order": order.to_json()} | _as_json(course)
             save_checkpoint(out / "checkpoints", course.legs, model, average, content)
         if average is not None and average.weights is not None:
-            with averaged(model, average):
-                final = validate(model, checks, preset.task)
-                kept = [one.data.clone() for one in model.policy.parameters()]
-            for parameter, one in zip(model.policy.parameters(), kept, strict=True):
-                parameter.data.copy_(one)
-        else:
-            final = validate(model, checks, preset.task)
-    finally:
-        envs.close()
-        checks.close()
+            set_weights(model, average.weights)
+        final = validate(model, checks, preset.task)
     return Trained(model, course, final)
 
 
@@ -200,7 +195,7 @@ def _resumed(
     if found is None:
         return Course()
     number, path = found
-    content = told(path)
+    content = told(path, ("order", "curve", "wall_s", "stopped"))
     here = json.loads(json.dumps(order.to_json()))
     if content["order"] != here:
         raise CheckpointError(
@@ -208,12 +203,8 @@ def _resumed(
             "--out, or delete that folder"
         )
     load_checkpoint(path, model, average)
-    if average is not None:
-        average.resumed_at(model.num_timesteps)
-    course = content["course"]
-    return Course(
-        [Point(*point) for point in course["curve"]], number, course["wall_s"], course["stopped"]
-    )
+    curve = [Point(*point) for point in content["curve"]]
+    return Course(curve, number, content["wall_s"], content["stopped"])
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -281,6 +272,8 @@ class _Watch(BaseCallback):
     def validate_at_end(self) -> None:
         """A leg ends with a validation, unless it has just had one."""
         curve = self._course.curve
+        if self._course.stopped:
+            return
         if not curve or self.model.num_timesteps > curve[-1].steps:
             self._validate()
 

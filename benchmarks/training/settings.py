@@ -1,0 +1,153 @@
+"""Settings of the algorithms in a preset: which there are, and what values they may have."""
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+_COMMON = {"batch_size", "gamma", "learning_rate"}
+_REPLAY = _COMMON | {"buffer_size", "gradient_steps", "learning_starts", "tau", "train_freq"}
+
+SETTINGS = {
+    "ppo": _COMMON
+    | {
+        "clip_range",
+        "ent_coef",
+        "gae_lambda",
+        "max_grad_norm",
+        "n_epochs",
+        "n_steps",
+        "target_kl",
+        "vf_coef",
+    },
+    "sac": _REPLAY | {"ent_coef"},
+    "td3": _REPLAY | {"policy_delay", "target_noise_clip", "target_policy_noise"},
+    "tqc": _REPLAY | {"ent_coef", "top_quantiles_to_drop_per_net"},
+}
+"""Settings of each algorithm that are numbers."""
+
+WHOLE = {
+    "batch_size",
+    "buffer_size",
+    "gradient_steps",
+    "learning_starts",
+    "n_epochs",
+    "n_steps",
+    "policy_delay",
+    "top_quantiles_to_drop_per_net",
+    "train_freq",
+}
+"""Those that are whole numbers."""
+
+SHARES = {"gae_lambda", "gamma", "tau"}
+"""Those that lie in 0 to 1."""
+
+FALLING = {"clip_range", "learning_rate"}
+"""Those that may fall: "lin_0.001" falls linearly from 0.001 to 0."""
+
+NETWORK = {"net_arch", "log_std_init", "n_critics", "n_quantiles"}
+"""Settings of the network."""
+
+
+def setting(algorithm: str, key: str, value: object) -> float | int | str:
+    """A setting's value, checked; whole numbers as such.
+
+    Raises:
+        ValueError: one that the algorithm has not, with the nearest; or a value out of range.
+    """
+    known = SETTINGS[algorithm]
+    if key not in known:
+        raise ValueError(f"{algorithm} has no setting {key!r}{nearest(key, known)}")
+    if isinstance(value, str):
+        return _worded(algorithm, key, value)
+    if key in WHOLE:
+        # -1 gradient steps: as many as control steps were taken.
+        return whole(key, value, {"gradient_steps": -1, "learning_starts": 0}.get(key, 1))
+    found = real(key, value)
+    if found < 0.0 or key in SHARES and found > 1.0:
+        rule = "lie in 0 to 1" if key in SHARES else "not be negative"
+        raise ValueError(f"{key} must {rule}, got {value!r}")
+    return found
+
+
+def _worded(algorithm: str, key: str, value: str) -> str:
+    """A value that is no number: one that falls, or SB3's automatic temperature."""
+    automatic = key == "ent_coef" and algorithm != "ppo"
+    start, _, number = value.partition("_")
+    if automatic and value == "auto":
+        return value
+    if (start == "lin" and key in FALLING or start == "auto" and automatic) and _is_number(number):
+        return value
+    forms = ["a number"]
+    forms += ['"lin_" and a number'] * (key in FALLING) + ['"auto"', '"auto_0.1"'] * automatic
+    hint = "; YAML takes it for text: write 0.001 or 1.0e-3" if _is_number(value) else ""
+    raise ValueError(f"{key} must be {' or '.join(forms)}, got {value!r}{hint}")
+
+
+def network(given: object) -> dict[str, Any]:
+    """Settings of the network, checked.
+
+    Raises:
+        ValueError: text, or one that is unknown or of the wrong kind.
+    """
+    if not isinstance(given, Mapping) or not set(given) <= NETWORK:
+        raise ValueError(
+            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {given!r}; "
+            "text that the zoo would evaluate is not read here"
+        )
+    arch = given.get("net_arch", [])
+    for layers in arch.values() if isinstance(arch, Mapping) else [arch]:
+        if not isinstance(layers, list):
+            raise ValueError(f"net_arch must be a list such as [64, 64], got {arch!r}")
+        for size in layers:
+            whole("a layer of net_arch", size)
+    return dict(given)
+
+
+def whole(name: str, value: object, least: int = 1) -> int:
+    """A whole number; 3.0e6 is one.
+
+    Raises:
+        ValueError: none, or one that is too small.
+    """
+    number = real(name, value)
+    if number != int(number) or number < least:
+        raise ValueError(f"{name} must be a whole number from {least} up, got {value!r}")
+    return int(number)
+
+
+def real(name: str, value: object) -> float:
+    """A finite number.
+
+    Raises:
+        ValueError: none.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        text = isinstance(value, str) and _is_number(value)
+        hint = "; YAML takes it for text: write 0.001 or 1.0e-3" if text else ""
+        raise ValueError(f"{name} must be a finite number, got {value!r}{hint}")
+    return value
+
+
+def mapping(name: str, value: object) -> dict[str, Any]:
+    """A mapping, as a copy.
+
+    Raises:
+        ValueError: none.
+    """
+    if not isinstance(value, Mapping):
+        raise ValueError(f"{name} must be a mapping of names to values, got {value!r}")
+    return dict(value)
+
+
+def nearest(name: str, known: Iterable[str]) -> str:
+    """Asks whether the nearest known name was meant, if there is one near."""
+    close = difflib.get_close_matches(name, sorted(known), n=1, cutoff=0.5)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text)) and float(text) >= 0.0
+    except ValueError:
+        return False
