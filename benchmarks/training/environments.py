@@ -1,5 +1,6 @@
 """Batched environments of a preset: to train on, and to validate on."""
 
+import time
 from typing import Any
 
 from stable_baselines3.common.vec_env import VecEnv
@@ -13,22 +14,30 @@ from pma_gym.tasks import named_task
 PRESSURE_STEP_KPA = 25
 """Distance of the pressures that episodes begin at (kPa)."""
 
+USUAL = "robust"
+"""Suite whose recipe validation stations are drawn by, if the preset names none."""
+
 RESERVE_KPA = 25
 """What a jump of the regulator needs below the highest pressure (kPa): the rig breaks at 600."""
 
 
 def training_environments(preset: Preset, threads: int = 1) -> VecEnv:
     """What a preset trains on."""
-    return _made(preset, preset.environments, threads, Stations, staggered=True)
+    drawn = Stations(preset.stations) if preset.stations else None
+    return _made(preset, preset.environments, threads, drawn, staggered=True)
 
 
 def validation_environments(preset: Preset, threads: int = 1) -> VecEnv:
-    """As many episodes, on stations that neither training nor a suite has."""
+    """Two episodes on each of the stations that neither training nor a suite has.
 
-    def stations(suite: str) -> Stations:
-        return Stations(suite, VALIDATION_FIRST, VALIDATION)
+    Also where a preset trains on the nominal station alone.
+    """
+    drawn = _validated_on(preset)
+    return _made(preset, 2 * VALIDATION, threads, drawn, staggered=False)
 
-    return _made(preset, 2 * VALIDATION, threads, stations, staggered=False)
+
+def _validated_on(preset: Preset) -> Stations:
+    return Stations(preset.stations or USUAL, VALIDATION_FIRST, VALIDATION)
 
 
 def pressures_kpa(preset: Preset) -> list[float]:
@@ -41,17 +50,18 @@ def pressures_kpa(preset: Preset) -> list[float]:
     return [float(p) for p in range(low, top + 1, PRESSURE_STEP_KPA)]
 
 
-def _made(preset: Preset, count: int, threads: int, stations: Any, staggered: bool) -> VecEnv:  # noqa: ANN401
+def _made(
+    preset: Preset, count: int, threads: int, drawn: Stations | None, staggered: bool
+) -> VecEnv:
     options = {key: value for key, value in preset.options.items() if key != "task"}
     options.setdefault("pressure_kpa", pressures_kpa(preset))
-    if preset.stations:
-        drawn = stations(preset.stations)
+    if drawn is not None:
         options |= {"randomisation": drawn, "model": drawn.structure}
     if preset.view.kind == "environment":
         view = preset.view
         options |= {"preview": view.preview, "history": view.history}
         return SB3VecEnv(count, preset.task, threads=threads, **options)
-    told = "station" if preset.stations else options.get("model", "station")
+    told = str(preset.options.get("model", "station"))
     return PilotedVecEnv(
         count,
         preset.task,
@@ -62,3 +72,13 @@ def _made(preset: Preset, count: int, threads: int, stations: Any, staggered: bo
         threads=threads,
         **options,
     )
+
+
+def drawing_s(preset: Preset) -> float:
+    """Draw all stations of a preset, unless this process has them already; how long it took (s)."""
+    began = time.perf_counter()
+    own = [Stations(preset.stations)] if preset.stations else []
+    for stations in (*own, _validated_on(preset)):
+        for number in range(stations.count):
+            stations.of(number)
+    return time.perf_counter() - began

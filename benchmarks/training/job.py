@@ -92,9 +92,9 @@ def _line(point: Point, unit: str) -> str:
 
 def _closing(trained: Trained, unit: str, path: Path) -> str:
     course = trained.course
-    rate = trained.model.num_timesteps / course.wall_s
+    rate = trained.model.num_timesteps / course.learning_s
     early = " (ended at a plateau)" if course.stopped else ""
     return (
         f"{trained.final.error:.4g} {unit} on validation stations after {course.wall_s:.0f} s, "
-        f"{rate:.0f} steps/s with validation{early}\nPolicy: {path}"
+        f"{rate:.0f} steps/s while learning{early}\nPolicy: {path}"
     )

@@ -27,7 +27,11 @@ from benchmarks.training.checkpoint import (
     save_checkpoint,
     told,
 )
-from benchmarks.training.environments import training_environments, validation_environments
+from benchmarks.training.environments import (
+    drawing_s,
+    training_environments,
+    validation_environments,
+)
 from benchmarks.training.learner import learner
 from benchmarks.training.preset import Preset
 from benchmarks.training.validation import Validation, validate
@@ -98,13 +102,15 @@ class Course:
     Attributes:
         curve: validations so far.
         legs: legs that are done.
-        wall_s: wall time of these (s).
+        wall_s: wall time of these, and of drawing stations (s).
+        learning_s: the same without validations and drawing (s).
         stopped: whether it ended at a plateau.
     """
 
     curve: list[Point] = field(default_factory=list)
     legs: int = 0
     wall_s: float = 0.0
+    learning_s: float = 0.0
     stopped: bool = False
 
 
@@ -168,6 +174,7 @@ def train(order: Order, out: Path, told_of: Told) -> Trained:
         if preset.average_share:
             average = WeightAverage(preset.average_share, preset.steps)
         course = _resumed(order, out, model, average)
+        course.wall_s += drawing_s(preset)
         ends = leg_ends(preset, int(envs.envs.task.steps(preset.rate_hz)))  # type: ignore[attr-defined]
         while course.legs < len(ends) and not course.stopped:
             _leg(order, ends[course.legs], model, average, course, checks, told_of)
@@ -195,7 +202,7 @@ def _resumed(
     if found is None:
         return Course()
     number, path = found
-    content = told(path, ("order", "curve", "wall_s", "stopped"))
+    content = told(path, ("order", "curve", "wall_s", "learning_s", "stopped"))
     here = json.loads(json.dumps(order.to_json()))
     if content["order"] != here:
         raise CheckpointError(
@@ -204,7 +211,8 @@ def _resumed(
         )
     load_checkpoint(path, model, average)
     curve = [Point(*point) for point in content["curve"]]
-    return Course(curve, number, content["wall_s"], content["stopped"])
+    times = content["wall_s"], content["learning_s"]
+    return Course(curve, number, *times, content["stopped"])
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
@@ -213,7 +221,7 @@ def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
 
 
 def _as_json(course: Course) -> dict[str, Any]:
-    return {"curve": course.curve, "wall_s": course.wall_s, "stopped": course.stopped}
+    return {name: getattr(course, name) for name in ("curve", "wall_s", "learning_s", "stopped")}
 
 
 def _leg(
@@ -236,8 +244,10 @@ def _leg(
     callbacks = CallbackList([one for one in (average, watch) if one is not None])
     model.learn(end - model.num_timesteps, callback=callbacks, reset_num_timesteps=False)
     watch.validate_at_end()
+    spent = time.perf_counter() - began
     course.legs += 1
-    course.wall_s += time.perf_counter() - began
+    course.wall_s += spent
+    course.learning_s += spent - watch.validating_s
 
 
 class _Watch(BaseCallback):
@@ -255,6 +265,7 @@ class _Watch(BaseCallback):
         super().__init__()
         self._order, self._average, self._course = order, average, course
         self._checks, self._told_of, self._began = checks, told_of, began
+        self.validating_s = 0.0
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps >= self._next:
@@ -278,8 +289,10 @@ class _Watch(BaseCallback):
             self._validate()
 
     def _validate(self) -> None:
+        started = time.perf_counter()
         with averaged(self.model, self._average):
             found = validate(self.model, self._checks, self._order.preset.task)
+        self.validating_s += time.perf_counter() - started
         wall = self._course.wall_s + time.perf_counter() - self._began
         point = Point(self.model.num_timesteps, round(wall, 3), *found)
         curve = self._course.curve

@@ -30,11 +30,14 @@ class Stations:
         suite: name of the suite whose recipe it is.
         first: number of the first one.
         count: how many.
+
+    Attributes:
+        recipe: by which they are drawn.
     """
 
     def __init__(self, suite: str, first: int = 0, count: int = TRAINING) -> None:
         self.recipe = training_recipe(suite)
-        self._first, self._count = first, count
+        self.first, self.count = first, count
 
     @property
     def structure(self) -> Model:
@@ -44,12 +47,12 @@ class Stations:
 
     def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
         """The station of an episode."""
-        number = int(generator.integers(self._count))
+        number = int(generator.integers(self.count))
         return self.of(number, "operator" in nominal.parameters)
 
     def of(self, number: int, operated: bool = False) -> Model:
         """A station by its number among these; with an operator at its slide if so asked."""
-        return _station(self.recipe, self._first + number, operated)
+        return _station(self.recipe, self.first + number, operated)
 
 
 def training_recipe(suite: str) -> Recipe:
