@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
-yaml = pytest.importorskip("yaml")
+pytest.importorskip("yaml")
 
+import yaml
 from stable_baselines3.common.monitor import Monitor
 
 from benchmarks.training.piloted_env import PilotedEnv
