@@ -74,7 +74,8 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Command what the action asks for."""
         volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
-        _, reward, terminated, truncated, info = self.env.step(self.rig.action(volts))
+        command: Any = self.rig.action(volts)
+        _, reward, terminated, truncated, info = self.env.step(command)
         entries = self.pilot.see(self.rig.reading, self.rig.time)
         return entries, float(reward), terminated, truncated, info
 

@@ -9,7 +9,7 @@ from torch.distributions import Normal
 
 import pma_gym  # noqa: F401 - registers the environments
 
-steps = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+steps = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000
 task = "pma_gym/IsokineticDisplacement-v0"
 envs = gym.make_vec(task, num_envs=64, pressure_kpa=300, preview=3, history=3)
 torch.manual_seed(1)

@@ -9,7 +9,7 @@ from ray.tune import register_env
 
 from pma_gym import PMAEnv
 
-steps = int(sys.argv[1]) if len(sys.argv) > 1 else 500_000
+steps = int(sys.argv[1]) if len(sys.argv) > 1 else 40_960
 options = {"pressure_kpa": 300, "preview": 3, "history": 3}
 
 register_env("displacement", lambda options: PMAEnv("displacement", **options))

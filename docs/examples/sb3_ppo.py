@@ -7,7 +7,7 @@ from stable_baselines3 import PPO
 
 from pma_gym.envs.sb3 import SB3VecEnv
 
-steps = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000_000
+steps = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000
 
 envs = SB3VecEnv(64, "displacement", pressure_kpa=300, preview=3, history=3)
 settings = {"n_steps": 64, "batch_size": 1024, "n_epochs": 5, "learning_rate": 1e-3, "gamma": 0.95}
