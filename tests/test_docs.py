@@ -120,7 +120,7 @@ EXAMPLES = [
     for number, (language, code) in enumerate(
         re.findall(r"```(python|bash)\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
     )
-    if not re.search(r"^(make|python -m benchmarks)", code, re.MULTILINE)
+    if not re.search(r"^(make|pip|python -m (benchmarks|rl_zoo3))", code, re.MULTILINE)
 ]
 
 

@@ -20,7 +20,8 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
     """As `PilotedVecEnv`, one of it: what the presets name as `env_wrapper`.
 
     Args:
-        env: an environment of pma_gym; with `stations` or `options` it is made anew.
+        env: an environment of pma_gym; with `stations` or `options` it is made anew, inside the
+            same wrappers (the zoo's Monitor is one).
         view: arguments of the View.
         form: arguments of the Form.
         stations: suite whose training stations episodes are on; empty for the environment's own.
@@ -46,15 +47,16 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         options: Mapping[str, Any] | None = None,
     ) -> None:
         """Make the pilot, and the environment anew if it is to be another."""
-        inner = env.unwrapped
-        if not isinstance(inner, PMAEnv):
-            raise TypeError(f"env must be one of pma_gym, got {type(inner).__name__}")
+        rig = env.unwrapped
+        if not isinstance(rig, PMAEnv):
+            raise TypeError(f"env must be one of pma_gym, got {type(rig).__name__}")
         if stations or options:
-            inner = _made(inner, stations, options or {})
-        super().__init__(inner)
-        self.rig = inner
+            made = _made(rig, stations, options or {})
+            env, rig = _exchanged(env, rig, made), made
+        super().__init__(env)
+        self.rig = rig
         self.pilot = Pilot(View.of(view), Form.of({"base": None} | dict(form)))
-        told = inner.station
+        told = rig.station
         entries = len(self.pilot.view.rows(told, self.pilot.form.base))
         self.observation_space = spaces.Box(-BOUND, BOUND, (entries,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
@@ -63,7 +65,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begin a trial."""
-        _, info = self.rig.reset(seed=seed, options=options)
+        _, info = self.env.reset(seed=seed, options=options)
         self.pilot.reset(self.rig.reference, self.rig.station)
         return self.pilot.see(self.rig.reading, self.rig.time), info
 
@@ -72,9 +74,10 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """Command what the action asks for."""
         volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
-        _, reward, terminated, truncated, info = self.rig.step(self.rig.action(volts))
+        command: Any = self.rig.action(volts)
+        _, reward, terminated, truncated, info = self.env.step(command)
         entries = self.pilot.see(self.rig.reading, self.rig.time)
-        return entries, reward, terminated, truncated, info
+        return entries, float(reward), terminated, truncated, info
 
 
 def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:
@@ -84,3 +87,14 @@ def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:
         drawn = Stations(stations)
         chosen |= {"randomisation": drawn, "model": drawn.structure}
     return PMAEnv(env.task, env.render_mode, **chosen)
+
+
+def _exchanged(env: gym.Env[Any, Any], rig: PMAEnv, made: PMAEnv) -> gym.Env[Any, Any]:
+    """Wrappers of one environment around another."""
+    if env is rig:
+        return made
+    inmost = env
+    while isinstance(inmost, gym.Wrapper) and inmost.env is not rig:
+        inmost = inmost.env
+    inmost.env = made  # type: ignore[attr-defined]
+    return env
