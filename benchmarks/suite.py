@@ -85,6 +85,7 @@ class Suite:
         pressures_kpa: by task.
         pictured_kpa: by task, those whose trials are drawn.
         targets: figures to reach.
+        only: models that a controller runs on, by its name; all models if it is not there.
         selected: whether something was left out or added.
     """
 
@@ -98,12 +99,19 @@ class Suite:
     pressures_kpa: Mapping[str, tuple[float, ...]]
     pictured_kpa: Mapping[str, tuple[float, ...]]
     targets: Targets
+    only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     selected: bool = field(default=False)
+
+    def does(self, controller: Contender, model: str) -> bool:
+        """Whether a controller runs on a model."""
+        return model in self.only.get(controller.name, (model,))
 
     def cases(self) -> Iterator[Case]:
         """Every case, in the order of the results."""
         for model in self.models:
             for controller in self.controllers:
+                if not self.does(controller, model):
+                    continue
                 for task, pressures in self.pressures_kpa.items():
                     for pressure in pressures:
                         yield Case(model, controller, task, pressure)
@@ -168,7 +176,7 @@ def load_suite(name: str = "reproduction") -> Suite:
 
     >>> suite = load_suite()
     >>> len(list(suite.cases()))
-    136
+    153
     """
     document = tomllib.loads((SUITES / f"{name}.toml").read_text(encoding="utf-8"))
     if document["schema"] != SCHEMA:
@@ -178,6 +186,8 @@ def load_suite(name: str = "reproduction") -> Suite:
         raise SuiteError(f"{name}.toml has unknown tasks: {', '.join(sorted(unknown))}")
     targets = dict(document["targets"])
     targets["feedback"] = tuple(targets["feedback"])
+    entries = [dict(entry) for entry in document["controllers"]]
+    only = {e["name"]: tuple(e.pop("models")) for e in entries if "models" in e}
     return Suite(
         name=document["name"],
         version=document["version"],
@@ -185,10 +195,11 @@ def load_suite(name: str = "reproduction") -> Suite:
         control_rate_hz=document["control_rate_hz"],
         noise=document["noise"],
         models=tuple(document["models"]),
-        controllers=tuple(Contender(**entry) for entry in document["controllers"]),
+        controllers=tuple(Contender(**entry) for entry in entries),
         pressures_kpa={t: tuple(v["pressures_kpa"]) for t, v in document["tasks"].items()},
         pictured_kpa={t: tuple(v["pictured_kpa"]) for t, v in document["tasks"].items()},
         targets=Targets(**targets),
+        only=only,
     )
 
 

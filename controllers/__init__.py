@@ -10,6 +10,7 @@ from controllers.lqg import LQG
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
+from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.sliding_mode import SlidingMode
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
@@ -23,6 +24,7 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "sliding_mode": SlidingMode,
     "mpc": PreviewMPC,
     "ilc": ILC,
+    "ppo": PPOPolicy,
     "oracle": Oracle,
 }
 """Controllers by name: what makes a new one. A controller listed here is scored."""
@@ -37,9 +39,12 @@ __all__ = [
     "FeedforwardPID",
     "ImprovedFeedforward",
     "Oracle",
+    "PPOPolicy",
+    "Policy",
     "PreviewMPC",
     "Reference",
     "SerresFeedforward",
     "SerresReplay",
+    "ShippedPolicy",
     "SlidingMode",
 ]

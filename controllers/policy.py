@@ -114,6 +114,18 @@ class ShippedPolicy:
         return self._policies[name]
 
 
+class PPOPolicy(ShippedPolicy):
+    """The shipped policies that proximal policy optimisation trained.
+
+    Source:
+        J. Schulman, F. Wolski, P. Dhariwal, A. Radford and O. Klimov 2017, "Proximal Policy
+        Optimization Algorithms", arXiv:1707.06347.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("ppo")
+
+
 def shipped_policies(folder: Path = POLICIES) -> list[Path]:
     """The shipped policies' .json files by name; none where there is no such folder."""
     return sorted(folder.glob("*.json"))

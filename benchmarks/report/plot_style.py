@@ -22,7 +22,7 @@ _FIXED: dict[str, tuple[str, str, Dashes]] = {
     "mpc": ("#332288", "p", "--"),
     "ilc": ("#D55E00", "d", "--"),
     "oracle": ("#000000", "*", ":"),
-    "policy": ("#56B4E9", "P", "-"),
+    "ppo": ("#56B4E9", "P", "-"),
 }
 _OTHERS: tuple[tuple[str, str, Dashes], ...] = (
     ("#CC79A7", "D", "-."),

@@ -44,8 +44,12 @@ class Stations:
 
     def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
         """The station of an episode."""
-        number = self._first + int(generator.integers(self._count))
-        return _station(self.recipe, number, "operator" in nominal.parameters)
+        number = int(generator.integers(self._count))
+        return self.of(number, "operator" in nominal.parameters)
+
+    def of(self, number: int, operated: bool = False) -> Model:
+        """A station by its number among these; with an operator at its slide if so asked."""
+        return _station(self.recipe, self._first + number, operated)
 
 
 def training_recipe(suite: str) -> Recipe:

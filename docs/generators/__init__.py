@@ -30,6 +30,13 @@ from generators.hidden_effects import (
     hidden_ways,
 )
 from generators.models import differences, identification, misfit, parameters, shipped
+from generators.policies import (
+    policies_ablations,
+    policies_judged,
+    policies_robustness,
+    policies_shipped,
+    policies_trained,
+)
 from generators.source import misprints, rates, verdicts, wrong_in_print
 from generators.suite import controllers, example, targets, trials, tuning
 from generators.suites import deals, occasional, suites
@@ -46,6 +53,8 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(suites, deals, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_ways, hidden_bound),
+        *(policies_shipped, policies_judged, policies_trained),
+        *(policies_ablations, policies_robustness),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

@@ -12,6 +12,12 @@ from benchmarks.comparison.suite import FrozenSuite, frozen_suite
 from benchmarks.contender import parse_contenders
 from benchmarks.training.study.pooled import Pool
 
+SHIPPED_GROUP = "ppo-increment"
+"""Group whose best policies ship."""
+
+PID_FOLDER = "pid"
+"""Folder of the PID's results, which learning curves are compared with."""
+
 SUITES = ("nominal", "robust", "hard")
 """Suites that policies are judged by."""
 
@@ -21,7 +27,7 @@ def seed_folders(group: Path) -> list[Path]:
     return sorted(group.glob("seed-*"), key=lambda path: int(path.name.partition("-")[2]))
 
 
-def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path:
+def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path | None:
     """Run every seed's policies through a suite; what ran before stays.
 
     Args:
@@ -42,6 +48,13 @@ def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) 
     out = group / f"suite-{suite}"
     run_comparison(frozen, entries, out, jobs, console)
     return out
+
+
+def judge_pid(out: Path, jobs: int, console: Console) -> None:
+    """Run the PID through suite `robust`, what curves are compared with."""
+    frozen = frozen_suite("robust")
+    entries = [frozen.entry(one) for one in parse_contenders("pid")]
+    run_comparison(frozen, entries, out / PID_FOLDER, jobs, console)
 
 
 def _able(suite: FrozenSuite, tasks: Sequence[str], group: Path, algorithm: str) -> tuple[str, ...]:

@@ -1,0 +1,97 @@
+"""`python -m benchmarks.training.study`: trains the study's policies, judges them, reports."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+OUT = Path("results/training/study")
+FIGURES = Path("docs/figures/policies.json")
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+Out = Annotated[Path, typer.Option(help="Folder of the study.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+Groups = Annotated[str, typer.Option(help="Groups by commas; all if empty.")]
+
+
+@app.command()
+def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
+    """Train what has no policy yet; an interrupted study goes on."""
+    from benchmarks.training.study.cells import cells
+    from benchmarks.training.study.runs import Run, runs, train_all
+    from controllers.policy_file import PolicyFile
+
+    chosen = [cell for cell in cells() if not groups or cell.group in groups.split(",")]
+    todo = runs(chosen, out)
+
+    def told(done: Run, policy: PolicyFile, number: int, count: int) -> None:
+        scores = policy.training["scores"]["validation"]
+        print(
+            f"{number}/{count} {done.cell.group} {policy.name} seed {done.seed}: "
+            f"{scores['error']:.4g} {scores['unit']} in {policy.training['wall_s']:.0f} s",
+            flush=True,
+        )
+
+    try:
+        print(f"{train_all(todo, jobs, told)} trained, {len(todo)} in all")
+    except KeyboardInterrupt:
+        print("Interrupted; run it again, it goes on where it stopped", file=sys.stderr)
+        raise typer.Exit(130) from None
+
+
+@app.command()
+def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "") -> None:
+    """Run every seed's policies through the suites; what ran before stays."""
+    from rich.console import Console
+
+    from benchmarks.training.study.cells import cells
+    from benchmarks.training.study.judged import SUITES, judge_pid
+    from benchmarks.training.study.judged import judge as judge_group
+
+    if not groups:
+        judge_pid(out, jobs, Console())
+    algorithms = {cell.group: cell.algorithm for cell in cells()}
+    for group, algorithm in algorithms.items():
+        wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
+        if not wanted:
+            continue
+        for suite in suites.split(",") if suites else SUITES:
+            judge_group(out / group, algorithm, suite, jobs, Console())
+
+
+@app.command()
+def report(
+    out: Out = OUT,
+    figures: Annotated[Path, typer.Option(help="JSON file of all figures.")] = FIGURES,
+    ship: Annotated[bool, typer.Option(help="Also put the best policies where they ship.")] = False,
+) -> None:
+    """Collect all figures, draw the curves, try the best policies where none was trained."""
+    import json
+
+    from benchmarks.files import write_text
+    from benchmarks.training.study.figures import pid_errors, study_figures, variation
+    from benchmarks.training.study.judged import PID_FOLDER, SHIPPED_GROUP
+    from benchmarks.training.study.pictures import write_curves
+    from benchmarks.training.study.robustness import robustness
+    from benchmarks.training.study.ship import best_policies
+    from benchmarks.training.study.ship import ship as ship_policies
+
+    found = study_figures(out)
+    found["pid"] = pid_errors(out)
+    found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
+    best = {path.stem.rpartition("-")[0]: path for path in best_policies(out / SHIPPED_GROUP)}
+    found["robustness"] = {
+        task: robustness(task, {"ppo": best[f"{task}-100hz"]})
+        for task in ("displacement", "rotation")
+    }
+    write_text(figures, json.dumps(found, indent=1) + "\n")
+    write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
+    if ship:
+        for path in ship_policies(out / SHIPPED_GROUP, found["groups"][SHIPPED_GROUP]):
+            print(path)
+
+
+if __name__ == "__main__":
+    app()

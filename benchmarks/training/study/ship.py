@@ -1,0 +1,134 @@
+"""Ships the best policy of every task and loop, chosen on validation stations, with its card."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from benchmarks.training.study.judged import seed_folders
+from controllers.policy import POLICIES
+from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
+
+
+def best_policies(group: Path) -> list[Path]:
+    """Of each task and loop the policy with the least validation error.
+
+    Args:
+        group: folder of the seeds.
+    """
+    folders = seed_folders(group)
+    return [
+        min(
+            (folder / name for folder in folders if (folder / name).exists()),
+            key=lambda path: _validation(load_policy_file(path)),
+        )
+        for name in sorted(path.name for path in folders[0].glob("*.json"))
+    ]
+
+
+def ship(group: Path, figures: dict[str, Any], folder: Path = POLICIES) -> list[Path]:
+    """Copy the best seeds' policies to the folder that ships, each with its card.
+
+    Args:
+        group: folder of the seeds.
+        figures: the group's, from `study_figures`: suites' scores go into the files.
+        folder: where to.
+    Returns:
+        The .json files.
+    """
+    folder.mkdir(exist_ok=True)
+    found = []
+    for best in best_policies(group):
+        policy = load_policy_file(best)
+        scores = dict(policy.training["scores"]) | {"suites": _scores(policy, figures)}
+        shipped = replace(policy, training=dict(policy.training) | {"scores": scores})
+        path = save_policy_file(shipped, folder / best.name)
+        path.with_suffix(".md").write_text(card(shipped, figures["seeds"]), encoding="utf-8")
+        found.append(path)
+    return found
+
+
+def _validation(policy: PolicyFile) -> float:
+    return float(policy.training["scores"]["validation"]["error"])
+
+
+def _scores(policy: PolicyFile, figures: dict[str, Any]) -> dict[str, Any]:
+    """Interquartile means of the shipped seed, and of all seeds with their interval."""
+    seed = policy.training["seed"]
+    loop = policy.name.partition("-")[2].rpartition("-")[0]
+    found: dict[str, Any] = {}
+    for suite, measures in figures["judged"].items():
+        if (suite == "hard") != ("delay" in loop):
+            continue
+        for measure, pooled in measures.items():
+            if policy.task in measure:
+                found[f"{suite}: {measure}"] = {
+                    "this": pooled["by_seed"][seed],
+                    "all_seeds": pooled["mean"],
+                    "unit": pooled["unit"],
+                }
+    return found
+
+
+def card(policy: PolicyFile, seeds: int) -> str:
+    """The model card of a policy, as Markdown."""
+    training, kwargs = policy.training, policy.environment["kwargs"]
+    validation = training["scores"]["validation"]
+    preset = training["preset"]
+    command = (
+        f"python -m benchmarks train --algo {training['algorithm']} --task {policy.task} "
+        f"--preset {preset} --seed {training['seed']}"
+    )
+    rows = [
+        f"| {name} | {one['this']:.4g} {one['unit']} | {one['all_seeds'][0]:.4g} "
+        f"[{one['all_seeds'][1]:.4g}, {one['all_seeds'][2]:.4g}] |"
+        for name, one in training["scores"].get("suites", {}).items()
+    ]
+    curve = [
+        f"| {int(steps)} | {wall:.0f} | {error:.4g} |" for steps, wall, error in training["curve"]
+    ]
+    layers = "-".join(map(str, policy.weights.sizes))
+    return "\n".join(
+        [
+            f"# {policy.name}",
+            "",
+            f"{policy.title}: a network of {layers} ({policy.weights.activation}) for "
+            f"`{policy.environment['id']}` at {kwargs['control_rate_hz']:g} Hz, commands "
+            f"{1e3 * kwargs['action_delay_s']:g} ms late.",
+            "",
+            f"- **Sees**: {len(policy.observation)} entries, listed in the .json file.",
+            f"- **Does**: {_does(policy)}",
+            f"- **Trained on**: 128 stations drawn by the recipe of suite `robust` with its "
+            f"training seed; {training['steps']} control steps, {training['wall_s']:.0f} s on one "
+            f"core of a machine that did other things too; seed {training['seed']}, the best of "
+            f"{seeds} on 64 validation stations ({validation['error']:.4g} {validation['unit']}).",
+            f"- **Code**: {training['code']}",
+            f"- **Made again by**: `{command}`",
+            "",
+            "Interquartile means of the RMSE; in brackets 95 % intervals over all seeds and the "
+            "suite's stations:",
+            "",
+            "| Suite | This policy | All seeds |",
+            "| :-- | --: | --: |",
+            *rows,
+            "",
+            "Learning curve:",
+            "",
+            "| Control steps | Wall time (s) | Validation error |",
+            "| --: | --: | --: |",
+            *curve,
+            "",
+            "Limits: for this control rate and delay alone (others are refused), for stations like "
+            "those of the recipe; at a limit of the rig it knows no more than its training showed "
+            "it. Its voltage is less smooth than a PID's. Never run on a real rig.",
+            "",
+        ]
+    )
+
+
+def _does(policy: PolicyFile) -> str:
+    form = policy.form
+    if form.kind == "increment":
+        return f"its action changes the motor voltage by up to {form.authority_v:g} V a step."
+    if form.kind == "residual":
+        return f"its action adds up to {form.authority_v:g} V to the voltage of {form.base}."
+    return "its action is the motor voltage, 0-10 V."
