@@ -8,6 +8,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from benchmarks.training.reward import bounded
 from benchmarks.training.stations import Stations
 from controllers.form import Form
 from controllers.pilot import Pilot
@@ -74,7 +75,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
         _, reward, terminated, truncated, info = self.rig.step(self.rig.action(volts))
         entries = self.pilot.see(self.rig.reading, self.rig.time)
-        return entries, reward, terminated, truncated, info
+        return entries, float(bounded(reward, terminated)), terminated, truncated, info
 
 
 def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:
