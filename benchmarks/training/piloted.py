@@ -10,20 +10,13 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from benchmarks.training.reward import bounded
 from controllers.form import HIGHEST_V, Form
 from controllers.pilots import Pilots
 from controllers.view import View
 from pma_gym.envs import PMAVectorEnv, Station
 from pma_gym.envs.observation import BOUND
 from pma_gym.plant.model import load_model
-
-LEAST_REWARD, BROKEN_REWARD = -10.0, -100.0
-"""Least reward of a step that is learned from, and of one that breaks a limit.
-
-Further from the reference than 10 % of the range, and after a limit, one is as bad as another. In
-full, the first episodes' rewards (down to -150 000) would drown everything else: some trainings
-then learn to stay at 0 V and never leave it.
-"""
 
 
 class PilotedVecEnv(VecEnv):
@@ -108,8 +101,7 @@ class PilotedVecEnv(VecEnv):
                 infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
             self._begin_again(which, over)
             entries[which] = self.pilots.see(self.envs.readings(), which)
-        learned = np.maximum(rewards, np.where(terminated, BROKEN_REWARD, LEAST_REWARD))
-        return entries, learned.astype(np.float32), over, infos
+        return entries, bounded(rewards, terminated).astype(np.float32), over, infos
 
     def _last(
         self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool

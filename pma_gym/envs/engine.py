@@ -226,6 +226,11 @@ class Engine:
 
     def _checked(self, drawn: Model) -> Model:
         """A drawn station, if the compiled one can be it."""
+        if not isinstance(drawn, Model):
+            raise ValueError(
+                "a randomisation must give a Model, got "
+                f"{drawn!r}; return the one that it is given, or what its replace() gives"
+            )
         if list(drawn.effects) != list(self.nominal.model.effects):
             odd = sorted(set(drawn.effects) ^ set(self.nominal.model.effects))
             raise ValueError(
