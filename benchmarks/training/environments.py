@@ -1,7 +1,6 @@
 """Batched environments of a preset: to train on, and to validate on."""
 
 import time
-from typing import Any
 
 from stable_baselines3.common.vec_env import VecEnv
 

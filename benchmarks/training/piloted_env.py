@@ -78,11 +78,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         command: Any = self.rig.action(volts)
         _, reward, terminated, truncated, info = self.env.step(command)
         entries = self.pilot.see(self.rig.reading, self.rig.time)
-<<<<<<< HEAD
-        return entries, float(reward), terminated, truncated, info
-=======
         return entries, float(bounded(reward, terminated)), terminated, truncated, info
->>>>>>> a20f60320884038010792d56e2bbd5b5d2158fbf
 
 
 def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:

@@ -68,11 +68,8 @@ def cells() -> list[Cell]:
             group = f"{HEADLINE}-increment"
             found.append(Cell(group, "PPO", HEADLINE, preset, task, HEADLINE_SEEDS))
     for algorithm in ("sac", "td3", "tqc"):
-        for task in ("displacement", "rotation"):
-            title = algorithm.upper()
-            found.append(
-                Cell(f"{algorithm}-increment", title, algorithm, "increment", task, OTHER_SEEDS)
-            )
+        group, title = f"{algorithm}-increment", algorithm.upper()
+        found.append(Cell(group, title, algorithm, "increment", "displacement", OTHER_SEEDS))
     found += ablations("displacement")
     return found
 
