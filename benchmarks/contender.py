@@ -11,7 +11,7 @@ from types import ModuleType
 
 from controllers import CONTROLLERS
 from controllers.controller import Controller
-from controllers.policy import Policy, ShippedPolicy, shipped_policies
+from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
 from controllers.policy_file import policy_pair
 
 POLICY_FILES = (".json", ".safetensors")
@@ -68,6 +68,18 @@ class Contender:
         """Its title, or its name if it has none."""
         return self.title or self.name
 
+    @property
+    def files(self) -> list[Path]:
+        """Files that its figures depend on, besides the project's code: its own, or a policy's."""
+        if self.algorithm or (not self.path and is_shipped(self.name)):
+            folder = Path(self.path) if self.algorithm else POLICIES
+            algorithm = self.algorithm or self.name
+            names = [p for p in shipped_policies(folder) if p.stem.endswith(f"-{algorithm}")]
+            return [file for path in names for file in policy_pair(path)]
+        if not self.path:
+            return []
+        return list(policy_pair(self.path)) if self.is_policy else [Path(self.path)]
+
     def make(self) -> Controller:
         """A new controller.
 
@@ -122,6 +134,12 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
             contender = replace(contender, title=_own_name(made))
         contenders.append(contender)
     return contenders
+
+
+def is_shipped(name: str) -> bool:
+    """Whether a controller of the registry is a shipped policy."""
+    made = CONTROLLERS.get(name)
+    return isinstance(made, type) and issubclass(made, ShippedPolicy)
 
 
 def _policy(item: str) -> Contender | None:

@@ -15,7 +15,7 @@ SOURCES = (
     "pma_gym/**/*.toml",
     "pma_gym/**/*.csv",
     "controllers/**/*.py",
-    "controllers/**/*.json",
+    "controllers/*.json",
     "benchmarks/rollout.py",
     "benchmarks/contender.py",
     "benchmarks/suite.py",
@@ -38,11 +38,11 @@ def key(suite: FrozenSuite, contender: Contender) -> str:
     """Fingerprint of everything that a controller's rows of a suite depend on.
 
     The suite's numbers, this repository's code, the packages' versions, and for a controller of
-    somebody's own its file. What that file imports or reads besides is not looked at.
+    somebody's own its file, for a policy its files. What that file imports or reads besides is not looked at.
     """
     parts = [suite.name, str(suite.version), suite.digest, code_digest(), contender.name]
-    if contender.path:
-        parts.append(_digest([Path(contender.path)]))
+    if contender.files:
+        parts.append(_digest(contender.files))
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
