@@ -37,8 +37,9 @@ PACKAGES = ("numpy", "scipy", "control", "osqp", "llvmlite", "gymnasium")
 def key(suite: FrozenSuite, contender: Contender) -> str:
     """Fingerprint of everything that a controller's rows of a suite depend on.
 
-    The suite's numbers, this repository's code, the packages' versions, and for a controller of
-    somebody's own its file, for a policy its files. What that file imports or reads besides is not looked at.
+    The suite's numbers, this repository's code, the packages' versions, for a controller of
+    somebody's own its file, for a policy its files. What such a file imports or reads besides is
+    not looked at.
     """
     parts = [suite.name, str(suite.version), suite.digest, code_digest(), contender.name]
     if contender.files:
