@@ -17,7 +17,7 @@ CONTRACTION = "contraction (mm)"
 
 @cache
 def drawn():
-    shared = bench(laboratory("bump")[0])
+    shared = bench(laboratory("bump", 4)[0])
     refitted = shared.careful_fit(STATION)
     assert refitted is not None
     return drawn_laws(shared, refitted)
