@@ -137,7 +137,7 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
     tried = np.concatenate([suspect.absent[None], suspect.probes])
     columns = evidence.columns(tried)
     if columns is None:
-        columns = _one_by_one(evidence, tried)
+        columns = _balanced(evidence, tried)
     changes = [part[1:] for part in columns]
     across = np.zeros((size - 1, len(suspect.probes)))
     whole = np.zeros(len(suspect.probes))
@@ -157,6 +157,20 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
     strengths = np.where(strengths > LEAST_PART * np.maximum(whole, 1e-12), strengths, 0.0)
     slopes = np.concatenate(along, axis=1) - weights.T @ np.concatenate(own, axis=1)
     return _Probed(slopes, strengths, _changes(baseline, changes, weights))
+
+
+def _balanced(evidence: Evidence, tried: Array) -> list[Any]:
+    """As `_one_by_one`, but those that balance the load go together, which takes far less time."""
+    able = evidence.balanced[: len(tried)]
+    together = evidence.columns(tried[able]) if able[0] and not able.all() else None
+    if together is None:
+        return _one_by_one(evidence, tried)
+    columns = []
+    for part in together:
+        whole = np.zeros((len(tried), *part.shape[1:]), part.dtype)
+        whole[able] = part
+        columns.append(whole)
+    return columns
 
 
 def _one_by_one(evidence: Evidence, tried: Array) -> list[Any]:

@@ -86,6 +86,7 @@ class Residuals:
         count: number of residuals.
         deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
         trials: number of trials.
+        balanced: which of the parameters tried last balance the load where trials begin.
     Raises:
         ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
         ValueError: no trial, or one that measures nothing.
@@ -116,6 +117,7 @@ class Residuals:
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
         self._buffer = np.empty(0)
+        self.balanced = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.plant == "slide":
@@ -188,10 +190,11 @@ class Residuals:
         commands = np.repeat(first, count, axis=0).T
         states, zeros = settle.all_at_rest(self.plant, commands[0], commands[1], every)
         found: list[Array] = []
-        self._settled = bool(np.isfinite(zeros).all() and np.isfinite(states).all())
+        shape = (len(self._trials), count)
+        finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
+        self._settled, self.balanced = bool(finite.all()), finite.reshape(shape).all(axis=0)
         if not self._settled:
             return found
-        shape = (len(self._trials), count)
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
         with ThreadPoolExecutor(self.threads) as pool:
             # A thread costs more than the work of a small trial does.

@@ -67,8 +67,8 @@ def measured(model, number=4, rate=64.0, seconds=5.0, seed=3, noise=True, **kind
 
 
 @cache
-def laboratory(case, number=4, rate=64.0, seed=3):
-    """Trials in which something is hidden, and the model that made them."""
+def laboratory(case, number=3, rate=64.0, seed=3):
+    """Trials in which something is hidden, one of each kind, and the model that made them."""
     effects, moved = {
         "nothing": ({}, {}),
         "parameters": ({}, OFF),
@@ -81,9 +81,9 @@ def laboratory(case, number=4, rate=64.0, seed=3):
 
 
 @cache
-def diagnosed(case, number=4, rate=64.0, seed=3):
-    """The diagnosis of such trials with the station's model."""
-    return diagnose(laboratory(case, number, rate, seed)[0], STATION)
+def diagnosed(case, number=3, rate=64.0, seed=3):
+    """The diagnosis of such trials with the station's model; it proposes no experiment."""
+    return diagnose(laboratory(case, number, rate, seed)[0], STATION, propose=False)
 
 
 def bench(trials, model=STATION):

@@ -1,6 +1,7 @@
 """The page of a diagnosis: whole, self-contained, in words, for every verdict."""
 
 import re
+from functools import cache
 from html.parser import HTMLParser
 
 import pytest
@@ -30,10 +31,15 @@ class Tags(HTMLParser):
         assert self.open.pop() == tag
 
 
+@pytest.fixture(scope="module")
+def page_of(diagnoses):
+    """The page of a verdict's diagnosis; its pictures take most of a second, so it is kept."""
+    return cache(lambda verdict: report_page(diagnoses[verdict], "Rig 2", {"Seed": "3"}))
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
-def test_the_page_needs_nothing_else_and_says_the_verdict_first(diagnoses, verdict):
-    diagnosis = diagnoses[verdict]
-    page = report_page(diagnosis, "Rig 2", {"Seed": "3"})
+def test_the_page_needs_nothing_else_and_says_the_verdict_first(diagnoses, page_of, verdict):
+    diagnosis, page = diagnoses[verdict], page_of(verdict)
     tags = Tags()
     tags.feed(page)
     assert not tags.open
@@ -70,8 +76,8 @@ def test_the_order_of_the_page(found):
     assert named[8] == "How it was decided"
 
 
-def test_the_effect_comes_with_equation_size_and_rivals(found):
-    page = report_page(found)
+def test_the_effect_comes_with_equation_size_and_rivals(page_of):
+    page = page_of("effect")
     assert "F = -f(v) z" in page and "Dry friction of the slide" in page
     for text in ("19.1 to 21.4", "below 22", "hysteresis", "p &lt; 0.001", "about 40 to 1"):
         assert text in page
@@ -85,8 +91,8 @@ def test_the_worst_trial_is_the_one_missed_by_most(found):
     assert worst.name == max(ratios, key=ratios.get)
 
 
-def test_the_same_diagnosis_gives_the_same_page(found):
-    assert report_page(found) == report_page(found)
+def test_the_same_diagnosis_gives_the_same_page(found, page_of):
+    assert report_page(found, "Rig 2", {"Seed": "3"}) == page_of("effect")
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

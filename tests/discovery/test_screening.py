@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pma_gym.discovery import screening
 from pma_gym.discovery.screening import Baseline, beginnings, look
 from pma_gym.discovery.suspects import suspects
 from tests.discovery.laboratory import DELAY, HYSTERESIS, STATION, bench, measured
@@ -185,3 +186,18 @@ def test_the_seed_alone_draws_chance(quiet):
     assert [each.p_value for each in one] == [each.p_value for each in same]
     assert [each.p_value for each in one] != [each.p_value for each in other]
     assert [each.gain for each in one] == [each.gain for each in other]
+
+
+def test_probes_change_what_each_does_alone_beside_one_that_has_no_balance():
+    shared = bench(measured(STATION, 2, rate=32.0))
+    evidence = shared.evidence(STATION)
+    tried = np.tile(evidence.start, (4, 1))
+    # A muscle that pushes holds no load.
+    tried[1:, shared.own.free.index("contractile_force.slope_n_per_kpa")] *= [1.01, -4.0, 0.99]
+    assert evidence.columns(tried) is None
+    assert evidence.balanced.tolist() == [True, True, False, True]
+    together = screening._balanced(evidence, tried)
+    alone = screening._one_by_one(evidence, tried)
+    for ours, theirs in zip(together, alone, strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
+        assert ours[1].any() and ours[3].any() and not ours[2].any()
