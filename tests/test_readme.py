@@ -48,7 +48,7 @@ def test_example_of_a_controller_is_the_file():
 
 
 def test_example_of_a_controller_is_scored(tmp_path):
-    (command,) = (block for block in blocks("bash") if "--controllers" in block)
+    (command,) = (block for block in blocks("bash") if "integral.py:Integral --out" in block)
     _, controllers, _, out = command.split("-m benchmarks ")[1].split()
     mine = controllers.split(",")[1]
     selection = ["--model", "station", "--task", "rotation", "--pressures", "400"]
