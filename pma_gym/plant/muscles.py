@@ -20,7 +20,9 @@ from pma_gym.units import Quantity
 Force = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Static force (N) by pressure (Pa) and contraction (m), as `statics.muscle_force` gives it."""
 
-NUMBER = Quantity("1", 1, 100, "assumption: what fits side by side on one pulley", usual=1)
+MOST = 100
+"""Muscles side by side: more are a slip of the pen, an assumption."""
+
 DIAMETER = Quantity("mm", 5, 80, "Serres 2008, 1.2.1.4: Festo has 10, 20 and 40", usual=20)
 LENGTH = Quantity("mm", 40, 2000, "Serres 2008, 2.1.2.1: 250", usual=250)
 
@@ -70,14 +72,16 @@ def muscles(number: int, diameter_mm: float, length_mm: float) -> Muscles:
     >>> muscles(2, 40, 250).ratio
     8.0
     """
+    if number not in range(1, MOST + 1):
+        raise MusclesError(
+            f"muscles must be a whole number in 1 to {MOST}, got {number!r}; give how many there "
+            "are side by side on the pulley"
+        )
     try:
-        NUMBER.check("muscles", number)
         DIAMETER.check("diameter", diameter_mm)
         LENGTH.check("length", length_mm)
     except ValueError as error:
         raise MusclesError(str(error)) from None
-    if number != int(number):
-        raise MusclesError(f"muscles must be a whole number, got {number!r}; round it up")
     return Muscles(int(number), DIAMETER.to_si(diameter_mm), LENGTH.to_si(length_mm))
 
 

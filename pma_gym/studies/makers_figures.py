@@ -42,10 +42,10 @@ def makers_figures(model: Model) -> list[Figure]:
         model: of the station.
     """
     by_diameter = {diameter: _force_at_rest(model, diameter) for diameter in (10, 20, 40)}
-    at = "at 600 kPa and its resting length (N)"
+    at = "at its resting length (N)"
     return [
         Figure(f"force of 10 mm {at}", 630.0 * 6 / 8, by_diameter[10], f"630 N at 8 bar: {_OF_10}"),
-        Figure(f"force of 20 mm {at}", 1200.0, by_diameter[20], "Serres 2008, 2.1.2.1: upward of"),
+        Figure(f"force of 20 mm {at}", 1200.0, by_diameter[20], "Serres 2008, 2.1.2.1: at least"),
         Figure(f"force of 20 mm {at}", 1500.0, by_diameter[20], _CATALOGUE),
         Figure(f"force of 40 mm {at}", 6000.0, by_diameter[40], "Serres 2008, 1.2.1.4"),
         Figure("contraction without load (%)", 25.0, _free_percent(model), "Serres 2008, 1.2.1.4"),

@@ -50,8 +50,9 @@ class Miss:
         place = f"at {self.angle / _DEG:.4g} deg"
         if not np.isfinite(self.distance):
             return (
-                f"no pressure of the model allows {place} on {self.device}: the muscle would be "
-                "stretched beyond its limit; use a longer muscle or a smaller pulley"
+                f"{self.wanted:g} N m {place}: no pressure of the model allows that angle on "
+                f"{self.device}, the muscle would be stretched beyond its resting length; use a "
+                "longer muscle or a smaller pulley"
             )
         return (
             f"moment must lie in {self.low:.2f} to {self.high:.2f} N m {place}, the range of "

@@ -43,10 +43,10 @@ def test_at_equal_strain_the_length_does_not_matter(force):
 
 @pytest.mark.parametrize(("diameter", "length"), [(0.010, 0.250), (0.040, 0.400), (0.015, 0.120)])
 def test_it_is_how_the_geometric_law_scales_at_one_braid_angle(diameter, length):
-    def law(d, l):
+    def law(d, length0):
         # tan(alpha0) = pi n D0 / L0 is the same for all.
-        turns = 2.085 * (0.020 / 0.250) * l / d
-        return lambda p, x: schulte_force(p, x, SchulteForce(1.0, l, d, turns))
+        turns = 2.085 * (0.020 / 0.250) * length0 / d
+        return lambda p, x: schulte_force(p, x, SchulteForce(1.0, length0, d, turns))
 
     scaled = scaled_force(law(0.020, 0.250), Muscles(1, diameter, length))
     x = CONTRACTION * length / 0.250
@@ -56,8 +56,8 @@ def test_it_is_how_the_geometric_law_scales_at_one_braid_angle(diameter, length)
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ((0, 20, 250), "muscles must lie in 1 to 100"),
-        ((1.5, 20, 250), "muscles must be a whole number, got 1.5"),
+        ((0, 20, 250), "muscles must be a whole number in 1 to 100, got 0; give"),
+        ((1.5, 20, 250), r"muscles must be a whole number in 1 to 100, got 1\.5"),
         ((1, 0.02, 250), r"diameter must lie in 5 to 80 mm, got 0\.02; check unit"),
         ((1, 20, 0.25), r"length must lie in 40 to 2000 mm, got 0\.25; check unit"),
         ((1, float("nan"), 250), "diameter must lie in 5 to 80 mm, got nan"),
