@@ -38,12 +38,12 @@ def _draw_pressures(axis: Axes, model: Model, devices: Sequence[Device]) -> None
     """Moment at 90 deg against constant pressure, with table I3's points and table 23's."""
     pressure = pressure_grid(model)
     diameters = sorted({device.muscles.diameter for device in devices})
-    others = sorted({(d.muscles.number, d.muscles.length, d.radius) for d in devices})
+    counts = sorted({device.muscles.number for device in devices})
     for device in devices:
         given = resistive_moment(model, device, pressure, FULL_ANGLE)
-        number, diameter, length = device.muscles
+        number, diameter, _ = device.muscles
         color = _COLORS[diameters.index(diameter) % len(_COLORS)]
-        line = _DASHES[others.index((number, length, device.radius)) % len(_DASHES)]
+        line = _DASHES[counts.index(number) % len(_DASHES)]
         moment = np.where(given.allowed, given.moment, np.nan)
         axis.plot(1e-3 * pressure, moment, color=color, linestyle=line)
         _label_end(axis, device, moment, color)
@@ -116,6 +116,10 @@ def _draw_band(
         return
     angle = _DEG * np.linspace(0.0, 90.0, 46)
     swept = resistive_moment(model, device, pressure_grid(model, 12.5e3), angle[:, None], rest)
-    moment = np.where(swept.allowed, swept.moment, np.nan)
-    low, high = np.nanmin(moment, axis=1), np.nanmax(moment, axis=1)
-    axis.fill_between(angle / _DEG, low, high, color=color, alpha=0.15, linewidth=0, label=label)
+    some = swept.allowed.any(axis=1)
+    low, high = (
+        edge(swept.moment[some], axis=1, where=swept.allowed[some], initial=worst)
+        for edge, worst in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    degrees = angle[some] / _DEG
+    axis.fill_between(degrees, low, high, color=color, alpha=0.15, linewidth=0, label=label)

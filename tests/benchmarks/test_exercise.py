@@ -83,6 +83,19 @@ def test_the_smallest_configuration_for_a_profile(tmp_path, profile):
     assert "the pressure following the angle (kPa): 0 deg 393," in words
 
 
+def test_a_short_muscle_serves_a_profile_that_ends_early(tmp_path):
+    path = tmp_path / "profile.csv"
+    path.write_text("angle_deg,moment_nm\n10,4\n30,10\n")
+    found = run_exercise(
+        Choice("1", "20", "150"), read_profile(path), tmp_path, Console(quiet=True)
+    )
+    assert found.device.muscles == muscles(1, 20, 150)
+    device, given = found.device, found.given
+    angle, model = found.wanted.angle, load_model("station")
+    held_there = resistive_moment(model, device, given.pressure, angle, given.rest_pressure)
+    assert held_there.moment == pytest.approx(found.wanted.moment, rel=0.01)
+
+
 def test_a_given_size_narrows_the_choice(tmp_path):
     choice, model = Choice(diameter="20"), load_model("station")
     assert {device.muscles.diameter for device in choice.searched(model)} == {0.020}
