@@ -7,6 +7,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from benchmarks.exercise.commands import register as register_exercise
 from benchmarks.training.commands import register as register_training
 
 # Figures are drawn to files; each process computes on its own core.
@@ -469,6 +470,7 @@ def hidden_effects_report(
 
 
 register_training(app)
+register_exercise(app)
 
 
 def _listed(text: str) -> list[str]:

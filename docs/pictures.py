@@ -8,8 +8,12 @@ from pathlib import Path
 
 import gymnasium as gym
 import matplotlib.image
+from rich.console import Console
 
 import pma_gym  # noqa: F401 - registers the environments
+from benchmarks.exercise.choice import Choice
+from benchmarks.exercise.job import run_exercise
+from benchmarks.exercise.profile import read_profile
 from benchmarks.hidden_effects.pictures import naming_picture
 from controllers import SerresReplay
 from pma_gym.data.dataset import read_dataset
@@ -66,7 +70,21 @@ def draw_hidden_effects() -> None:
     (IMAGES / "diagnosis-naming.png").write_bytes(naming_picture(ranges))
 
 
+def draw_exercise() -> None:
+    """The exercise device's moments, with the smallest configuration for the page's profile."""
+    page = (Path(__file__).parent / "exercise.md").read_text(encoding="utf-8")
+    block = re.search(r"```csv\n(.*?)```", page, flags=re.DOTALL)
+    assert block is not None
+    with tempfile.TemporaryDirectory() as folder:
+        profile = Path(folder) / "profile.csv"
+        profile.write_text(block[1], encoding="utf-8")
+        run_exercise(Choice(), read_profile(profile), Path(folder), Console(quiet=True))
+        drawn = (Path(folder) / "plots" / "exercise.png").read_bytes()
+    (IMAGES / "exercise.png").write_bytes(drawn)
+
+
 if __name__ == "__main__":
     draw_station()
     draw_diagnosis()
     draw_hidden_effects()
+    draw_exercise()

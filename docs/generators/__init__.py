@@ -19,6 +19,13 @@ from generators.environments import (
     tasks,
 )
 from generators.equations import equations, ports, written
+from generators.exercise import (
+    exercise_check,
+    exercise_knee,
+    exercise_makers,
+    exercise_ranges,
+    exercise_worst,
+)
 from generators.files import calibrations, columns, raw_columns, tables
 from generators.hidden_effects import (
     hidden_bound,
@@ -55,6 +62,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(hidden_ways, hidden_bound),
         *(policies_shipped, policies_judged, policies_trained),
         *(policies_ablations, policies_robustness),
+        *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

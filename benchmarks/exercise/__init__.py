@@ -1,0 +1,1 @@
+"""The exercise device as a design tool: moments of configurations, and the smallest that serves."""

@@ -1,0 +1,114 @@
+"""Prescriptions: a moment held at 90 deg, or a profile of moments over angle from a CSV file."""
+
+import csv
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.studies.exercise import FULL_ANGLE
+from pma_gym.units import SI_FACTORS
+
+COLUMNS = ("angle_deg", "moment_nm")
+_LARGEST_NM = 10_000.0
+_FILL = 5.0
+"""Largest step (deg) between the angles at which a profile is checked."""
+
+
+class ProfileError(ValueError):
+    """A prescription that cannot be read; says file, row, column, rule, unit, what came, mend."""
+
+
+class Prescription(NamedTuple):
+    """Moments over angle.
+
+    Attributes:
+        angle: of the pulley (rad), increasing.
+        moment: wanted there (N m).
+        scheduled: whether the pressure may follow the angle.
+    """
+
+    angle: NDArray[np.float64]
+    moment: NDArray[np.float64]
+    scheduled: bool
+
+
+def held(moment: float) -> Prescription:
+    """A moment (N m) that one pressure holds at 90 deg.
+
+    Raises:
+        ProfileError: not a positive number.
+    """
+    if not 0.0 < moment <= _LARGEST_NM:
+        raise ProfileError(
+            f"--moment must lie above 0, to {_LARGEST_NM:g} N m, got {moment!r}; give the moment "
+            "against the operator at 90 deg in N m"
+        )
+    return Prescription(np.array([FULL_ANGLE]), np.array([moment]), scheduled=False)
+
+
+def read_profile(path: Path) -> Prescription:
+    """A profile of moments, filled by lines so that no two angles are more than 5 deg apart.
+
+    Args:
+        path: CSV file with columns angle_deg (0-90, increasing) and moment_nm (not negative).
+    Raises:
+        ProfileError: no such file, not these columns, no rows, or a value that breaks a rule.
+    """
+    rows = _rows(path)
+    angle, moment = (np.array(column) for column in zip(*rows, strict=True))
+    between = [np.linspace(a, b, 1 + math.ceil((b - a) / _FILL)) for a, b in pairwise(angle)]
+    filled = np.unique(np.concatenate([angle, *between]))
+    factor = SI_FACTORS["deg"]
+    return Prescription(factor * filled, np.interp(filled, angle, moment), scheduled=True)
+
+
+def _rows(path: Path) -> list[tuple[float, float]]:
+    """Angles (deg) and moments (N m) of the file, checked row by row."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ProfileError(f"--profile {path}: {_why(error)}; name a CSV file in UTF-8") from None
+    reader = csv.DictReader(lines)
+    names = [name.strip() for name in reader.fieldnames or ()]
+    if set(names) != set(COLUMNS):
+        raise ProfileError(
+            f"{path} must have the columns {' and '.join(COLUMNS)}, got "
+            f"{', '.join(names) or 'an empty file'}; write them as its first line"
+        )
+    reader.fieldnames = names
+    rows: list[tuple[float, float]] = []
+    for row in reader:
+        place = f"row {reader.line_num} of {path}"
+        angle = _number(row, "angle_deg", 90.0, place)
+        if rows and angle <= rows[-1][0]:
+            raise ProfileError(
+                f"angle_deg must increase from row to row, {place} has {angle:g} after "
+                f"{rows[-1][0]:g}; sort the rows and keep one for each angle"
+            )
+        rows.append((angle, _number(row, "moment_nm", _LARGEST_NM, place)))
+    if not rows:
+        raise ProfileError(f"{path} has no rows below its header; give an angle and a moment each")
+    return rows
+
+
+def _number(row: dict, column: str, largest: float, place: str) -> float:
+    """A cell as a number in 0 to a largest."""
+    try:
+        value = float(row[column])
+    except (TypeError, ValueError):
+        value = math.nan
+    if not 0.0 <= value <= largest:
+        raise ProfileError(
+            f"{column} must be a number in 0 to {largest:g} "
+            f"{'deg' if column == 'angle_deg' else 'N m'}, {place} has {row[column]!r}; check "
+            "unit, sign and decimal point"
+        )
+    return value
+
+
+def _why(error: OSError | UnicodeDecodeError) -> str:
+    return error.strerror or str(error) if isinstance(error, OSError) else "not UTF-8 text"

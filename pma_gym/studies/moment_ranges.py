@@ -1,0 +1,127 @@
+"""The range of moments that a device can give, at constant and at scheduled pressure."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.serres2008 import load_table
+from pma_gym.plant.model import Model
+from pma_gym.studies.exercise import FULL_ANGLE, Device, own_device, resistive_moment
+from pma_gym.studies.station_limits import load_at_rotation
+from pma_gym.units import SI_FACTORS
+
+_KPA = SI_FACTORS["kPa"]
+
+
+class Span(NamedTuple):
+    """What a device can hold at an angle as its pressure is chosen.
+
+    Attributes:
+        low: smallest moment (N m).
+        high: largest (N m).
+        lowest: lowest pressure that the angle allows (Pa).
+        highest: highest (Pa).
+    """
+
+    low: float
+    high: float
+    lowest: float
+    highest: float
+
+
+def pressure_grid(model: Model, step: float = 2.5e3) -> NDArray[np.float64]:
+    """Pressures (Pa) of the model's validity, evenly spaced by about a step (Pa)."""
+    ends = model.parameters["validity"]
+    count = round((ends.highest - ends.lowest) / step) + 1
+    return np.linspace(ends.lowest, ends.highest, count)
+
+
+def span(
+    model: Model, device: Device, angle: float = FULL_ANGLE, rest_pressure: float | None = None
+) -> Span | None:
+    """Moments at an angle that the pressures of the model's validity give.
+
+    Args:
+        model: of the station.
+        device: muscles and pulley.
+        angle: of the pulley (rad).
+        rest_pressure: at which the cable was set (Pa); None sets it anew at every pressure: the
+            constant pressure of the dissertation.
+    Returns:
+        The span; None where no pressure allows the angle: the muscle is too short for the pulley.
+    """
+    pressure = pressure_grid(model)
+    given = resistive_moment(model, device, pressure, angle, rest_pressure)
+    if not given.allowed.any():
+        return None
+    moment, usable = given.moment[given.allowed], pressure[given.allowed]
+    return Span(float(moment.min()), float(moment.max()), float(usable[0]), float(usable[-1]))
+
+
+def lowest_rest_pressure(model: Model, device: Device, step: float = 25e3) -> float | None:
+    """Lowest pressure (Pa) at which a cable can be set so that 90 deg is allowed at any pressure.
+
+    The lower it is, the more the muscles pull at small angles, and the further 90 deg pulls them.
+
+    Args:
+        model: of the station.
+        device: muscles and pulley.
+        step: between the pressures tried (Pa).
+    Returns:
+        The pressure; None if none of the model's validity serves.
+    """
+    rests = pressure_grid(model, step)
+    given = resistive_moment(model, device, rests[None, :], FULL_ANGLE, rests[:, None])
+    serving = rests[given.allowed.all(axis=1)]
+    return float(serving[0]) if len(serving) else None
+
+
+class MomentCheck(NamedTuple):
+    """The tested muscle's moment at 90 deg beside table I3 and table 23.
+
+    Attributes:
+        pressure: gauge pressure (Pa).
+        ours: static moment of the model (N m).
+        measured: load cell of table I3 at 90 deg times the model's pulley radius (N m).
+        printed: table 23's (N m), which does not follow from table I3: no truth.
+    """
+
+    pressure: float
+    ours: float
+    measured: float
+    printed: float
+
+    @property
+    def percent(self) -> float:
+        """Ours over the measured one, less 100 %."""
+        return 100.0 * (self.ours / self.measured - 1.0)
+
+
+def check_moments(model: Model) -> list[MomentCheck]:
+    """The tested muscle's moment at 90 deg beside load cell times radius, at table 23's pressures.
+
+    Table I3 at a pressure has twelve loads in three repeats. Of the three, the loads that the cell
+    read and the rotations (from where the pulley stood without a load) are averaged, a lost figure
+    left out; the load is read off at 90 deg on the line between the two neighbours. The radius is
+    the model's, as identified from the same table; it multiplies both sides. The model was fitted
+    to table I3, so this is consistency, no proof on data that it has not seen.
+
+    Args:
+        model: of the station.
+
+    Source:
+        Serres 2008, tables I3 and 23.
+    """
+    device, table = own_device(model), load_table("23")
+    ours = resistive_moment(model, device, _KPA * table["pressure_kpa"], FULL_ANGLE).moment
+    rows = zip(table["pressure_kpa"], ours, table["moment_nm"], strict=True)
+    return [
+        MomentCheck(
+            float(_KPA * pressure),
+            float(moment),
+            device.radius * load_at_rotation(float(pressure)),
+            float(printed),
+        )
+        for pressure, moment, printed in rows
+    ]
