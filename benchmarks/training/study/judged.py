@@ -23,8 +23,9 @@ SUITES = ("nominal", "robust", "hard")
 
 
 def seed_folders(group: Path) -> list[Path]:
-    """Folders of a group's seeds, in order."""
-    return sorted(group.glob("seed-*"), key=lambda path: int(path.name.partition("-")[2]))
+    """Folders of a group's seeds that have a policy, in order."""
+    found = [path for path in group.glob("seed-*") if any(path.glob("*.json"))]
+    return sorted(found, key=lambda path: int(path.name.partition("-")[2]))
 
 
 def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path | None:
