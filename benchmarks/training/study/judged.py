@@ -38,14 +38,15 @@ def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) 
         jobs: processes.
         console: where to print.
     Returns:
-        The folder of the results.
+        The folder of the results; None if there is no policy for the suite's loop.
     """
     frozen = frozen_suite(suite)
     names = ",".join(f"{folder}:{algorithm}" for folder in seed_folders(group))
     entries = [frozen.entry(one) for one in parse_contenders(names)]
-    entries = [
-        entry._replace(only=_able(frozen, entry.only, group, algorithm)) for entry in entries
-    ]
+    able = _able(frozen, entries[0].only, group, algorithm)
+    if not able:
+        return None
+    entries = [entry._replace(only=able) for entry in entries]
     out = group / f"suite-{suite}"
     run_comparison(frozen, entries, out, jobs, console)
     return out
