@@ -12,7 +12,7 @@ from types import ModuleType
 from controllers import CONTROLLERS
 from controllers.controller import Controller
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
-from controllers.policy_file import policy_pair
+from controllers.policy_file import PolicyError, policy_pair
 
 POLICY_FILES = (".json", ".safetensors")
 """Endings of a policy's two files."""
@@ -61,7 +61,7 @@ class Contender:
                 for path in files
                 if path.stem.endswith(f"-{self.algorithm}")
             )
-        return frozenset((Policy(self.path).file.task,)) if self.is_policy else frozenset()
+        return frozenset((_loaded(self.path).file.task,)) if self.is_policy else frozenset()
 
     @property
     def label(self) -> str:
@@ -96,7 +96,7 @@ class Contender:
         if self.algorithm:
             return ShippedPolicy(self.algorithm, Path(self.path))
         if self.is_policy:
-            return Policy(self.path)
+            return _loaded(self.path)
         factory = _class_of(self) if self.path else CONTROLLERS[self.name]
         try:
             controller = factory()
@@ -134,6 +134,18 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
             contender = replace(contender, title=_own_name(made))
         contenders.append(contender)
     return contenders
+
+
+def _loaded(path: str) -> Policy:
+    """A policy from its file.
+
+    Raises:
+        ControllerError: a file that cannot be used.
+    """
+    try:
+        return Policy(path)
+    except PolicyError as error:
+        raise ControllerError(str(error)) from error
 
 
 def is_shipped(name: str) -> bool:

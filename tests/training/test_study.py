@@ -109,6 +109,15 @@ def test_a_policy_file_and_a_folder_are_contenders(station, tmp_path):
         parse_contenders(f"{tmp_path}:sac")
 
 
+def test_a_contender_that_was_cut_off_is_refused(station, tmp_path):
+    policy = trained(station)
+    save_policy_file(policy, tmp_path / policy.name)
+    weights = tmp_path / f"{policy.name}.safetensors"
+    weights.write_bytes(weights.read_bytes()[:-100])
+    with pytest.raises(ControllerError, match="was cut off, changed or mixed up"):
+        parse_contenders(f"{tmp_path / policy.name}.json")
+
+
 def test_what_ships_is_small():
     total = sum(
         p.stat().st_size for path in shipped_policies() for p in path.parent.glob(f"{path.stem}.*")
