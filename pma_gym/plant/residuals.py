@@ -117,7 +117,7 @@ class Residuals:
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
         self._buffer = np.empty(0)
-        self.balanced = np.ones(1, bool)
+        self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.plant == "slide":
@@ -192,7 +192,8 @@ class Residuals:
         found: list[Array] = []
         shape = (len(self._trials), count)
         finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
-        self._settled, self.balanced = bool(finite.all()), finite.reshape(shape).all(axis=0)
+        self._settled = bool(finite.all())
+        self.balanced = np.asarray(finite.reshape(shape).all(axis=0))
         if not self._settled:
             return found
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
