@@ -7,8 +7,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
-from stable_baselines3.common.vec_env import VecEnv
-from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from benchmarks.training.reward import bounded
 from controllers.form import HIGHEST_V, Form
@@ -16,10 +15,11 @@ from controllers.pilots import Pilots
 from controllers.view import View
 from pma_gym.envs import PMAVectorEnv, Station
 from pma_gym.envs.observation import BOUND
+from pma_gym.envs.sb3 import EngineVecEnv
 from pma_gym.plant.model import load_model
 
 
-class PilotedVecEnv(VecEnv):
+class PilotedVecEnv(EngineVecEnv):
     """`PMAVectorEnv` behind a view and a form, for Stable-Baselines3.
 
     Args:
@@ -55,7 +55,6 @@ class PilotedVecEnv(VecEnv):
             return Station(model, self.envs.task, pressure, chosen.period, *late)
 
         self.pilots = Pilots(count, view, form, station)
-        self.render_mode = None
         self._staggered = staggered
         self._length = self.envs.task.steps(chosen.control_rate_hz)
         self._left = np.zeros(count, np.int64)
@@ -123,36 +122,3 @@ class PilotedVecEnv(VecEnv):
         self._returns[which] = 0.0
         self._left[which] = np.iinfo(np.int64).max
         self.pilots.begin(which, self.envs.pressures[which])
-
-    def close(self) -> None:
-        """Free the environments."""
-        self.envs.close()
-
-    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute, the same for each environment."""
-        value = getattr(self, attr_name)
-        return [value for _ in self._get_indices(indices)]
-
-    def set_attr(
-        self,
-        attr_name: str,
-        value: Any,  # noqa: ANN401 - as the base class has it
-        indices: VecEnvIndices = None,
-    ) -> None:
-        """Refused: the environments share one engine."""
-        raise AttributeError(f"{attr_name} cannot be set: make the environments anew")
-
-    def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: VecEnvIndices = None,
-        **method_kwargs: Any,
-    ) -> list[Any]:
-        """Call a method of the `PMAVectorEnv` once; its result for each environment asked for."""
-        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
-
-    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """Whether an environment is wrapped; Monitor's `episode` is in the infos without it."""
-        return [False for _ in self._get_indices(indices)]

@@ -14,7 +14,54 @@ from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import Task
 
 
-class SB3VecEnv(VecEnv):
+class EngineVecEnv(VecEnv):
+    """What VecEnvs around a `PMAVectorEnv` share: their environments have one engine.
+
+    Attributes:
+        envs: the PMAVectorEnv.
+    """
+
+    envs: PMAVectorEnv
+
+    def close(self) -> None:
+        """Free the environments."""
+        self.envs.close()
+
+    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
+        """An attribute of the environments, the same for each."""
+        value = getattr(self.envs, attr_name)
+        return [value for _ in self._get_indices(indices)]
+
+    def set_attr(
+        self,
+        attr_name: str,
+        value: Any,  # noqa: ANN401 - as the base class has it
+        indices: VecEnvIndices = None,
+    ) -> None:
+        """Refused: environments that share an engine have no attributes of their own."""
+        raise AttributeError(f"{attr_name} cannot be set: make the environments anew")
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method of the `PMAVectorEnv` once; its result for each environment asked for."""
+        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
+        return [result for _ in self._get_indices(indices)]
+
+    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
+        """Whether an environment is wrapped; Monitor's `episode` is in the infos without it."""
+        return [False for _ in self._get_indices(indices)]
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """None: render one environment of the same seed."""
+        return [None] * self.num_envs
+
+
+class SB3VecEnv(EngineVecEnv):
     """`PMAVectorEnv` as a VecEnv: what Stable-Baselines3 trains on.
 
     An environment's info is empty but where its episode ends. There it has `PMAEnv`'s last info,
@@ -92,43 +139,6 @@ class SB3VecEnv(VecEnv):
             }
             self._returns[i], self._lengths[i] = 0.0, 0
         return observations, rewards.astype(np.float32), over, infos
-
-    def close(self) -> None:
-        """Free the environments."""
-        self.envs.close()
-
-    def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the environments, the same for each."""
-        value = getattr(self.envs, attr_name)
-        return [value for _ in self._get_indices(indices)]
-
-    def set_attr(
-        self,
-        attr_name: str,
-        value: Any,  # noqa: ANN401 - as the base class has it
-        indices: VecEnvIndices = None,
-    ) -> None:
-        """Refused: environments that share an engine have no attributes of their own."""
-        raise AttributeError(f"{attr_name} cannot be set: make the environments anew")
-
-    def env_method(
-        self,
-        method_name: str,
-        *method_args: Any,
-        indices: VecEnvIndices = None,
-        **method_kwargs: Any,
-    ) -> list[Any]:
-        """Call a method of the `PMAVectorEnv` once; its result for each environment asked for."""
-        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
-
-    def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """Whether an environment is wrapped; Monitor's `episode` is in the infos without it."""
-        return [False for _ in self._get_indices(indices)]
-
-    def get_images(self) -> Sequence[np.ndarray | None]:
-        """None: render one environment of the same seed."""
-        return [None] * self.num_envs
 
 
 def _of_one(info: Mapping[str, Any], i: int) -> dict[str, Any]:
