@@ -89,7 +89,7 @@ def report(
 
     from benchmarks.files import write_text
     from benchmarks.training.study.figures import pid_errors, study_figures, variation
-    from benchmarks.training.study.judged import PID_FOLDER, SHIPPED_GROUP
+    from benchmarks.training.study.judged import ALSO_SHIPPED, PID_FOLDER, SHIPPED_GROUP
     from benchmarks.training.study.pictures import write_curves
     from benchmarks.training.study.ship import ship as ship_policies
 
@@ -99,8 +99,8 @@ def report(
     found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
-    if ship:
-        for path in ship_policies(out / SHIPPED_GROUP, found["groups"][SHIPPED_GROUP]):
+    for group in (SHIPPED_GROUP, *ALSO_SHIPPED) if ship else ():
+        for path in ship_policies(out / group, found["groups"][group]):
             print(path)
 
 

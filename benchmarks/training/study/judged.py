@@ -13,7 +13,10 @@ from benchmarks.contender import parse_contenders
 from benchmarks.training.study.pooled import Pool
 
 SHIPPED_GROUP = "ppo-increment"
-"""Group whose best policies ship."""
+"""Group of the headline algorithm: its best policies ship, and have a column in the tables."""
+
+ALSO_SHIPPED = ("tqc-increment",)
+"""Groups whose best policies ship too: the best of the algorithms that learn from what is past."""
 
 PID_FOLDER = "pid"
 """Folder of the PID's results, which learning curves are compared with."""
