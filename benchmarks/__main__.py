@@ -373,39 +373,6 @@ def speed(
     raise typer.Exit(code)
 
 
-@app.command()
-def export(
-    model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
-    env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
-    env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
-    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; found out if empty.")] = "",
-    vecnormalize: Annotated[
-        Path | None, typer.Option(help="Its statistics, if it was trained in a VecNormalize.")
-    ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(help="DIR/NAME of the policy; results/policies/MODEL if not given."),
-    ] = None,
-    onnx: Annotated[bool, typer.Option("--onnx", help="Write NAME.onnx too.")] = False,
-    trust: Annotated[
-        bool, typer.Option("--trust", help="Load the zip, which runs whatever code is in it.")
-    ] = False,
-) -> None:
-    """Make a policy file of your own model, which the benchmark runs without torch."""
-    from benchmarks.training.users_model import Order, export_model, parsed_kwargs
-
-    try:
-        kwargs = parsed_kwargs(env_kwargs)
-        usual = RESULTS / "policies" / model.stem
-        order = Order(model, env, kwargs, out or usual, algo, vecnormalize, onnx, trust)
-        if out is None and trust:
-            usual.parent.mkdir(parents=True, exist_ok=True)
-        written = export_model(order)
-    except ValueError as error:
-        _refuse(error)
-    print("\n".join(map(str, written)))
-
-
 @app.command("hidden-effects")
 def hidden_effects(
     block: Annotated[

@@ -55,7 +55,7 @@ def exercise_blocks(model: Model, devices: Sequence[Device], found: Answer | Non
 def _knee_words() -> str:
     return (
         "Largest voluntary isometric torque of a man of 18–25 years after Anderson, Madigan and "
-        f"Nussbaum 2007 (literature, not checked here against the paper), {BODY_MASS:g} kg and "
+        f"Nussbaum 2007 (its table 3 as RBDL has it; the paper was not read), {BODY_MASS:g} kg and "
         f"{BODY_HEIGHT:g} m (assumption). The dissertation (6.3) says that its largest moment is "
         "about 20 % of the knee's largest, without a torque over angle: "
         f"{dissertations_knee_peak():.0f} N m."

@@ -1,4 +1,4 @@
-"""The commands about policies: `train`."""
+"""The commands about policies: `train` and `export`."""
 
 import sys
 from pathlib import Path
@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+RESULTS = Path("results")
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
 
@@ -13,6 +14,7 @@ INTERRUPTED = 130
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command()(train)
+    app.command()(export)
 
 
 def train(
@@ -51,7 +53,7 @@ def train(
             file=sys.stderr,
         )
         raise typer.Exit(2) from None
-    folder = out or Path("results") / "training" / f"{Path(preset).stem}-{algo}" / f"{task}-{seed}"
+    folder = out or RESULTS / "training" / f"{Path(preset).stem}-{algo}" / f"{task}-{seed}"
     try:
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
@@ -68,3 +70,36 @@ def train(
             f"Interrupted; run it again, it goes on from {folder / 'checkpoints'}", file=sys.stderr
         )
         raise typer.Exit(INTERRUPTED) from None
+
+
+def export(
+    model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
+    env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
+    env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
+    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; found out if empty.")] = "",
+    vecnormalize: Annotated[
+        Path | None, typer.Option(help="Its statistics, if it was trained in a VecNormalize.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="DIR/NAME of the policy; results/policies/MODEL if not given."),
+    ] = None,
+    onnx: Annotated[bool, typer.Option("--onnx", help="Write NAME.onnx too.")] = False,
+    trust: Annotated[
+        bool, typer.Option("--trust", help="Load the zip, which runs whatever code is in it.")
+    ] = False,
+) -> None:
+    """Make a policy file of your own model, which the benchmark runs without torch."""
+    from benchmarks.training.users_model import Order, export_model, parsed_kwargs
+
+    try:
+        kwargs = parsed_kwargs(env_kwargs)
+        usual = RESULTS / "policies" / model.stem
+        order = Order(model, env, kwargs, out or usual, algo, vecnormalize, onnx, trust)
+        if out is None and trust:
+            usual.parent.mkdir(parents=True, exist_ok=True)
+        written = export_model(order)
+    except ValueError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+    print("\n".join(map(str, written)))

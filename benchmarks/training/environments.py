@@ -27,7 +27,7 @@ def training_environments(preset: Preset, threads: int = 1) -> VecEnv:
 
 
 def validation_environments(preset: Preset, threads: int = 1) -> VecEnv:
-    """Two episodes on each of the stations that neither training nor a suite has.
+    """Twice as many episodes as there are validation stations, each on one drawn from them.
 
     Also where a preset trains on the nominal station alone.
     """

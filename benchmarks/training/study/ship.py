@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.training.stations import TRAINING, VALIDATION
 from benchmarks.training.study.judged import seed_folders
 from controllers.policy import POLICIES
 from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
@@ -97,10 +98,11 @@ def card(policy: PolicyFile, seeds: int) -> str:
             "",
             f"- **Sees**: {len(policy.observation)} entries, listed in the .json file.",
             f"- **Does**: {_does(policy)}",
-            f"- **Trained on**: 128 stations drawn by the recipe of suite `robust` with its "
+            f"- **Trained on**: {TRAINING} stations drawn by the recipe of suite `robust` with its "
             f"training seed; {training['steps']} control steps, {training['wall_s']:.0f} s on one "
             f"core of a machine that did other things too; seed {training['seed']}, the best of "
-            f"{seeds} on 64 validation stations ({validation['error']:.4g} {validation['unit']}).",
+            f"{seeds} on {VALIDATION} validation stations ({validation['error']:.4g} "
+            f"{validation['unit']}).",
             f"- **Code**: {training['code']}",
             f"- **Made again by**: `{command}`",
             "",
@@ -119,7 +121,7 @@ def card(policy: PolicyFile, seeds: int) -> str:
             "",
             "Limits: for this control rate and delay alone (others are refused), for stations like "
             "those of the recipe; at a limit of the rig it knows no more than its training showed "
-            "it. Its voltage is less smooth than a PID's. Never run on a real rig.",
+            "it. How busy its voltage is stands in docs/policies.md. Never run on a real rig.",
             "",
         ]
     )
