@@ -14,9 +14,8 @@ from benchmarks.exercise.tables import terminal_table
 from benchmarks.files import write_bytes, write_text
 from benchmarks.profiles import write_csv
 from pma_gym.pages.document import TextTable, to_html, to_markdown
+from pma_gym.plant.exercise import FULL_ANGLE, Device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model, load_model
-from pma_gym.studies.exercise import FULL_ANGLE, Device, resistive_moment
-from pma_gym.studies.moment_ranges import pressure_grid
 
 MODEL = "station"
 PLOTS = "plots"

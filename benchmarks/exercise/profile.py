@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.studies.exercise import FULL_ANGLE
+from pma_gym.plant.exercise import FULL_ANGLE
 from pma_gym.units import SI_FACTORS
 
 COLUMNS = ("angle_deg", "moment_nm")

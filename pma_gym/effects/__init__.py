@@ -23,6 +23,7 @@ from pma_gym.effects.geometric_force import (
 )
 from pma_gym.effects.hanging_load import HANGING_LOAD
 from pma_gym.effects.hysteresis import HYSTERESIS
+from pma_gym.effects.leg import LEG
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.load_dependent_damping import LOAD_DEPENDENT_DAMPING
 from pma_gym.effects.nonlinear_stiffness import NONLINEAR_STIFFNESS
@@ -100,6 +101,7 @@ CATALOGUE: dict[str, Effect] = {
         BEARING_FRICTION,
         ROTOR,
         HANGING_LOAD,
+        LEG,
         SLIDE,
         START,
         REGULATOR_LINE,

@@ -232,11 +232,14 @@ def _slide(search: _Search) -> None:
 def _drive_load(search: _Search) -> np.ndarray:
     """Load of the drive (N), which the pulley shows while the cable hangs slack."""
     rotor, pull = search.parameters("rotor"), search.rate("spin")
-    if "hanging_load" not in search.plant.model.effects:
-        return pull * rotor["inertia"] / rotor["radius"]
+    effects, inertia = search.plant.model.effects, rotor["inertia"]
+    if "leg" in effects:
+        inertia = inertia + search.parameters("leg")["inertia"]
+    if "hanging_load" not in effects:
+        return pull * inertia / rotor["radius"]
     # The load is what accelerates rotor and weights, whose mass is the load's: L - M a = J a / r^2.
     share = search.parameters("hanging_load")["share"] * rotor["radius"] * pull / GRAVITY
-    return pull * rotor["inertia"] / (rotor["radius"] * (1.0 - share))
+    return pull * inertia / (rotor["radius"] * (1.0 - share))
 
 
 def _station(search: _Search) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.hanging_load import hanging_inertia
+from pma_gym.effects.leg import leg_torque
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.trace import trace
 from pma_gym.plant.compose import Equations, Port
@@ -99,12 +100,21 @@ def _write_drive(eq: Equations) -> None:
 
 
 def _inertia(eq: Equations) -> Value:
-    """Inertia at the pulley (kg m^2): the rotor's, and that of what hangs on the cable."""
+    """Inertia at the pulley (kg m^2): the rotor's, of what hangs on the cable, of a leg."""
     rotor = eq.parameters["rotor"]
-    if "hanging_load" not in eq.parameters:
-        return rotor.inertia
-    hanging = eq.parameters["hanging_load"]
-    return rotor.inertia + trace(hanging_inertia, eq["load_asked"], rotor.radius, hanging)
+    inertia = rotor.inertia
+    if "hanging_load" in eq.parameters:
+        hanging = eq.parameters["hanging_load"]
+        inertia = inertia + trace(hanging_inertia, eq["load_asked"], rotor.radius, hanging)
+    return inertia + eq.parameters["leg"].inertia if "leg" in eq.parameters else inertia
+
+
+def _drag(eq: Equations) -> Value:
+    """Torque that turning costs (N m): the rotor's damping, and a knee's."""
+    drag = eq.parameters["rotor"].damping * eq["spin"]
+    if "leg" not in eq.parameters:
+        return drag
+    return drag + trace(leg_torque, eq["spin"], eq.parameters["leg"])
 
 
 def _write_states(eq: Equations) -> None:
@@ -117,7 +127,7 @@ def _write_states(eq: Equations) -> None:
         "velocity", (force - eq["resistance"] * eq["velocity"]) / slide.mass, SCALES["velocity"]
     )
     eq.add_state("angle", eq["spin"], SCALES["angle"])
-    eq.add_state("spin", (torque - rotor.damping * eq["spin"]) / _inertia(eq), SCALES["spin"])
+    eq.add_state("spin", (torque - _drag(eq)) / _inertia(eq), SCALES["spin"])
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)

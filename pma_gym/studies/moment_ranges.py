@@ -2,12 +2,9 @@
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pma_gym.data.serres2008 import load_table
+from pma_gym.plant.exercise import FULL_ANGLE, Device, own_device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model
-from pma_gym.studies.exercise import FULL_ANGLE, Device, own_device, resistive_moment
 from pma_gym.studies.station_limits import load_at_rotation
 from pma_gym.units import SI_FACTORS
 
@@ -28,13 +25,6 @@ class Span(NamedTuple):
     high: float
     lowest: float
     highest: float
-
-
-def pressure_grid(model: Model, step: float = 2.5e3) -> NDArray[np.float64]:
-    """Pressures (Pa) of the model's validity, evenly spaced by about a step (Pa)."""
-    ends = model.parameters["validity"]
-    count = round((ends.highest - ends.lowest) / step) + 1
-    return np.linspace(ends.lowest, ends.highest, count)
 
 
 def span(

@@ -7,14 +7,16 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.plant.exercise import FULL_ANGLE, Device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model
-from pma_gym.studies.exercise import FULL_ANGLE, Device, resistive_moment
-from pma_gym.studies.moment_ranges import pressure_grid
 from pma_gym.units import SI_FACTORS
 
 _DEG = SI_FACTORS["deg"]
 _GRID = 25e3
 """Largest step between the pressures that a schedule is read off (Pa)."""
+
+_ROUNDING = 1e-6
+"""How far a moment may be outside the range by rounding (N m)."""
 
 
 @dataclass(frozen=True)
@@ -69,9 +71,9 @@ class UnreachableError(ValueError):
         miss: where, and what could be given there.
     """
 
-    def __init__(self, miss: Miss, among: int = 1) -> None:
+    def __init__(self, miss: Miss, among: int = 1, instead: str = "") -> None:
         nearest = f" (the nearest of {among} configurations)" if among > 1 else ""
-        super().__init__(f"{miss}{nearest}")
+        super().__init__(f"{miss}{nearest}{instead}")
         self.miss = miss
 
 
@@ -134,18 +136,86 @@ def follow(
     pressure = pressure_grid(model, _GRID)
     misses = []
     for rest in pressure:
-        given = resistive_moment(model, device, pressure, angle[:, None], rest)
-        found = [
-            _miss(device, a, m, pressure[ok], row[ok])
-            for a, m, row, ok in zip(angle, moment, given.moment, given.allowed, strict=True)
-        ]
-        missed = [miss for miss in found if miss is not None]
-        if not missed:
-            rows = zip(moment, given.moment, given.allowed, strict=True)
-            read = [np.interp(m, row[ok], pressure[ok]) for m, row, ok in rows]
-            return Schedule(float(rest), np.array(read))
-        misses.append(max(missed, key=lambda miss: miss.distance))
+        found = _scheduled(model, device, angle, moment, float(rest), 0.0)
+        if isinstance(found, Schedule):
+            return found
+        misses.append(found)
     raise UnreachableError(min(misses, key=lambda miss: miss.distance))
+
+
+def follow_from(
+    model: Model,
+    device: Device,
+    angle: NDArray[np.float64],
+    moment: NDArray[np.float64],
+    rest_pressure: float,
+    rest_moment: float,
+) -> Schedule:
+    """As `follow`, of a cable that is drawn in until it holds a moment at angle 0 and a pressure.
+
+    Args:
+        model: of the station.
+        device: muscles and pulley.
+        angle: of the pulley (rad), shape (n,).
+        moment: wanted (N m), shape (n,).
+        rest_pressure: gauge pressure at angle 0 (Pa).
+        rest_moment: moment there (N m); 0 for a cable that hangs slack.
+    Raises:
+        UnreachableError: where it fails most, and what could be given there.
+    """
+    found = _scheduled(model, device, angle, moment, rest_pressure, rest_moment)
+    if isinstance(found, Miss):
+        raise UnreachableError(found)
+    return found
+
+
+def constant_moments(
+    model: Model, device: Device, rest_pressure: float, step: float = 0.25
+) -> tuple[float, float] | None:
+    """The moments that a device can hold from 0 to 90 deg, the cable drawn in for each.
+
+    Args:
+        model: of the station.
+        device: muscles and pulley.
+        rest_pressure: gauge pressure at angle 0 (Pa).
+        step: between the moments tried (N m).
+    Returns:
+        The least and the greatest of those tried (N m); None if it holds none of them.
+    """
+    angle = FULL_ANGLE * np.linspace(0.0, 1.0, 10)
+    start = float(resistive_moment(model, device, rest_pressure, FULL_ANGLE).moment)
+    found = [
+        float(moment)
+        for moment in np.arange(step, start, step)
+        if isinstance(
+            _scheduled(model, device, angle, moment + 0.0 * angle, rest_pressure, moment), Schedule
+        )
+    ]
+    return (found[0], found[-1]) if found else None
+
+
+def _scheduled(
+    model: Model,
+    device: Device,
+    angle: NDArray[np.float64],
+    moment: NDArray[np.float64],
+    rest_pressure: float,
+    rest_moment: float,
+) -> Schedule | Miss:
+    """Pressures over the angle with one setting of the cable, or where it fails most."""
+    pressure = pressure_grid(model, _GRID)
+    columns = angle[:, None]
+    given = resistive_moment(model, device, pressure, columns, rest_pressure, rest_moment)
+    found = [
+        _miss(device, a, m, pressure[ok], row[ok])
+        for a, m, row, ok in zip(angle, moment, given.moment, given.allowed, strict=True)
+    ]
+    missed = [miss for miss in found if miss is not None]
+    if missed:
+        return max(missed, key=lambda miss: miss.distance)
+    rows = zip(moment, given.moment, given.allowed, strict=True)
+    read = [np.interp(m, row[ok], pressure[ok]) for m, row, ok in rows]
+    return Schedule(rest_pressure, np.array(read))
 
 
 def _miss(
@@ -155,7 +225,7 @@ def _miss(
     if not len(moment):
         return Miss(device, angle, wanted, np.nan, np.nan, np.nan, np.nan)
     low, high = float(moment.min()), float(moment.max())
-    if low <= wanted <= high:
+    if low - _ROUNDING <= wanted <= high + _ROUNDING:
         return None
     return Miss(device, angle, wanted, low, high, float(pressure[0]), float(pressure[-1]))
 

@@ -76,12 +76,20 @@ def own_device(model: Model) -> Device:
     return Device(TESTED, model.parameters["rotor"].radius)
 
 
+def pressure_grid(model: Model, step: float = 2.5e3) -> NDArray[np.float64]:
+    """Pressures (Pa) of the model's validity, evenly spaced by about a step (Pa)."""
+    ends = model.parameters["validity"]
+    count = round((ends.highest - ends.lowest) / step) + 1
+    return np.linspace(ends.lowest, ends.highest, count)
+
+
 def resistive_moment(
     model: Model,
     device: Device,
     pressure: ArrayLike,
     angle: ArrayLike,
     rest_pressure: ArrayLike | None = None,
+    rest_moment: ArrayLike = 0.0,
 ) -> Moments:
     """Static moment of a device at the joint.
 
@@ -92,20 +100,24 @@ def resistive_moment(
         angle: of the pulley (rad), broadcast with the pressures.
         rest_pressure: gauge pressure (Pa) at which the cable was set, to hang with its slack at
             angle 0; None sets it anew at every pressure, as the dissertation did.
+        rest_moment: moment (N m) at angle 0 and the pressure of rest, for which the cable was
+            drawn in further; broadcast too. 0: it hangs slack there.
     Returns:
         Moments, of the broadcast shape.
     """
     size = device.muscles.length / TESTED.length
     force = scaled_force(muscle_force(model), device.muscles)
     set_at = pressure if rest_pressure is None else rest_pressure
-    pressures, angles, rests = np.broadcast_arrays(
-        *(np.asarray(value, dtype=np.float64) for value in (pressure, angle, set_at))
+    pressures, angles, rests, held = np.broadcast_arrays(
+        *(np.asarray(value, dtype=np.float64) for value in (pressure, angle, set_at, rest_moment))
     )
     ends = size * _SHORTEST, size * _LONGEST
-    start = contraction_at(force, rests, np.zeros_like(rests), *ends)
+    drawn = held / device.radius
+    start = contraction_at(force, rests, drawn, *ends)
     cable = model.parameters["cable"]
     stiffness = device.muscles.ratio * cable.stiffness
-    wound = device.radius * angles - cable.slack - start
+    slack = np.where(drawn > 0.0, -drawn / stiffness, cable.slack)
+    wound = device.radius * angles - slack - start
 
     def unbalanced(at: np.ndarray, contraction: np.ndarray) -> np.ndarray:
         return force(at, contraction) - stiffness * np.maximum(0.0, wound + contraction)
