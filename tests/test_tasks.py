@@ -12,6 +12,7 @@ from pma_gym.metrics import phase_times
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import (
     EVERY_TASK,
+    EXERCISES,
     ISOTONIC,
     REWARDS,
     TASKS,
@@ -95,7 +96,8 @@ def test_names_of_tasks_are_their_keys():
     assert set(ISOTONIC) == {"isotonic", "triangle_low", "triangle_high"}
     kinds = ("sine", "multisine", "steps", "speeds")
     assert set(UNSEEN) == {f"{base}_{kind}" for base in TASKS for kind in kinds}
-    assert len(EVERY_TASK) == len(TASKS) + len(UNSEEN) + len(ISOTONIC)
+    assert set(EXERCISES) == {"isokinetic_exercise", "isotonic_exercise", "profile_exercise"}
+    assert len(EVERY_TASK) == len(TASKS) + len(UNSEEN) + len(ISOTONIC) + len(EXERCISES)
 
 
 @pytest.mark.parametrize("task", UNSEEN.values(), ids=UNSEEN)

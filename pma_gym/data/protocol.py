@@ -17,9 +17,10 @@ Motion = Callable[[Any], Any]
 """Ideal position (m or rad) by time since the start of the trial (s): of an array one of the same
 shape, of a number one."""
 
-Followed = Literal["extension", "rotation", "contraction"]
+Followed = Literal["extension", "rotation", "contraction", "excess"]
 """What a task asks for, from where the trial began: how far the muscle is pulled out (m), how far
-the pulley has turned (rad), or how far the muscle has shortened (m)."""
+the pulley has turned (rad), or how far the muscle has shortened (m); or by how much the moment at a
+joint exceeds the one that is prescribed at its angle (N m), which is to be 0."""
 
 OVERTIME = PHASE_SAMPLES - round(PHASE_DURATION * SAMPLE_RATE_HZ)
 """Samples of a phase beyond those of its duration, as in the dissertation's tables: the first and
@@ -117,6 +118,11 @@ class Protocol:
                 f"phases of {self.name} must be one or more, all lines or all of one motion; write "
                 "it as one function of the trial's time"
             )
+
+    @property
+    def suffix(self) -> str:
+        """The unit as it ends a name: `mm`, `deg`, `nm` for N m."""
+        return self.unit.replace(" ", "").lower()
 
     @property
     def motion(self) -> Motion | None:

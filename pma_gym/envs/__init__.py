@@ -11,6 +11,7 @@ ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
     "pma_gym/IsokineticRotation-v0": "rotation",
     "pma_gym/IsotonicContraction-v0": "isotonic",
+    "pma_gym/ResistiveExercise-v0": "isokinetic_exercise",
 }
 """Registered environments, and the task of each; `task=` gives another."""
 

@@ -6,9 +6,11 @@ From the action to the drive, from the plant's state to reading, observation, re
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.observation import BOUND, ObservationTable, heard_position
+from pma_gym.envs.exercised import Exercised, held_volts
+from pma_gym.envs.observation import BOUND, ObservationTable, Prescribed, heard_position
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH, Record
 from pma_gym.envs.scoring import position_of
 from pma_gym.kernels.generic import to_real, where
@@ -52,12 +54,22 @@ class Circuit:
         """The graph of all values."""
         return self.equations.graph
 
+    @cached_property
+    def exercised(self) -> Exercised | None:
+        """What an exercise adds."""
+        return Exercised(self) if self.record.task.exercise else None
+
+    @property
+    def prescribed(self) -> Prescribed | None:
+        """What a measured moment is compared with, in an exercise that prescribes one."""
+        return self.exercised.prescribed if self.exercised else None
+
     def slot(self, name: str) -> Value:
         """A number of the record, as an input; states and commands are the plant's own."""
         if name in self.record.states or name in (*COMMANDS, ZERO):
             return self.equations[name]
-        if name == START:
-            return self.graph.input(START, HELD)
+        if name == START or name in self.record.prescribed:
+            return self.graph.input(name, HELD)
         return self.graph.input(f"record.{name}", CHANGING, self.record.kind(name))
 
     def action(self, i: int) -> Value:
@@ -87,7 +99,10 @@ class Circuit:
                 found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
         else:
             heard = volts
-        if record.task.actuator == "regulator":
+        if self.exercised:
+            regulator, guarded = self.exercised.keep_safe(heard[0])
+            found |= self.exercised.operate() | guarded
+        elif record.task.actuator == "regulator":
             found["motor_voltage"], regulator = self.slot("rest_motor"), heard[0]
         else:
             found["motor_voltage"] = heard[0]
@@ -117,7 +132,7 @@ class Circuit:
         for name in jumps:
             size = self.slot(name.replace("_step", ""))
             volts = volts + where(now >= self.slot(name), size, 0.0)
-        return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
+        return held_volts(volts)
 
     def _pulse(self) -> Value:
         """Force of the operator in the step that begins (N)."""
@@ -181,6 +196,8 @@ class Circuit:
         ended = broken(self.equations.parameters["limits"], truth)
         found["ended"] = self.graph.value(ended)
         found["count"] = count
+        if self.exercised:
+            found |= self.exercised.score(found, first)
         found |= self._info(found, to_real(count))
         return found
 
@@ -194,7 +211,9 @@ class Circuit:
         pressure = found["true_pressure"]
         inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
         heard = heard_position(
-            quantity, lambda part: found[f"{part}_{record.options.observation_delay}"]
+            quantity,
+            lambda part: found[f"{part}_{record.options.observation_delay}"],
+            self.prescribed,
         )
         values = [
             count * record.options.period,
@@ -208,12 +227,14 @@ class Circuit:
             found["true_load"],
             where(inside, 0.0, 1.0),
         ]
+        if self.exercised:
+            values += self.exercised.info(found)
         return dict(zip(record.info, values, strict=True))
 
     def position(self, found: Mapping[str, Value]) -> Value:
         """True position that the task asks for (m or rad)."""
-        task, eq = self.record.task, self.equations
-        return position_of(eq, task, found["true_contraction"], found["true_rotation"])
+        outputs = {name: found[f"true_{name}"] for name in TRUTH}
+        return position_of(self.equations, self.record.task, outputs)
 
     def reward(self, found: Mapping[str, Value]) -> Value:
         """Reward of a step; the action's change stands where the reward will."""
@@ -230,5 +251,6 @@ class Circuit:
             lambda part, k: found[f"{part}_{k}"],
             self.reference,
             [self.slot(f"action_{i}") for i in range(self.record.actions)],
+            self.prescribed,
         )
         return [where(e < -BOUND, -BOUND, where(e > BOUND, BOUND, e)) for e in entries]

@@ -115,7 +115,8 @@ class CudaKernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, self.single, record.task.structure, record.events),
+            *(options.regulator_action, options.safety, self.single),
+            *(record.task.structure, record.events),
             *(self.own_tables, self.draws, self.ranged),
         )
         return ["threads", *structure(self.program.model), *map(str, said)]

@@ -61,6 +61,8 @@ class ThreadMemory(Writer):
         made = [*self.layout_values, *sensed, *entries, *self.tare, *self.commanded.values()]
         read = {value.id for value in live_inputs(made)}
         always = {"sample", "ended", *self.sums, "count", "key_0", "key_1", "episode"}
+        # What only an info tells is computed with the rest.
+        always |= {"operator_moment"} & set(record.places)
         names = [n for n in record.places if circuit.slot(n).id in read or n in always]
         self.places = {name: i for i, name in enumerate(names)}
 

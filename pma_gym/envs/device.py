@@ -99,7 +99,7 @@ class DeviceEngine:
         self._own_tables = options.randomisation != "none"
         pressures = self._pressures()
         # What comes beside pressure and rest is drawn by the processor.
-        alone = not self._own_tables and not self.record.events and not task.load
+        alone = not self._own_tables and not self.record.events and task.actuator == "motor"
         self._draws = alone and self._hangs_slack(pressures)
         self.kernel = CudaKernel(
             self.nominal.program,

@@ -16,7 +16,8 @@ from pma_gym.envs.beginning import (
 )
 from pma_gym.envs.kernel import ARGUMENTS, BAD_ACTION, Kernel
 from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model
+from pma_gym.envs.operators import check_prescription, operators, wound_back
+from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START, Record
 from pma_gym.kernels.crew import Crew
 from pma_gym.plant.model import Model, load_model
@@ -72,11 +73,13 @@ class Engine:
     ) -> None:
         """Compile, and make room."""
         self.task, self.options, self.count = task, options, count
+        self._possible: set[str] = set()
         self.wanted = list(pressures) if pressures is not None else [options.pressure_kpa] * count
-        self.told = load_model(options.model)
+        self.told = told_model(task, load_model(options.model))
         # The very same model where nothing is added: its plant is known by that.
         self.nominal = Plant(rig_model(task, replace(options, model=self.told)))
         self.rest_motor = motor_at_rest(self.told, task)
+        self._check_prescription(self.wanted)
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self.width = 1 if count == 1 else WIDTH
@@ -194,6 +197,8 @@ class Engine:
             ValueError: a pressure that the regulator does not reach, or at which nothing balances
                 the task's load.
         """
+        if wanted is not None:
+            self._check_prescription(wanted)
         self._episodes[indices] += 1
         asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
         pressures = drawn_pressures(self.task, self._keys[indices], self._episodes[indices], asked)
@@ -207,6 +212,14 @@ class Engine:
         arguments[ARGUMENTS.index("last")] = len(indices)
         self.kernel.begin(arguments.ctypes.data)
         self._score_first_sample(indices)
+
+    def _check_prescription(self, wanted: Sequence[Pressure]) -> None:
+        """Refuse pressures at which an exercise's device cannot give what is prescribed."""
+        if self.task.exercise is None or self.task.exercise.prescription is None:
+            return
+        new = {repr(one): one for one in wanted if repr(one) not in self._possible}
+        check_prescription(self.task, self.told, new.values())
+        self._possible |= set(new)
 
     def _drawn_models(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
         """Draw the stations of episodes; their vectors, or None if all are nominal."""
@@ -247,11 +260,15 @@ class Engine:
         regulator: NDArray[np.float64],
         vectors: NDArray[np.float64] | None,
     ) -> Settled:
-        if self.task.load:
-            held = self.rest_motor, regulator, pressures, vectors
-            return settled_under_load(self.nominal, *held)
         models = [self.models[i] for i in indices.tolist()]
-        return settled_at_no_load(self.nominal, models, pressures, vectors)
+        if not self.rest_motor:
+            return settled_at_no_load(self.nominal, models, pressures, vectors)
+        held = self.rest_motor, regulator, pressures, vectors
+        states, zero = settled_under_load(self.nominal, *held)
+        if self.task.exercise:
+            radii = np.array([model.parameters["rotor"].radius for model in models])
+            wound_back(self.record.states, states, zero, radii)
+        return states, zero
 
     def _fill(
         self,
@@ -284,6 +301,11 @@ class Engine:
                 self._set(indices, f"wire_{k}_{i}", volts[i])
         if self.record.events:
             self._set_events(indices)
+        if self.task.exercise:
+            drawn_by = self._keys[indices], self._episodes[indices], self.pressures[indices]
+            told = operators(self.task, self.options, self.told, *drawn_by, regulator)
+            for name, values in told.items():
+                self._set(indices, name, values)
 
     def _set_events(self, indices: NDArray[np.int64]) -> None:
         """Draw what will disturb episodes: the control steps it comes with, and its sizes."""
@@ -321,6 +343,8 @@ class Engine:
             position = true["zero_contraction"] - true["true_contraction"]
         elif quantity == "contraction":
             position = true["true_contraction"] - true[START]
+        elif quantity == "excess":
+            position = self.records[block, self.record.places["excess_nm"], lane]
         self._set(indices, f"sum_{phase.name}", (position - float(phase.reference(0.0))) ** 2)
         self._set(indices, "sample", 1.0)
         if self.width == 1:

@@ -82,7 +82,7 @@ class Kernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, self.width, self.single),
+            *(options.regulator_action, options.safety, self.width, self.single),
             *(record.task.structure, record.events),
         )
         return ["environment", *structure(self.program.model), *map(str, said)]

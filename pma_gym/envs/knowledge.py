@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from pma_gym.envs.options import rest_load
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
 
@@ -29,14 +30,24 @@ class Station:
 
     @property
     def load(self) -> float:
-        """Load that the motor holds while the regulator moves (N); 0 where the motor moves."""
-        return self.task.load
+        """Load that the motor holds while the regulator moves (N); 0 where the motor moves.
+
+        In an exercise the load that it begins with: the motor is the operator.
+        """
+        return rest_load(self.model, self.task)
+
+    def moment(self, reading: "Reading") -> float:
+        """Moment at an exercise's joint, as the load cell says it by the nominal pulley (N m)."""
+        return self.model.parameters["rotor"].radius * reading.load
 
     def position(self, reading: "Reading") -> float:
-        """The position that the task asks for, as the sensors say it (m or rad)."""
+        """The position that the task asks for, as the sensors say it (m, rad or N m)."""
         quantity = self.task.protocol.quantity
         if quantity == "rotation":
             return reading.rotation
+        if quantity == "excess":
+            assert self.task.exercise and self.task.exercise.prescription
+            return self.moment(reading) - self.task.exercise.prescription.at(reading.rotation)
         return -reading.extension if quantity == "contraction" else reading.extension
 
 

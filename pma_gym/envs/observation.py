@@ -1,13 +1,13 @@
 """What the agent sees: one table of entries, which packs, describes and bounds the observation."""
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
 
 from pma_gym.envs.options import Options
-from pma_gym.tasks import TASKS, Task
+from pma_gym.tasks import TASKS, Plan, Task
 from pma_gym.units import SI_FACTORS
 
 BOUND = 5.0
@@ -18,6 +18,22 @@ ROTATION_SCALE = TASKS["rotation"].protocol.span
 LOAD_SCALE = 1000.0
 PRESSURE_SCALE = 600e3
 """What 1.0 stands for (m, rad, N, Pa)."""
+
+
+class Prescribed(NamedTuple):
+    """What the moment at a joint is compared with; numbers or traced values.
+
+    Attributes:
+        radius: of the pulley (m).
+        plan: moment over the angle that is prescribed.
+    """
+
+    radius: Any
+    plan: Plan
+
+    def excess(self, load: Any, angle: Any) -> Any:  # noqa: ANN401
+        """Moment that a load (N) makes, less the one that is prescribed at an angle (rad): N m."""
+        return self.radius * load - self.plan.at(angle)
 
 
 class ObservationTable:
@@ -69,6 +85,7 @@ class ObservationTable:
         reading: Callable[[str, int], Any],
         reference: Callable[[int], Any],
         action: Sequence[Any],
+        prescribed: Prescribed | None = None,
     ) -> list[Any]:
         """The entries before they are clipped, of numbers or traced values.
 
@@ -77,28 +94,37 @@ class ObservationTable:
                 taken.
             reference: reference (m or rad) so many control steps ahead.
             action: the last action, -1 to 1.
+            prescribed: of an exercise that prescribes a moment.
         """
         delay = self.delay
 
         def position(steps: int) -> Any:  # noqa: ANN401
-            return heard_position(self._quantity, lambda part: reading(part, steps))
+            return heard_position(self._quantity, lambda part: reading(part, steps), prescribed)
 
         now = reference(0) * (1.0 / self._span)
+        error = now - position(delay) * (1.0 / self._span)
+        if prescribed is not None:
+            # An excess is an error by itself; what it is of stands in the reference's place.
+            now = prescribed.plan.at(reading("rotation", delay)) * (1.0 / self._span)
         return [
             reading("extension", delay) * (1.0 / EXTENSION_SCALE),
             reading("rotation", delay) * (1.0 / ROTATION_SCALE),
             reading("load", delay) * (1.0 / LOAD_SCALE),
             reading("pressure", delay) * (1.0 / PRESSURE_SCALE),
             now,
-            now - position(delay) * (1.0 / self._span),
+            error,
             *(reference(k) * (1.0 / self._span) for k in range(1, self._preview + 1)),
             *action,
             *(position(delay + k) * (1.0 / self._span) for k in range(1, self._history + 1)),
         ]
 
 
-def heard_position(quantity: str, reading: Callable[[str], Any]) -> Any:  # noqa: ANN401
-    """The position that a task asks for (m or rad), from parts of a reading by their names."""
+def heard_position(
+    quantity: str, reading: Callable[[str], Any], prescribed: Prescribed | None = None
+) -> Any:  # noqa: ANN401
+    """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""
+    if prescribed is not None:
+        return prescribed.excess(reading("load"), reading("rotation"))
     return -reading("extension") if quantity == "contraction" else reading(quantity)
 
 
@@ -106,17 +132,21 @@ def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
     unit = task.protocol.unit
     span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
     volts = "10 V, -1.0 = 0 V"
+    now, less, heard = "reference now", "reference now less measured position", "position heard"
+    if task.protocol.quantity == "excess":
+        now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
+        heard = "excess of the moment heard"
     return [
         ("measured extension", "25 mm"),
         ("measured rotation", "90 deg"),
         ("measured load", "1000 N"),
         ("measured pressure", "600 kPa"),
-        ("reference now", span),
-        ("reference now less measured position", span),
+        (now, span),
+        (less, span),
         *((f"reference {_steps(k)} ahead", span) for k in range(1, options.preview + 1)),
         (f"last {task.actuator} action", volts),
         *([("last regulator action", volts)] if options.regulator_action else []),
-        *((f"position heard {_steps(k)} before", span) for k in range(1, options.history + 1)),
+        *((f"{heard} {_steps(k)} before", span) for k in range(1, options.history + 1)),
     ]
 
 

@@ -9,13 +9,17 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
+from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,
+    HUMAN_BOUNDS,
+    LOWEST_RATE_HZ,
     RANDOMISATIONS,
     REWARDS,
     Disturbances,
+    Human,
     Randomisation,
     Task,
     named_task,
@@ -25,6 +29,9 @@ LOWEST_PRESSURE_KPA = 150.0
 HIGHEST_PRESSURE_KPA = 575.0
 """Pressures at which the station was ever shown (kPa): table I3."""
 
+
+HUMANS = ("random", "typical")
+"""Operators by name."""
 
 Pressure = float | Sequence[float] | str
 """Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
@@ -50,6 +57,9 @@ class Options:
             the same effects (it does not survive JSON).
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
+        human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
+            `pma_gym.tasks.Human` (which does not survive JSON).
+        safety: whether an exercise has its safety layer between agent and regulator.
     """
 
     pressure_kpa: Pressure = "random"
@@ -64,6 +74,8 @@ class Options:
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
+    human: str | Human = "random"
+    safety: bool = True
 
     @property
     def disturbing(self) -> Disturbances:
@@ -105,13 +117,17 @@ def parse_options(given: Mapping[str, Any]) -> Options:
     _check_rate_and_delays(options)
     for name in ("preview", "history"):
         _check_whole(name, getattr(options, name))
-    for name in ("noise", "regulator_action"):
+    for name in ("noise", "regulator_action", "safety"):
         if not isinstance(getattr(options, name), bool):
             raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
     check_named("reward", options.reward, REWARDS)
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
+    if isinstance(options.human, Human):
+        check_human(options.human)
+    else:
+        check_named("human", options.human, HUMANS)
     check_pressure(options.pressure_kpa)
     return options
 
@@ -131,7 +147,30 @@ def parse_task(given: str | Task, options: Options) -> Task:
             f"regulator_action gives the motor's tasks a second action; the only action of task "
             f"{task.name} is the regulator's already: leave the option out"
         )
+    _check_exercise(task, options)
     return task
+
+
+def _check_exercise(task: Task, options: Options) -> None:
+    """Refuse what an exercise cannot have, and what nothing else has a use for."""
+    if task.exercise is None:
+        if options.human != "random":
+            raise ValueError(
+                f"human is the operator of an exercise, and task {task.name} has none; leave it "
+                "out, or take isokinetic_exercise, isotonic_exercise or profile_exercise"
+            )
+        return
+    if options.control_rate_hz < LOWEST_RATE_HZ:
+        raise ValueError(
+            f"control_rate_hz must be at least {LOWEST_RATE_HZ:g} Hz in task {task.name}, where "
+            "the motor plays the operator once a control step, got "
+            f"{options.control_rate_hz:g} Hz"
+        )
+    if options.preview and task.exercise.prescription:
+        raise ValueError(
+            f"preview shows a reference that goes by time; the moment of task {task.name} goes by "
+            f"the angle: leave the option out, got {options.preview!r}"
+        )
 
 
 def rig_model(task: Task, options: Options) -> Model:
@@ -148,16 +187,26 @@ def rig_model(task: Task, options: Options) -> Model:
             "which has no muscle; take station or serres2008"
         )
     operated = options.disturbing.operator_force != 0.0
-    if model.plant != "station" and (operated or task.load):
+    if model.plant != "station" and (operated or task.load or task.exercise):
         what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
         why = "somebody pulls at its slide" if operated else "the motor holds a load"
         raise ValueError(
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"
         )
+    model = told_model(task, model)
     if not operated or "operator" in model.parameters:
         return model
     return model.with_effects({"operator": {"share": 1.0}})
+
+
+def told_model(task: Task, model: Model) -> Model:
+    """The nominal model that controllers are told: with a leg on its lever in an exercise."""
+    if task.exercise is None or "leg" in model.parameters or model.plant != "station":
+        return model
+    leg = CATALOGUE["leg"]
+    usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}
+    return model.with_effects({"leg": {door: float(value or 0.0) for door, value in usual.items()}})
 
 
 def motor_at_rest(model: Model, task: Task) -> float:
@@ -166,17 +215,25 @@ def motor_at_rest(model: Model, task: Task) -> float:
     Raises:
         ValueError: the drive does not hold such a load.
     """
-    if not task.load:
+    load = rest_load(model, task)
+    if not load:
         return 0.0
     drive = model.parameters["drive"]
-    volts = (task.load - drive.offset) / drive.gain
+    volts = (load - drive.offset) / drive.gain
     if not 0.0 <= volts <= 10.0:
         raise ValueError(
             f"task {task.name}: the load must lie in {max(0.0, drive.offset):.4g} to "
             f"{10.0 * drive.gain + drive.offset:.4g} N, what the drive of model {model.name} holds "
-            f"with 0-10 V; got {task.load:g} N"
+            f"with 0-10 V; got {load:g} N"
         )
     return volts
+
+
+def rest_load(model: Model, task: Task) -> float:
+    """Load that the motor holds as an episode begins (N), by the nominal pulley."""
+    if task.exercise is None:
+        return task.load
+    return task.exercise.start_moment / model.parameters["rotor"].radius
 
 
 def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
@@ -201,6 +258,17 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
     names = list(known)
     if not isinstance(value, str) or value not in names:
         raise _unknown(what, value, names)
+
+
+def check_human(human: Human) -> None:
+    """Refuse an operator whom nobody could be.
+
+    Raises:
+        ValueError: names the number, its range and unit, and what came.
+    """
+    for name, value in human._asdict().items():
+        lower, upper, unit = HUMAN_BOUNDS[name]
+        _check_number(f"human.{name}", value, lower, upper, unit)
 
 
 def check_pressure(pressure: object) -> None:

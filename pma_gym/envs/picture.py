@@ -27,6 +27,10 @@ STRIDE = 4
 """Of the samples at 384 Hz one in four is drawn: more than there are pixels."""
 
 
+_AXIS = {"excess": "moment's excess"}
+"""Labels of quantities that do not speak for themselves."""
+
+
 class Picture:
     """Draws an environment again and again.
 
@@ -77,12 +81,14 @@ class Picture:
             "--",
             color=REFERENCE,
             lw=1.4,
-            label="reference",
+            label="prescribed" if protocol.quantity == "excess" else "reference",
         )
         (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
-        axes.set_ylim(-0.12 * protocol.span / self._factor, 1.2 * protocol.span / self._factor)
-        axes.set_ylabel(f"{protocol.quantity} ({protocol.unit})")
+        # An excess lies on either side of what is prescribed.
+        lowest = -1.2 if protocol.quantity == "excess" else -0.12
+        axes.set_ylim(lowest * protocol.span / self._factor, 1.2 * protocol.span / self._factor)
+        axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")
         axes.tick_params(labelbottom=False)
         axes.legend(
             loc="lower right",

@@ -22,9 +22,9 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
-from pma_gym.envs.summary import info_maker, summary
+from pma_gym.envs.summary import exercise_places, exercise_summaries, info_maker, summary
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.tasks import Events, Task, limit_in_words
+from pma_gym.tasks import Events, Human, Task, limit_in_words
 
 if TYPE_CHECKING:
     from pma_gym.envs.picture import Picture
@@ -49,10 +49,15 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `isotonic` | contraction: 12.5 mm in 2.5 s, held 2.5 s, back in 2.5 s | regulator |
     | `triangle_low` | contraction: 11.4 mm up and down in 4 s, three times | regulator |
     | `triangle_high` | contraction: 5.5 mm up and down in 10 s, three times | regulator |
+    | `isokinetic_exercise` | an operator's joint: 0-90 deg in 5 s, held, back | regulator |
+    | `isotonic_exercise` | the moment at his joint: 8 N m | regulator |
+    | `profile_exercise` | the moment at his joint, by its angle | regulator |
 
     The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
     begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
-    drive needs for it; contraction counts from there. Drawn references come by number too:
+    drive needs for it; contraction counts from there. In an exercise the motor plays an operator
+    (`pma_gym.tasks.human`) with a leg on the lever, and the regulator resists him; a moment other
+    than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
     `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
     `pma_gym.tasks.following` makes of a function, can be given instead of a name.
 
@@ -84,6 +89,10 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | next 1 or 2 | last action | 10 V, -1.0 = 0 V |
     | next `history` | position heard 1, 2... control steps before | range |
 
+    Where an exercise prescribes a moment, 4 is the moment prescribed at the measured angle, 5 that
+    less the measured one, and the position heard before is the moment's excess; the range is the
+    greatest moment prescribed, and there is no preview.
+
     `table.describe()` prints the table of the options in use.
 
     ## Reward
@@ -109,9 +118,13 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | cable tension | 1300 N |
     | pressure | 600 kPa |
 
+    An exercise also ends where moment (24 N m) or speed of the joint (60 deg/s) are not safe. Its
+    safety layer (`safety`, on by default; `pma_gym.tasks.guard`) holds the regulator's command
+    away from there.
+
     `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
     is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
-    references), 751 (isotonic), 1201 or 3001 (triangles).
+    references), 751 (isotonic), 1201 or 3001 (triangles), 1501 (exercises).
 
     ## Disturbances
     By name, `disturbances`; drawn at every reset, at random times, by the environment's seed:
@@ -138,7 +151,11 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `motor_voltage_v`, `regulator_voltage_v` | as heard by the station in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
     | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
-    | at the end: `rmse_mm` or `rmse_deg`, ... | see `episode_summary` | |
+    | of an exercise: `moment_nm`, `operator_nm` | moment at the joint, and the operator's | N m |
+    | `speed_deg_s`, `power_w` | of the joint; that the operator gives | deg/s, W |
+    | if it prescribes a moment: `rotation_deg`, `prescribed_nm` | angle, moment | deg, N m |
+    | and `excess_nm` for the position, `_nm` for `_mm` | moment less prescribed | N m |
+    | at the end: `rmse_mm`, `rmse_deg` or `rmse_nm`, ... | see `episode_summary` | |
 
     ## Reset options
     `reset(options={"pressure_kpa": 300})` sets the pressure of one episode, as the keyword does.
@@ -263,7 +280,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """What the step that ends an episode returns."""
         code, *_, reward = numbers = self._tail.tolist()
-        self.ended_by = limit_in_words(self._engine.models[0], code)
+        self.ended_by = limit_in_words(self._engine.models[0], code, self.task.exercise)
         self._idle = f"the episode ended at {self.time:g} s"
         info = self._info(*numbers) | self.episode_summary()
         return self._observed.copy(), reward, terminated, not terminated, info
@@ -333,7 +350,16 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         truth = self.truth
         if self.task.protocol.quantity == "contraction":
             return truth["contraction"] - self._number(START)
+        if self.task.protocol.quantity == "excess":
+            return self._number("excess_nm")
         return truth[self.task.protocol.quantity]
+
+    @property
+    def human(self) -> Human | None:
+        """The operator of this exercise; None without one. Not for controllers."""
+        if self.task.exercise is None:
+            return None
+        return Human(*(self._number(f"human_{name}") for name in Human._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
@@ -423,10 +449,17 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
             each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
             or the contraction's stroke; `ended_by`: the limit that ended the episode, in words, or
-            None.
+            None. An exercise has `exercise_summaries` too, and its RMSE in N m where it prescribes
+            a moment.
         """
         sums = {p.name: self._number(f"sum_{p.name}") for p in self.task.protocol.phases}
-        return summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}
+        found = summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}
+        if self.task.exercise is None:
+            return found
+        counts = {"count": np.array([self._count])}
+        numbers = {name: np.array([self._number(name)]) for name in exercise_places()[1:]}
+        other = exercise_summaries(counts | numbers, self.options.period)
+        return found | {name: float(values[0]) for name, values in other.items()}
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, shape (400, 800, 3).

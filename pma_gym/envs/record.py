@@ -6,7 +6,7 @@ from typing import Literal
 
 from pma_gym.envs.options import Options
 from pma_gym.kernels.graph import Kind
-from pma_gym.tasks import Task
+from pma_gym.tasks import PACE, Human, Mind, Task
 
 Part = Literal["extension", "rotation", "load", "pressure"]
 PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
@@ -20,6 +20,26 @@ OPERATOR = "memory_operator"
 
 TRUTH = ("contraction", "rotation", "load", "pressure")
 """True outputs, in the order of the plant's."""
+
+
+PEAKS = ("peak_moment", "peak_speed", "peak_power")
+"""Places of the greatest moment at a joint (N m), of its speed (rad/s) and of the operator's power
+(W), at the control steps' ends."""
+
+WORK = ("work", "returned")
+"""Places of the work that the operator did and that he took back (J)."""
+
+TOLD = (
+    *("told_radius", "told_drive_gain", "told_drive_offset"),
+    *("told_line_gain", "told_line_offset", "told_lag_share"),
+)
+"""Places of what the rig's computer knows of its station, drawn or not (SI): it plays the operator,
+and keeps the exercise safe. `told_lag_share` is how far the pressure goes in a control step."""
+
+GUARDED = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
+"""Places of what the safety layer remembers: the pressure that the nominal regulator has come to
+(Pa), the extension that it heard last (m), the speed that it found (rad/s), the moment of late
+(N m)."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +69,8 @@ class Record:
     @property
     def info(self) -> list[str]:
         """Keys of a step's info that are numbers, in order."""
-        unit, quantity = self.task.protocol.unit, self.task.protocol.quantity
-        return [
+        unit, quantity = self.task.protocol.suffix, self.task.protocol.quantity
+        common = [
             "time_s",
             f"{quantity}_{unit}",
             f"measured_{quantity}_{unit}",
@@ -62,12 +82,52 @@ class Record:
             "load_n",
             "extrapolated",
         ]
+        if self.task.exercise is None:
+            return common
+        other = ["rotation_deg", "prescribed_nm"] if self.task.exercise.prescription else []
+        return [*common, *other, "moment_nm", "operator_nm", "speed_deg_s", "power_w"]
 
     @property
     def held(self) -> list[str]:
         """What the march needs that stays during a control step."""
         own = [START] if self.task.actuator == "regulator" else []
-        return ["motor_voltage", "regulator_voltage", "zero_contraction", *own]
+        return ["motor_voltage", "regulator_voltage", "zero_contraction", *own, *self.prescribed]
+
+    @property
+    def prescribed(self) -> list[str]:
+        """Places of the operator's plan, where it is what the moment is compared with."""
+        exercise = self.task.exercise
+        return self.plan if exercise and exercise.prescription else []
+
+    @property
+    def plan(self) -> list[str]:
+        """Places of the operator's plan: first moment (N m), angles (rad), slopes (N m/rad)."""
+        if self.task.exercise is None:
+            return []
+        knots = self.task.exercise.knots
+        return [
+            "plan_first",
+            *(f"plan_angle_{i}" for i in range(knots)),
+            *(f"plan_slope_{i}" for i in range(knots - 1)),
+        ]
+
+    @property
+    def operator(self) -> list[str]:
+        """Places of an exercise's operator, of its safety and of its score."""
+        if self.task.exercise is None:
+            return []
+        return [
+            *(f"human_{name}" for name in Human._fields),
+            "human_share",
+            *self.plan,
+            *TOLD,
+            *(f"mind_{name}" for name in Mind._fields),
+            *(GUARDED if self.options.safety else ()),
+            "operator_moment",
+            *PEAKS,
+            *WORK,
+            *(f"pace_{phase.name}" for phase in PACE.phases),
+        ]
 
     @cached_property
     def events(self) -> list[str]:
@@ -91,6 +151,7 @@ class Record:
             *("size", "zero_contraction", "motor_voltage", "regulator_voltage"),
             *(("rest_motor", START) if self.task.actuator == "regulator" else ()),
             *self.events,
+            *self.operator,
             *("rest_regulator", "count", "sample", "tare_contraction", "tare_rotation"),
             *("key_0", "key_1", "episode"),
             *(f"sum_{phase.name}" for phase in self.task.protocol.phases),

@@ -10,13 +10,15 @@ from matplotlib.collections import LineCollection
 from matplotlib.patches import Circle, Polygon, Rectangle
 from numpy.typing import NDArray
 
-from pma_gym.tasks import Task
+from pma_gym.tasks import PACE, Task
 
 if TYPE_CHECKING:
     from pma_gym.envs.pma_env import PMAEnv
 
 INK, FAINT, STEEL = "#2b2f36", "#c9ced6", "#8d96a3"
 RUBBER, BRAID, BROKEN, REFERENCE = "#3b4654", "#a9b6c6", "#c62828", "#e07b00"
+LEG, LEG_LENGTH = "#b9775a", 2.2
+"""Colour of an operator's leg on the lever, and its length in radii of the pulley: not to scale."""
 
 LENGTH, RADIUS = 250.0, 12.0
 """The muscle at rest (mm): a MAS-20-250N, its wall included."""
@@ -117,6 +119,8 @@ class RigDrawing:
         (self._dot,) = self.axes.plot([], [], "o", color=INK, ms=5)
         (self._mark,) = self.axes.plot([], [], color=REFERENCE, lw=2.2, solid_capstyle="round")
         self.moving += [self._cable, wheel, self._spokes, hub, self._dot, self._mark]
+        (self._leg,) = self.axes.plot([], [], color=LEG, lw=7.0, alpha=0.55, solid_capstyle="round")
+        self.moving += [self._leg] if self._task.exercise else []
 
     def _make_gauges(self) -> None:
         self._gauges = [
@@ -147,14 +151,18 @@ class RigDrawing:
         self._spokes.set_data(x, y)
         x, y = _on_pulley(np.exp(1j * (angles[:1] + math.pi / 2)), 0.72)
         self._dot.set_data(x, y)
+        # It hangs at 0 deg and is straight at 90 deg.
+        x, y = _on_pulley(np.array([0.0, LEG_LENGTH]) * np.exp(-1j * (rotation + math.pi / 2)), 1.0)
+        self._leg.set_data(x, y)
 
     def _move_mark(self, env: "PMAEnv", end: float) -> None:
-        if self._task.protocol.quantity != "rotation":
+        if self._task.protocol.quantity not in ("rotation", "excess"):
             outwards = -1.0 if self._task.protocol.quantity == "contraction" else 1.0
             x = end - 1e3 * outwards * env.error + 0.5 * SLIDE_WIDTH
             self._mark.set_data([x, x], [-64.0, -45.0])
         else:
-            reference = env.truth["rotation"] - env.error
+            excess = self._task.protocol.quantity == "excess"
+            reference = PACE.at(env.time) if excess else env.truth["rotation"] - env.error
             radii = np.array([1.08, 1.38]) * np.exp(1j * (math.pi / 2 - reference))
             self._mark.set_data(*_on_pulley(radii, 1.0))
 

@@ -1,7 +1,9 @@
 """Scores an episode while it runs: the position at 384 Hz, between the plant's internal steps."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pma_gym.envs.observation import Prescribed
 from pma_gym.envs.record import START
 from pma_gym.kernels.derivative import derivatives
 from pma_gym.kernels.graph import CHANGING, HELD, Value
@@ -9,7 +11,7 @@ from pma_gym.kernels.substitute import substitute
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.attempt import Attempt
 from pma_gym.plant.compose import Equations
-from pma_gym.tasks import Task
+from pma_gym.tasks import Plan, Task
 
 SAMPLE_PERIOD = 1.0 / SAMPLE_RATE_HZ
 """Time between two samples (s), whatever the control rate."""
@@ -41,7 +43,7 @@ class Course:
 
 def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
     """How the task's position moves during an attempt."""
-    position = position_of(eq, task, eq.outputs["contraction"], eq.outputs["rotation"])
+    position = position_of(eq, task, eq.outputs)
     speed = _rate(eq, position)
     bend = _rate(eq, speed)
     begin = {**attempt.frozen, **attempt.here}
@@ -50,13 +52,34 @@ def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
     return Course(*start, *end)
 
 
-def position_of(eq: Equations, task: Task, contraction: Value, rotation: Value) -> Value:
-    """The position that a task asks for (m or rad), from the plant's outputs."""
+def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Value:
+    """The position that a task asks for (m or rad), from the plant's outputs.
+
+    Of an exercise that prescribes a moment it is the moment's excess (N m).
+    """
     if task.protocol.quantity == "extension":
-        return eq["zero_contraction"] - contraction
+        return eq["zero_contraction"] - outputs["contraction"]
     if task.protocol.quantity == "contraction":
-        return contraction - eq.graph.input(START, HELD)
-    return rotation
+        return outputs["contraction"] - eq.graph.input(START, HELD)
+    if task.protocol.quantity == "excess":
+        radius = eq.parameters["rotor"].radius
+        return Prescribed(radius, held_plan(eq, task)).excess(outputs["load"], outputs["rotation"])
+    return outputs["rotation"]
+
+
+def held_plan(eq: Equations, task: Task) -> Plan:
+    """The moment that an exercise prescribes over the angle, as inputs that a step holds."""
+    assert task.exercise is not None
+
+    def held(name: str) -> Value:
+        return eq.graph.input(name, HELD)
+
+    knots = task.exercise.knots
+    return Plan(
+        held("plan_first"),
+        [held(f"plan_angle_{i}") for i in range(knots)],
+        [held(f"plan_slope_{i}") for i in range(knots - 1)],
+    )
 
 
 def _rate(eq: Equations, value: Value) -> Value:

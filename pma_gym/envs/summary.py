@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.envs.record import PEAKS, WORK
 from pma_gym.metrics import percent_of_range
-from pma_gym.tasks import Task
+from pma_gym.tasks import PACE, Task
 from pma_gym.units import SI_FACTORS
 
 
@@ -20,7 +21,8 @@ def info_maker(keys: Sequence[str]) -> Callable[..., dict[str, Any]]:
     Returns:
         A function of what stands there: the limit broken, the info's numbers, the reward.
     """
-    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9 = keys
+    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9 = keys[:10]
+    more = keys[10:]
 
     # Written out: this runs in every step, and a loop would take three times as long.
     def made(
@@ -50,7 +52,11 @@ def info_maker(keys: Sequence[str]) -> Callable[..., dict[str, Any]]:
             k9: v9 != 0.0,
         }
 
-    return made
+    def exercised(*numbers: float) -> dict[str, Any]:
+        common = made(*numbers[:11], numbers[-1])  # type: ignore[call-arg]
+        return common | dict(zip(more, numbers[11:-1], strict=True))
+
+    return exercised if more else made
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:
@@ -65,7 +71,7 @@ def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, 
         percent_of_range.
     """
     protocol = task.protocol
-    unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
+    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
     counts = {
         phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in protocol.phases
     }
@@ -91,7 +97,7 @@ def summaries(
         samples: samples so far, shape (m,).
     """
     protocol = task.protocol
-    unit, factor = protocol.unit, SI_FACTORS[protocol.unit]
+    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
     total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
     for phase in protocol.phases:
         count = np.clip(samples - phase.first, 0.0, phase.samples)
@@ -105,4 +111,36 @@ def summaries(
         f"rmse_{unit}": whole / factor,
         f"rmse_by_phase_{unit}": by_phase,
         "percent_of_range": 100.0 * whole / protocol.span,
+    }
+
+
+def exercise_places() -> list[str]:
+    """Places of what `exercise_summaries` needs."""
+    return ["count", *PEAKS, *WORK, *(f"pace_{phase.name}" for phase in PACE.phases)]
+
+
+def exercise_summaries(
+    numbers: Mapping[str, NDArray[np.float64]], period: float
+) -> dict[str, NDArray[np.float64]]:
+    """What exercises came to beside their RMSE, at the door.
+
+    Args:
+        numbers: of `exercise_places` by name, shape (m,) each.
+        period: of the control steps (s).
+    Returns:
+        By name, shape (m,): `pace_rmse_deg` of the angle against its ideal line, over all phases;
+        `peak_moment_nm`, `peak_speed_deg_s`, `peak_power_w` at the control steps' ends; `work_j`
+        that the operator did and `returned_j` that he took back.
+    """
+    degree = SI_FACTORS["deg"]
+    last = round(PACE.duration / period)
+    steps = np.minimum(numbers["count"], last)
+    squares = sum(numbers[f"pace_{phase.name}"] for phase in PACE.phases)
+    return {
+        "pace_rmse_deg": np.sqrt(squares / np.maximum(steps, 1)) / degree,
+        "peak_moment_nm": numbers["peak_moment"],
+        "peak_speed_deg_s": numbers["peak_speed"] / degree,
+        "peak_power_w": numbers["peak_power"],
+        "work_j": numbers["work"],
+        "returned_j": numbers["returned"],
     }

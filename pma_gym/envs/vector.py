@@ -23,7 +23,7 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import PARTS
-from pma_gym.envs.summary import summaries
+from pma_gym.envs.summary import exercise_places, exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
@@ -264,8 +264,13 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         sums = {name: engine.numbers(f"sum_{name}")[indices] for name in phases}
         found = {name: values[indices] for name, values in self.station_info().items()}
         found |= summaries(self.task, sums, engine.numbers("sample")[indices])
+        if self.task.exercise:
+            numbers = {name: engine.numbers(name)[indices] for name in exercise_places()[1:]}
+            numbers["count"] = engine.counts()[indices].astype(np.float64)
+            found |= exercise_summaries(numbers, self.options.period)
         codes = engine.numbers("ended")[indices].tolist()
-        limits = [limit_in_words(engine.models[i], c) for i, c in zip(indices, codes, strict=True)]
+        exercise, pairs = self.task.exercise, zip(indices, codes, strict=True)
+        limits = [limit_in_words(engine.models[i], code, exercise) for i, code in pairs]
         found["ended_by"] = np.array(limits, object)
         return spread(found, over)
 

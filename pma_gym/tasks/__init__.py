@@ -1,9 +1,18 @@
 """Tasks: what to follow, what it is worth, when it ends, what is drawn and what disturbs."""
 
 from pma_gym.tasks.disturbances import DISTURBANCES, PULSE_S, Disturbances, Events
+from pma_gym.tasks.exercise import LOWEST_RATE_HZ, PACE, PLAN_ANGLES, Exercise
+from pma_gym.tasks.exercises import (
+    EXERCISES,
+    isokinetic_exercise,
+    isotonic_exercise,
+    moment_exercise,
+    numbered_exercise,
+)
 from pma_gym.tasks.follow import obstacle
+from pma_gym.tasks.human import HUMAN_BOUNDS, PACED, PACING, Human, Mind, Plan, Population, plan_of
 from pma_gym.tasks.isotonic import ISOTONIC, isotonic, pressure_triangle
-from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words
+from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words, unsafe
 from pma_gym.tasks.randomisation import (
     CORNERS,
     FORCE_TOLERANCE,
@@ -27,24 +36,31 @@ from pma_gym.tasks.rewards import (
 from pma_gym.tasks.task import TASKS, TRIAL_TAIL_S, Actuator, Task, phase_errors, phase_rmse
 from pma_gym.tasks.unseen import UNSEEN, following, multisine, sine, speeds, steps, unseen
 
-EVERY_TASK: dict[str, Task] = {**TASKS, **UNSEEN, **ISOTONIC}
-"""All tasks by name: the dissertation's two, those with unseen references, and those in which the
-regulator contracts the muscle against a load."""
+EVERY_TASK: dict[str, Task] = {**TASKS, **UNSEEN, **ISOTONIC, **EXERCISES}
+"""All tasks by name: the dissertation's two, those with unseen references, those in which the
+regulator contracts the muscle against a load, and those in which it resists an operator."""
 
 
 def named_task(name: str) -> Task | None:
-    """The task of a name, also `displacement_multisine_17` and so on; None if there is none."""
-    return EVERY_TASK.get(name) or unseen(name)
+    """The task of a name, also `displacement_multisine_17` and `isotonic_exercise_6.5`, or None."""
+    return EVERY_TASK.get(name) or unseen(name) or numbered_exercise(name)
 
 
 __all__ = [
     "CORNERS",
     "DISTURBANCES",
     "EVERY_TASK",
+    "EXERCISES",
     "FORCE_TOLERANCE",
     "GAUSSIAN_END",
+    "HUMAN_BOUNDS",
     "ISOTONIC",
     "LIMITS",
+    "LOWEST_RATE_HZ",
+    "PACE",
+    "PACED",
+    "PACING",
+    "PLAN_ANGLES",
     "PULSE_S",
     "RANDOMISATIONS",
     "REWARDS",
@@ -55,6 +71,11 @@ __all__ = [
     "Actuator",
     "Disturbances",
     "Events",
+    "Exercise",
+    "Human",
+    "Mind",
+    "Plan",
+    "Population",
     "Randomisation",
     "Reward",
     "Task",
@@ -63,15 +84,20 @@ __all__ = [
     "broken_limit",
     "following",
     "gaussian_reward",
+    "isokinetic_exercise",
     "isotonic",
+    "isotonic_exercise",
     "limit_in_words",
     "missed_reward",
+    "moment_exercise",
     "multisine",
     "named_task",
     "nominal_station",
+    "numbered_exercise",
     "obstacle",
     "phase_errors",
     "phase_rmse",
+    "plan_of",
     "pressure_triangle",
     "quadratic_reward",
     "sine",
@@ -79,5 +105,6 @@ __all__ = [
     "speeds",
     "station_within_intervals",
     "steps",
+    "unsafe",
     "varied_station",
 ]

@@ -25,7 +25,9 @@ def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
     A jump of the reference; a voltage of less than 0 or more than 10 V; or, where the motor moves,
     a cable that would have to push, on the way back. The muscle's force and damping count; inertia,
     lags, delays, memories (hysteresis, dry friction) and the cable's slack do not. So None is no
-    promise: what is left even to a controller that knows all is the achievable bound.
+    promise: what is left even to a controller that knows all is the achievable bound. Nothing is
+    looked for in an exercise, where the operator moves; environments refuse a prescription that
+    the device cannot give.
 
     Args:
         task: the task.
@@ -48,7 +50,7 @@ def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
             f"{nominal.plant}"
         )
     found = _jump(task)
-    if found is not None:
+    if found is not None or task.exercise:
         return found
     balance = _Balance(task, Plant(nominal), pressure)
     return balance.of_motor() if task.actuator == "motor" else balance.of_regulator()

@@ -5,6 +5,8 @@ from typing import Any
 
 from pma_gym.kernels.generic import where
 from pma_gym.plant.model import Model
+from pma_gym.tasks.exercise import Exercise
+from pma_gym.units import SI_FACTORS
 
 LIMITS: tuple[tuple[str, str, float], ...] = (
     ("contraction", "contraction", 1.0),
@@ -29,6 +31,20 @@ def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
     return found
 
 
+def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
+    """What of an exercise is not safe, counted on from `LIMITS`; 0.0 for none.
+
+    Args:
+        exercise: with its safe moment and speed.
+        moment: at the joint (N m), a number or a traced value.
+        speed: of the joint (rad/s).
+    """
+    code = float(len(LIMITS))
+    # A joint that turns at no speed that is a number is not safe.
+    found = where(abs(speed) <= exercise.safe_speed, 0.0, code + 2.0)
+    return where(moment <= exercise.safe_moment, found, code + 1.0)
+
+
 def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
     """Which physical limit of the rig a state breaks, in words; None if none.
 
@@ -39,8 +55,8 @@ def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
     return limit_in_words(model, broken(model.parameters["limits"], truth))
 
 
-def limit_in_words(model: Model, code: float) -> str | None:
-    """The limit of `LIMITS` that `broken` found, in words; None for 0."""
+def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str | None:
+    """The limit that `broken` or `unsafe` found, in words; None for 0."""
     limits = model.parameters["limits"]
     words = (
         "",
@@ -49,4 +65,10 @@ def limit_in_words(model: Model, code: float) -> str | None:
         f"cable tension above {limits.tension:g} N",
         f"pressure above {limits.pressure / 1e3:g} kPa",
     )
+    if exercise:
+        speed = exercise.safe_speed / SI_FACTORS["deg"]
+        words += (
+            f"moment at the joint above the safe {exercise.safe_moment:g} N m",
+            f"joint faster than the safe {speed:g} deg/s",
+        )
     return words[int(code)] or None

@@ -2,13 +2,16 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.protocol import DISPLACEMENT, ROTATION, Protocol
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ, rmse
+
+if TYPE_CHECKING:
+    from pma_gym.tasks.exercise import Exercise
 
 TRIAL_TAIL_S = (PHASE_SAMPLES - 1) / SAMPLE_RATE_HZ - PHASE_DURATION
 """How far past its 5 s the last phase is recorded (s): its last sample is at 1922 / 384 s."""
@@ -30,6 +33,7 @@ class Task:
             and the quantity is `contraction`; the motor's pulls it at one pressure.
         load: load that the motor holds where the regulator moves (N); 0 where the motor moves.
         start_pressures: range of the pressures that episodes begin at (Pa); the trials' if None.
+        exercise: of an operator, whom the motor plays while the regulator resists; else None.
     """
 
     name: str
@@ -39,9 +43,20 @@ class Task:
     actuator: Actuator = "motor"
     load: float = 0.0
     start_pressures: tuple[float, float] | None = None
+    exercise: "Exercise | None" = None
 
     def __post_init__(self) -> None:
         """Refuse what no environment can do."""
+        if self.exercise is None:
+            self._check_mover()
+        elif self.actuator != "regulator" or self.load:
+            raise ValueError(
+                f"task {self.name}: in an exercise the motor plays the operator and the regulator "
+                f"moves; got {self.actuator} and a load of {self.load!r} N; leave both as they are"
+            )
+        self._check_reference()
+
+    def _check_mover(self) -> None:
         if (self.actuator == "regulator") != (self.protocol.quantity == "contraction"):
             raise ValueError(
                 f"task {self.name}: the regulator contracts (quantity contraction) and the motor "
@@ -53,7 +68,6 @@ class Task:
                 f"task {self.name}: load must be the positive load (N) that the motor holds while "
                 f"the regulator moves, and 0 where the motor moves, got {self.load!r} N"
             )
-        self._check_reference()
 
     def _check_reference(self) -> None:
         every = np.concatenate([phase.reference(phase.times) for phase in self.protocol.phases])
@@ -85,7 +99,8 @@ class Task:
         words = self.name.replace("_", " ")
         if self.name in TASKS:
             return f"Isokinetic {words}"
-        return words.capitalize() + (" contraction" if self.actuator == "regulator" else "")
+        contracts = self.protocol.quantity == "contraction"
+        return words.capitalize() + (" contraction" if contracts else "")
 
     @property
     def structure(self) -> tuple[str, ...]:
@@ -100,6 +115,8 @@ class Task:
         ]
         numbers = protocol.span, self.lowest_pressure, self.highest_pressure
         said = (self.actuator, protocol.quantity, protocol.unit, *numbers, *phases)
+        if self.exercise:
+            said += self.exercise.structure
         return tuple(map(repr, said))
 
     def steps(self, control_rate: float) -> int:

@@ -21,13 +21,14 @@ OPTIONS = [
 ]
 MADE = {"model": "serres2008", "pressure_kpa": 300}
 ISOTONIC = "pma_gym/IsotonicContraction-v0"
+EXERCISE = "pma_gym/ResistiveExercise-v0"
 
 
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 @pytest.mark.parametrize("options", OPTIONS, ids=lambda options: ",".join(options) or "defaults")
 def test_check_env_finds_nothing_to_say(name, options):
-    if name == ISOTONIC:
-        # Its action is the regulator's already, and its load needs a station.
+    if name in (ISOTONIC, EXERCISE):
+        # Their action is the regulator's already, and their load needs a station.
         options = {k: v for k, v in options.items() if k not in ("regulator_action", "model")}
     # pytest turns each warning into an error.
     check_env(gym.make(name, **(MADE | options)).unwrapped)
@@ -35,7 +36,12 @@ def test_check_env_finds_nothing_to_say(name, options):
 
 @pytest.mark.parametrize(
     ("name", "task"),
-    [(ISOTONIC, "triangle_low"), ("pma_gym/IsokineticRotation-v0", "rotation_multisine_3")],
+    [
+        (ISOTONIC, "triangle_low"),
+        ("pma_gym/IsokineticRotation-v0", "rotation_multisine_3"),
+        (EXERCISE, "isotonic_exercise_6.5"),
+        (EXERCISE, "profile_exercise"),
+    ],
 )
 def test_check_env_finds_nothing_to_say_of_other_tasks_and_disturbances(name, task):
     env = gym.make(name, task=task, disturbances="regulator_and_operator").unwrapped
@@ -69,7 +75,9 @@ def test_spec_survives_json():
     np.testing.assert_array_equal(first, second)
 
 
-@pytest.mark.parametrize("task", ["displacement_sine", "displacement_speeds_12", "isotonic"])
+@pytest.mark.parametrize(
+    "task", ["displacement_sine", "displacement_speeds_12", "isotonic", "isokinetic_exercise"]
+)
 def test_names_of_tasks_survive_json(task):
     env = gym.make("pma_gym/IsokineticDisplacement-v0", task=task, pressure_kpa=300.0)
     assert env.spec is not None

@@ -19,7 +19,9 @@ NAME = "pma_gym/IsokineticDisplacement-v0"
 @pytest.mark.parametrize("mode", [None, "vector_entry_point"])
 @pytest.mark.parametrize("name", ENVIRONMENTS)
 def test_ids_make_batches(name, mode):
-    envs = gym.make_vec(name, 5, vectorization_mode=mode, threads=2, **MADE)
+    # An exercise's operator must be played often enough.
+    made = MADE | {"control_rate_hz": 50.0} if "Exercise" in name else MADE
+    envs = gym.make_vec(name, 5, vectorization_mode=mode, threads=2, **made)
     assert type(envs) is PMAVectorEnv
     assert envs.num_envs == 5 and envs.task.name == ENVIRONMENTS[name]
     assert envs.spec is not None and envs.spec.id == name

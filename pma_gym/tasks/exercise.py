@@ -1,0 +1,77 @@
+"""An exercise: an operator turns the joint, the regulator sets what he works against.
+
+The motor plays the operator (`pma_gym.tasks.human`): out to 90 deg in 5 s, 5 s there, back in 5 s,
+as in the dissertation's rotation. What the device is to do is prescribed:
+
+    isokinetic    hold the joint's speed at 18 deg/s whatever the operator's effort
+    isotonic      hold the moment at the joint
+    profile       hold the moment that is prescribed at the joint's angle
+
+Neither moment nor speed may exceed what is safe: an episode ends there, and a safety layer between
+agent and regulator keeps away from it (`pma_gym.tasks.guard`).
+
+Source:
+    Serres 2008, sections 3.3, 4.3 and 6.3. Moments of the prescriptions, safe moment and safe speed
+    are our choice.
+"""
+
+from dataclasses import dataclass
+
+from pma_gym.data.protocol import ROTATION
+from pma_gym.tasks.guard import Guard
+from pma_gym.tasks.human import Plan, Population
+from pma_gym.units import SI_FACTORS
+
+_DEG = SI_FACTORS["deg"]
+
+PACE = ROTATION
+"""Angle that the operator means to have: the dissertation's rotation."""
+
+SAFE_MOMENT = 24.0
+"""Moment at the joint that ends an episode (N m): 95 % of the 25.3 N m that the station's motor
+holds with 10 V, so that whoever it plays can bear it."""
+
+SAFE_SPEED = 60.0 * _DEG
+"""Speed of the joint that ends an episode (rad/s): the slow speed of isokinetic tests, more than
+three times the exercise's; an assumption, no standard was found that names one."""
+
+PLAN_ANGLES = tuple(15.0 * _DEG * i for i in range(7))
+"""Angles (rad) between which the operator's plan of an isokinetic exercise is linear."""
+
+LOWEST_RATE_HZ = 50.0
+"""Control steps a second that the motor needs to play somebody whose joint is stiff (Hz)."""
+
+
+@dataclass(frozen=True)
+class Exercise:
+    """What is prescribed, to whom, and what is safe.
+
+    Attributes:
+        prescription: moment over the angle; None where the speed is prescribed.
+        population: whom the operators are drawn from.
+        guard: numbers of the safety layer.
+        safe_moment: largest moment at the joint (N m).
+        safe_speed: largest speed of the joint (rad/s).
+    """
+
+    prescription: Plan | None
+    population: Population
+    guard: Guard
+    safe_moment: float = SAFE_MOMENT
+    safe_speed: float = SAFE_SPEED
+
+    @property
+    def start_moment(self) -> float:
+        """Moment that an episode begins with (N m)."""
+        return self.prescription.first if self.prescription else 0.0
+
+    @property
+    def knots(self) -> int:
+        """Knots of the operator's plan."""
+        return len(self.prescription.angles if self.prescription else PLAN_ANGLES)
+
+    @property
+    def structure(self) -> tuple[object, ...]:
+        """What compiled environments depend on: no moment, and nobody's numbers."""
+        prescribed = "speed" if self.prescription is None else "moment"
+        return ("exercise", prescribed, self.knots, self.guard, self.safe_moment, self.safe_speed)
