@@ -4,14 +4,18 @@ from collections.abc import Callable
 
 from controllers.adrc import ADRC
 from controllers.controller import Controller, Reference
+from controllers.exercise_mpc import ExerciseMPC
 from controllers.feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
 from controllers.ilc import ILC
 from controllers.lqg import LQG
+from controllers.moment_pid import MomentPID
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
+from controllers.scheduled_pressure import ConstantPressure, ScheduledPressure
 from controllers.sliding_mode import SlidingMode
+from controllers.speed_pid import SpeedPID
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "serres_replay": SerresReplay,
@@ -26,6 +30,11 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "ilc": ILC,
     "ppo": PPOPolicy,
     "oracle": Oracle,
+    "constant_pressure": ConstantPressure,
+    "scheduled_pressure": ScheduledPressure,
+    "speed_pid": SpeedPID,
+    "moment_pid": MomentPID,
+    "exercise_mpc": ExerciseMPC,
 }
 """Controllers by name: what makes a new one. A controller listed here is scored."""
 
@@ -35,16 +44,20 @@ __all__ = [
     "ILC",
     "LQG",
     "PID",
+    "ConstantPressure",
     "Controller",
     "FeedforwardPID",
     "ImprovedFeedforward",
+    "MomentPID",
     "Oracle",
     "PPOPolicy",
     "Policy",
     "PreviewMPC",
     "Reference",
+    "ScheduledPressure",
     "SerresFeedforward",
     "SerresReplay",
     "ShippedPolicy",
     "SlidingMode",
+    "SpeedPID",
 ]

@@ -17,7 +17,8 @@ class Controller(Protocol):
     """Anything with a name, `reset` and `act`.
 
     A controller may keep what it needs between calls; `reset` makes it new. It never sees the
-    plant, only what the station's sensors say.
+    plant, only what the station's sensors say. One that can do some kinds of task only
+    (`controllers.designs.kind_of`) may have them as an attribute `kinds`.
     """
 
     name: str
@@ -31,7 +32,7 @@ class Controller(Protocol):
         """
 
     def act(self, observation: Reading, time: float) -> float:
-        """Motor voltage (V, 0-10) to hold for the next control period.
+        """Voltage of the task's actuator (V, 0-10) to hold for the next control period.
 
         Args:
             observation: what the sensors say (SI).

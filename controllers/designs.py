@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from pma_gym.envs import Station
+from pma_gym.tasks import Task
 
 DESIGNS_FILE = Path(__file__).with_name("designs.json")
 """The settings of the controllers here, with where they come from."""
@@ -16,7 +17,10 @@ DESIGNS_FILE = Path(__file__).with_name("designs.json")
 SCHEMA = 1
 
 KINDS = {"extension": "displacement", "rotation": "rotation", "contraction": "contraction"}
-"""Kind of a task by the quantity that it asks for."""
+"""Kind of a task by the quantity that it asks for; an exercise's is its own."""
+
+EXERCISE_KINDS = ("isokinetic", "moment")
+"""Kinds of exercises: of a speed that is prescribed, and of a moment."""
 
 Settings = TypeVar("Settings", bound=NamedTuple)
 
@@ -58,8 +62,15 @@ def designed(
 
 
 def task_kind(station: Station) -> str:
-    """`displacement`, `rotation` or `contraction`: what the task asks for, whatever its name."""
-    return KINDS[station.task.protocol.quantity]
+    """What a station's task asks for, whatever its name: see `kind_of`."""
+    return kind_of(station.task)
+
+
+def kind_of(task: Task) -> str:
+    """`displacement`, `rotation` or `contraction`; of an exercise `isokinetic` or `moment`."""
+    if task.exercise is not None:
+        return EXERCISE_KINDS[0 if task.exercise.prescription is None else 1]
+    return KINDS[task.protocol.quantity]
 
 
 def loop_name(station: Station) -> str:

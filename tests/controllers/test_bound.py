@@ -12,7 +12,11 @@ from benchmarks.bound import achievable_bound
 from controllers import CONTROLLERS
 from pma_gym.plant.model import load_model
 
-RIVALS = [make for make in CONTROLLERS.values() if not hasattr(make, "see")]
+RIVALS = [
+    make
+    for make in CONTROLLERS.values()
+    if not hasattr(make, "see") and "rotation" in getattr(make, "kinds", ["rotation"])
+]
 
 bound_of = lru_cache(achievable_bound)
 
