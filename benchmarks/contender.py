@@ -61,7 +61,9 @@ class Contender:
                 for path in files
                 if path.stem.endswith(f"-{self.algorithm}")
             )
-        return frozenset((_loaded(self.path).file.task,)) if self.is_policy else frozenset()
+        if self.is_policy:
+            return frozenset((_loaded(self.path).file.task,))
+        return frozenset(getattr(CONTROLLERS.get(self.name), "kinds", ()) if not self.path else ())
 
     @property
     def label(self) -> str:

@@ -10,11 +10,23 @@ from benchmarks.comparison.suite import Entry, Episode, FrozenSuite, frozen_suit
 from benchmarks.contender import Contender
 from benchmarks.rollout import Rollout, rollout
 from pma_gym.envs import PMAEnv
+from pma_gym.envs.options import told_model
 from pma_gym.plant.model import Model
 
 Row = dict[str, Any]
 """What the journal says of a case: who, what, why it failed, its figures."""
 
+
+EXERCISE_FIGURES = {
+    "pace_rmse_deg": "Angle, RMSE (deg)",
+    "peak_moment_nm": "Peak moment (N m)",
+    "peak_speed_deg_s": "Peak speed (deg/s)",
+    "peak_power_w": "Peak power (W)",
+    "work_j": "Work (J)",
+    "returned_j": "Returned (J)",
+}
+"""What a row of an exercise has beside its errors, `exercise_summaries` of the environments, and
+what tables call it."""
 
 BY_LIMIT = "by a physical limit"
 """What a row's failure says where the rig's limits ended the episode."""
@@ -74,7 +86,8 @@ def run_case(case: Case, model: Model | None = None) -> Row:
     )
     period = environment.options.period
     controller = Guarded(contender, period) if contender.path else contender.make()
-    done = rollout(environment, controller, suite.seed_of(case.episode), suite.nominal)
+    told = told_model(environment.task, suite.nominal)
+    done = rollout(environment, controller, suite.seed_of(case.episode), told)
     if done.ended_by:
         end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
         return blank_row(case) | {"failure": end}
@@ -85,7 +98,11 @@ def _figures(done: Rollout, environment: PMAEnv) -> Row:
     actuator = 1 if done.task.actuator == "regulator" else 0
     measured = Measured(done.position, done.commands[:, actuator], done.truth, done.act_seconds)
     limits = environment.plant.model.parameters["limits"]
-    return figures(done.task, measured, done.period, limits).to_json()
+    found = figures(done.task, measured, done.period, limits).to_json()
+    if done.task.exercise is None:
+        return found
+    summary = environment.episode_summary()
+    return found | {"exercise": {name: summary[name] for name in EXERCISE_FIGURES}}
 
 
 def blank_row(case: Case) -> Row:

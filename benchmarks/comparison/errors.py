@@ -17,7 +17,7 @@ from benchmarks.comparison.statistics import Draws, resample
 from benchmarks.comparison.suite import NOMINAL, Entry, Episode, FrozenSuite
 from benchmarks.contender import Contender
 from controllers import CONTROLLERS
-from controllers.designs import KINDS
+from controllers.designs import kind_of
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.tasks import EVERY_TASK, Task, named_task
 from pma_gym.units import SI_FACTORS
@@ -40,15 +40,19 @@ class Measure(NamedTuple):
         tasks: tasks that have it.
         unit: mm, deg, or % of the range where tasks of several units are pooled.
         returning: whether it is of phase III, else of all other phases together.
+        alone: name of the only phase that counts; empty for what `returning` says.
     """
 
     name: str
     tasks: tuple[str, ...]
     unit: str
     returning: bool = False
+    alone: str = ""
 
     def phases(self, task: str) -> list[str]:
         """Names of a task's phases that count."""
+        if self.alone:
+            return [self.alone]
         names = [phase.name for phase in task_of(task).protocol.phases]
         back = RETURN if _returns(task) else ""
         return [name for name in names if (name == back) == self.returning]
@@ -94,11 +98,12 @@ def measures(tasks: Iterable[str]) -> list[Measure]:
     """What controllers are compared by in these tasks.
 
     Kind of task by kind of task; phase III apart; references that the dissertation did not have,
-    of a kind that it had, apart as well.
+    of a kind that it had, apart as well. Of an exercise whose speed is prescribed every phase by
+    itself too, as table 30 has them.
     """
     groups: dict[tuple[str, bool], list[str]] = {}
     for task in tasks:
-        kind = KINDS[task_of(task).protocol.quantity]
+        kind = kind_of(task_of(task))
         groups.setdefault((kind, kind in PROTOCOLS and task not in PROTOCOLS), []).append(task)
     found = []
     for (kind, unseen), names in groups.items():
@@ -111,6 +116,9 @@ def measures(tasks: Iterable[str]) -> list[Measure]:
             found.append(Measure(f"{title} {RETURN}", returning, unit, returning=True))
         else:
             found.append(there)
+        if kind == "isokinetic":
+            phases = [phase.name for phase in task_of(names[0]).protocol.phases]
+            found += [there._replace(name=f"{title} {name}", alone=name) for name in phases]
     return found
 
 

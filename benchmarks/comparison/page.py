@@ -1,6 +1,6 @@
 """The leaderboard's page: what stands on it, in which order, with which words."""
 
-from benchmarks.comparison.errors import PERCENT, is_bound
+from benchmarks.comparison.errors import PERCENT, is_bound, task_of
 from benchmarks.comparison.fingerprint import code_digest
 from benchmarks.comparison.leaderboard import Leaderboard
 from benchmarks.comparison.loop_plots import loop_plot, margin_table
@@ -14,6 +14,7 @@ from benchmarks.comparison.spending import spending
 from benchmarks.comparison.standings import Standings
 from benchmarks.comparison.tables import (
     capital,
+    exercise_table,
     failure_table,
     obstacle_table,
     spending_table,
@@ -42,6 +43,7 @@ def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     blocks += _ranking_blocks(leaderboard)
     blocks += _obstacle_blocks(leaderboard)
     blocks += _picture_blocks(leaderboard)
+    blocks += _exercise_blocks(leaderboard)
     blocks += _spending_blocks(leaderboard)
     blocks += _loop_blocks(leaderboard)
     if leaderboard.record.failures():
@@ -183,7 +185,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
     blocks: list[Block] = [Heading("What it costs"), Paragraph(text)]
     for each in _shown(leaderboard, pooled=False):
         measure = each.errors.measure
-        if not measure.returning:
+        if not (measure.returning or measure.alone):
             names = [row.name for row in each.rows]
             rows = spending(leaderboard.record, measure, names)
             title = f"{capital(measure.tasks[0])}: whole trials"
@@ -191,6 +193,25 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
                 title = f"{capital(measure.name)}: whole trials"
             blocks.append(spending_table(rows, title, measure.unit, leaderboard.labels))
     return blocks
+
+
+def _exercise_blocks(leaderboard: Leaderboard) -> list[Block]:
+    """What exercises came to beside their errors."""
+    blocks: list[Block] = []
+    for each in _shown(leaderboard, pooled=False):
+        measure = each.errors.measure
+        exercises = [task for task in measure.tasks if task_of(task).exercise]
+        if exercises and not measure.alone:
+            names = [row.name for row in each.rows]
+            title = f"{capital(measure.name)}: the joint and the operator's work"
+            table = exercise_table(leaderboard.record, exercises, names, title, leaderboard.labels)
+            blocks.append(table)
+    text = (
+        "Medians over the cases that did not fail, at the ends of the control steps. The angle is "
+        "compared with the dissertation's line, whatever is prescribed. Work is what the operator "
+        "does on the device, returned what it does on him."
+    )
+    return [Heading("Moment, speed, power"), Paragraph(text), *blocks] if blocks else []
 
 
 def _loop_blocks(leaderboard: Leaderboard) -> list[Block]:

@@ -15,7 +15,7 @@ from benchmarks.comparison.stations import DrawnStation, draw_station
 from benchmarks.comparison.target import Target, parse_target
 from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
-from controllers.designs import KINDS
+from controllers import designs
 from pma_gym.envs.options import parse_options
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EVERY_TASK, named_task
@@ -180,7 +180,7 @@ def kind_of(task: str) -> str:
     """Kind of a task of a suite."""
     found = named_task(task)
     assert found is not None
-    return KINDS[found.protocol.quantity]
+    return designs.kind_of(found)
 
 
 @lru_cache(maxsize=1024)

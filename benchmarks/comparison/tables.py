@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from benchmarks.comparison.case import EXERCISE_FIGURES
 from benchmarks.comparison.errors import PERCENT, Record
 from benchmarks.comparison.spending import Spending
 from benchmarks.comparison.standings import Standing, Standings
@@ -76,6 +77,27 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
         for row in rows
     ]
     return TextTable(title, header, cells)
+
+
+def exercise_table(
+    record: Record, tasks: Sequence[str], names: Sequence[str], title: str, labels: Labels
+) -> TextTable:
+    """What exercises came to beside their errors: medians over the cases that did not fail.
+
+    Args:
+        record: the suite's rows.
+        tasks: names of the exercises.
+        names: of the controllers, in the table's order.
+        title: of the table.
+        labels: what people call them.
+    """
+    rows = []
+    for name in names:
+        own = [row for (who, e), row in record.rows.items() if who == name and e.task in tasks]
+        done = [row["exercise"] for row in own if not row["failure"]]
+        medians = [float(np.median([row[f] for row in done] or [np.nan])) for f in EXERCISE_FIGURES]
+        rows.append([labels.get(name, name), *map(figure, medians)])
+    return TextTable(title, ["Controller", *EXERCISE_FIGURES.values()], rows)
 
 
 def tasks_table(found: Mapping[str, Standings], labels: Labels) -> TextTable:

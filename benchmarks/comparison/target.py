@@ -9,13 +9,14 @@ FIGURES = {
     "best": "least interquartile mean of any controller (mm or deg)",
     "best_to_bound": "the best controller's interquartile mean over the oracle's",
     "to_bound": "a controller's interquartile mean over the oracle's",
+    "to_other": "the first controller's interquartile mean over the second's",
     "half_width": "widest half interval of an interquartile mean (% of it)",
     "ratio_half_width": "widest half interval of a ratio to the best, up to twice it (% of it)",
 }
 """Figures that a target may speak of."""
 
-PER_CONTROLLER = ("largest", "above_bound", "to_bound")
-"""Figures of every controller that the target names; the others are of all rivals."""
+PER_CONTROLLER = ("largest", "above_bound", "to_bound", "to_other")
+"""Figures of the controllers that the target names; the others are of all rivals."""
 
 
 class Target(NamedTuple):
@@ -49,5 +50,7 @@ def parse_target(given: Mapping[str, Any]) -> Target:
     if bool(controllers) != (figure in PER_CONTROLLER):
         rule = "must name" if figure in PER_CONTROLLER else "speaks of all and must not name"
         raise ValueError(f"targets: {figure} {rule} controllers, got {list(controllers)}")
+    if figure == "to_other" and len(controllers) != 2:
+        raise ValueError(f"targets: to_other compares two controllers, got {list(controllers)}")
     most = given.get("most")
     return Target(figure, given["measure"], None if most is None else float(most), controllers)

@@ -9,7 +9,13 @@ from benchmarks.comparison.standings import Standing, Standings
 from benchmarks.comparison.statistics import Interval
 from benchmarks.comparison.target import FIGURES, Target
 
-UNITS = {"half_width": "%", "ratio_half_width": "%", "best_to_bound": "", "to_bound": ""}
+UNITS = {
+    "half_width": "%",
+    "ratio_half_width": "%",
+    "best_to_bound": "",
+    "to_bound": "",
+    "to_other": "",
+}
 """Units of figures that have not their measure's."""
 
 NEAR = 2.0
@@ -63,7 +69,9 @@ def verdicts(
     found = []
     for target in targets:
         known = standings.get(target.measure)
-        if target.controllers:
+        if target.figure == "to_other":
+            those = [_of_two(target, known, labels)]
+        elif target.controllers:
             those = [_of_one(target, known, name, labels, bound) for name in target.controllers]
         else:
             those = [_of_all(target, known, labels)]
@@ -97,6 +105,17 @@ def _of_one(
         for (task, pressure), mean in mean_by_trial(standings, name).items()
     ]
     return Verdict(what, target.most, Interval(max(excess), np.nan, np.nan))
+
+
+def _of_two(target: Target, standings: Standings | None, labels: Mapping[str, str]) -> Verdict:
+    """A target of one controller beside another."""
+    first, second = target.controllers
+    said = labels.get(first, first), labels.get(second, second)
+    what = f"{said[0]}, {target.measure}: interquartile mean over that of {said[1]}"
+    if standings is None or not {first, second} <= set(standings.errors.names):
+        return Verdict(what, target.most, None)
+    places = (standings.errors.names.index(name) for name in (first, second))
+    return Verdict(what, target.most, standings.ratio(*places))
 
 
 def _of_all(target: Target, standings: Standings | None, labels: Mapping[str, str]) -> Verdict:
