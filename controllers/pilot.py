@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from controllers.controller import Controller, Reference
 from controllers.form import HIGHEST_V, MIDDLE_V, Form
 from controllers.pid import nominal_offset
+from controllers.scales import scales_of
 from controllers.view import (
-    Scales,
     View,
     ahead,
     clipped,
@@ -56,7 +56,7 @@ class Pilot:
         self._before = rest_voltage(station)
         self._late = round(station.observation_delay / station.period)
         if self.view.kind == "tracking":
-            self._scales = Scales(station)
+            self._scales = scales_of(station)
             rows = ahead(references, self.view.preview, self._scales)
             self._ahead: list[list[float]] = rows.tolist()
             self._heard: deque[tuple[float, ...]] = deque(maxlen=self.view.history + 1)

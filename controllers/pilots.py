@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from controllers.form import HIGHEST_V, MIDDLE_V, Form
 from controllers.pilot import DIVERGED, base_of, rest_voltage
-from controllers.view import Scales, View, ahead, clipped, start_entry, steps_of
+from controllers.scales import scales_of
+from controllers.view import View, ahead, clipped, start_entry, steps_of
 from pma_gym.envs import Reading, Station
 
 
@@ -34,7 +35,7 @@ class Pilots:
         self.count, self.view, self.form, self._station = count, view, form, station
         lowest = station(station(0.0).task.lowest_pressure)
         self._task, self._period = lowest.task, lowest.period
-        self._scales = Scales(lowest)
+        self._scales = scales_of(lowest)
         self._references = steps_of(lowest.task.protocol.at, lowest, view.preview)
         self._ahead = ahead(self._references, view.preview, self._scales)
         self._late = round(lowest.observation_delay / lowest.period)

@@ -6,7 +6,7 @@ import reprlib
 from collections.abc import Mapping
 from typing import Any
 
-from controllers.designs import KINDS
+from controllers.designs import EXERCISE_KINDS, KINDS
 from controllers.form import Form
 from controllers.network import ACTIVATIONS, OUTPUTS
 from controllers.view import View
@@ -74,7 +74,7 @@ def parsed_document(text: bytes) -> dict[str, Any]:
         _check_keys(document, section)
     for key in ("name", "title"):
         _check(_is_text(document[key]), key, "a text", document[key])
-    kinds = tuple(KINDS.values())
+    kinds = (*KINDS.values(), *EXERCISE_KINDS)
     _check(document["task"] in kinds, "task", f"one of {', '.join(kinds)}", document["task"])
     _check_network(document["network"])
     _check_tensors(document)

@@ -36,7 +36,7 @@ class PolicyFile:
         name: what results call it.
         title: what reports call it.
         weights: its network.
-        task: kind of the task: displacement, rotation or contraction.
+        task: kind of the task: displacement, rotation, contraction, isokinetic or moment.
         environment: `id` and `kwargs` that it was trained with; kwargs have at least
             control_rate_hz, action_delay_s, observation_delay_s and model.
         view: what it sees.

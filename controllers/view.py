@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.controller import Reference
+from controllers.scales import FINE_SHARE, Scales, heard_rows, share_of
 from pma_gym.envs import Reading, Station
 from pma_gym.envs.observation import BOUND, ObservationTable
 from pma_gym.envs.options import Options
-from pma_gym.units import SI_FACTORS
 
 ViewKind = Literal["tracking", "environment"]
 VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")
@@ -19,18 +19,8 @@ VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")
 LONGEST = 64
 """Most steps that a view looks back or ahead."""
 
-FINE_SHARE = 0.01
-"""Share of the task's range that an error of 1.0 stands for: 0.25 mm, 0.9 deg.
-
-The sensors' noise is a tenth of it, so that a network of ordinary weights hears it; what is worse
-than five times as large is clipped.
-"""
-
 PRESSURE_CENTRE, PRESSURE_HALF = 362.5e3, 212.5e3
 """Middle and half of the pressures of table I3, 150-575 kPa (Pa)."""
-
-PRESSURE_CHANGE, LOAD_CHANGE = 20e3, 50.0
-"""Change of the pressure (Pa), and of the load (N), that 1.0 stands for."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +30,9 @@ class View:
     `tracking` is made for small errors: those of both position sensors, the pressure's change since
     the trial began, and the load less what the nominal drive gives for the voltage in force, now
     and in the control steps before; the reference's way in the steps ahead; the voltages commanded
-    last. `environment` is the environment's own observation.
+    last. In an exercise, whose errors are larger, it has the load as it is; where a moment is
+    prescribed, its error and the angle in place of the errors of position. `environment` is the
+    environment's own observation.
 
     Args:
         kind: `tracking` or `environment`.
@@ -89,8 +81,8 @@ class View:
         if self.kind == "environment":
             return self.table(station).rows
         protocol = station.task.protocol
-        span = f"{protocol.span / SI_FACTORS[protocol.unit]:g} {protocol.unit}"
-        fine = f"{FINE_SHARE * protocol.span / SI_FACTORS[protocol.unit]:g} {protocol.unit}"
+        span = share_of(protocol, 1.0)
+        fine = share_of(protocol, FINE_SHARE)
         rows = [
             ("reference now", span),
             ("pressure at the trial's start less 362.5 kPa", "212.5 kPa"),
@@ -101,12 +93,7 @@ class View:
         ]
         for k in range(self.history + 1):
             before = f", {k} before" if k else ""
-            rows += [
-                (f"reference less measured position{before}", fine),
-                (f"reference less position by the other sensor{before}", fine),
-                (f"pressure less pressure at the trial's start{before}", "20 kPa"),
-                (f"load less what the nominal drive is asked for{before}", "50 N"),
-            ]
+            rows += [(f"{name}{before}", unit) for name, unit in heard_rows(station.task)]
         rows += [(f"own action, {k} before", "1") for k in range(1, self.history + 1)]
         rows += [("voltage commanded last", "5 V, -1.0 = 0 V")]
         if base is not None:
@@ -124,62 +111,6 @@ class View:
                 action_delay_s=station.action_delay,
                 observation_delay_s=station.observation_delay,
             ),
-        )
-
-
-class Scales:
-    """What the entries of a trial are measured by.
-
-    Args:
-        station: what controllers are told; its model must be of a station.
-
-    Attributes:
-        fine: error that 1.0 stands for (m or rad).
-        span: the task's range (m or rad).
-        quantity: what the task asks for.
-        radius: of the nominal pulley (m).
-        delay: control steps after which a command is in force.
-    """
-
-    def __init__(self, station: Station) -> None:
-        parameters = station.model.parameters
-        if "drive" not in parameters or "rotor" not in parameters:
-            raise ValueError(
-                f"a tracking view needs the model of a station, with its drive and pulley; got "
-                f"{station.model.name}, a {station.model.plant}: take station or serres2008"
-            )
-        protocol = station.task.protocol
-        self.span, self.fine = protocol.span, FINE_SHARE * protocol.span
-        self.quantity = protocol.quantity
-        self.radius = parameters["rotor"].radius
-        self.delay = round((station.action_delay + station.observation_delay) / station.period)
-        self._gain, self._offset = parameters["drive"].gain, parameters["drive"].offset
-        self._held = station.load
-
-    def heard(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
-        """The four entries of a reading, before they are clipped; of numbers or arrays.
-
-        Args:
-            reading: extension (m), rotation (rad), load (N), pressure (Pa).
-            reference: when the reading was taken (m or rad).
-            start: pressure that the trial began at (Pa).
-            volts: motor voltage in force then (V), if the task is the motor's.
-        """
-        extension, rotation, load, pressure = reading
-        if self.quantity == "rotation":
-            own, other = rotation, extension / self.radius
-        elif self.quantity == "contraction":
-            own, other = -extension, -self.radius * rotation
-        else:
-            own, other = extension, self.radius * rotation
-        asked = self._held if self._held else self._gain * volts + self._offset
-        # The drive cannot push; half the sum of a number and its size is its positive part.
-        asked = 0.5 * (asked + abs(asked))
-        return (
-            (reference - own) / self.fine,
-            (reference - other) / self.fine,
-            (pressure - start) / PRESSURE_CHANGE,
-            (load - asked) / LOAD_CHANGE,
         )
 
 

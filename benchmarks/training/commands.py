@@ -20,7 +20,11 @@ def register(app: typer.Typer) -> None:
 def train(
     algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc.")],
     task: Annotated[
-        str, typer.Option(help="displacement or rotation; others with a preset of one's own.")
+        str,
+        typer.Option(
+            help="displacement, rotation, exercise (isokinetic), isotonic_exercise or "
+            "profile_exercise; others with a preset of one's own."
+        ),
     ],
     preset: Annotated[
         str, typer.Option(help="Name of a preset, or path of a .yml file of one's own.")

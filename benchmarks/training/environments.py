@@ -68,6 +68,7 @@ def _made(
         preset.form,
         told,
         staggered,
+        preset.reward_scale,
         threads=threads,
         **options,
     )

@@ -18,9 +18,16 @@ from benchmarks.training.run import Order, Point, Trained, train
 from benchmarks.training.validation import unit_of
 from controllers.policy_file import save_policy_file
 from pma_gym.envs import ENVIRONMENTS
+from pma_gym.tasks import EXERCISES, named_task
 
 ENVIRONMENT_OF = {task: name for name, task in ENVIRONMENTS.items()}
 """Id of the environment of a task."""
+
+EXERCISE = "pma_gym/ResistiveExercise-v0"
+"""Id of the environment of all exercises."""
+
+SHORT = {"exercise": ENVIRONMENTS[EXERCISE]}
+"""Tasks that have a shorter name here."""
 
 
 def ordered(
@@ -40,13 +47,26 @@ def ordered(
     """
     from benchmarks.training.learner import check_device
 
-    if task not in ENVIRONMENT_OF:
-        raise PresetError(f"task must be one of {', '.join(ENVIRONMENT_OF)}, got {task!r}")
-    found = load_preset(preset, algorithm, ENVIRONMENT_OF[task])
+    environment, options = _environment_of(task)
+    found = load_preset(preset, algorithm, environment)
+    if options:
+        found = found.changed(options={**found.options, **options})
     check_device(device)
     if steps is not None:
         found = found.changed(steps=steps)
     return Order(found, seed, device, threads, patience)
+
+
+def _environment_of(task: str) -> tuple[str, dict[str, str]]:
+    """Id of a task's environment, and the option that makes it this task where it needs one."""
+    name = SHORT.get(task, task)
+    if name in ENVIRONMENT_OF:
+        return ENVIRONMENT_OF[name], {}
+    found = named_task(name)
+    if found is None or found.exercise is None:
+        names = (*ENVIRONMENT_OF, *SHORT, *(one for one in EXERCISES if one not in ENVIRONMENT_OF))
+        raise PresetError(f"task must be one of {', '.join(names)}, got {task!r}")
+    return EXERCISE, {"task": name}
 
 
 def run_train(order: Order, out: Path, console: Console) -> Path:

@@ -30,6 +30,7 @@ class PilotedVecEnv(EngineVecEnv):
         told: name of the model that controllers are told.
         staggered: cut each environment's first episode at a random length, so that a rollout has
             all parts of a trial in it.
+        reward_scale: factor on the bounded rewards.
         options: as `PMAVectorEnv`.
 
     Attributes:
@@ -44,6 +45,7 @@ class PilotedVecEnv(EngineVecEnv):
         form: Form,
         told: str = "station",
         staggered: bool = False,
+        reward_scale: float = 1.0,
         **options: Any,
     ) -> None:
         """Make the environments and who pilots them."""
@@ -55,7 +57,7 @@ class PilotedVecEnv(EngineVecEnv):
             return Station(model, self.envs.task, pressure, chosen.period, *late)
 
         self.pilots = Pilots(count, view, form, station)
-        self._staggered = staggered
+        self._staggered, self._scale = staggered, reward_scale
         self._length = self.envs.task.steps(chosen.control_rate_hz)
         self._left = np.zeros(count, np.int64)
         self._nothing: list[dict[str, Any]] = [{} for _ in range(count)]
@@ -92,6 +94,7 @@ class PilotedVecEnv(EngineVecEnv):
         self._returns += rewards
         self._left -= 1
         entries = self.pilots.see(self.envs.readings())
+        learned = bounded(rewards, terminated, self._scale)
         over = terminated | truncated | (self._left == 0)
         infos = self._nothing.copy()
         if over.any():
@@ -100,13 +103,13 @@ class PilotedVecEnv(EngineVecEnv):
                 infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
             self._begin_again(which, over)
             entries[which] = self.pilots.see(self.envs.readings(), which)
-        return entries, bounded(rewards, terminated).astype(np.float32), over, infos
+        return entries, learned.astype(np.float32), over, infos
 
     def _last(
         self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
     ) -> dict[str, Any]:
         """What is told of an environment whose episode ends; errors unless it was cut."""
-        name = f"rmse_by_phase_{self.envs.task.protocol.unit}"
+        name = f"rmse_by_phase_{self.envs.task.protocol.suffix}"
         told: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,

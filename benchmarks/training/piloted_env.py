@@ -27,6 +27,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         form: arguments of the Form.
         stations: suite whose training stations episodes are on; empty for the environment's own.
         options: options in place of the environment's.
+        reward_scale: factor on the bounded rewards.
 
     Example:
         >>> env = PilotedEnv(
@@ -46,6 +47,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         form: Mapping[str, Any],
         stations: str = "",
         options: Mapping[str, Any] | None = None,
+        reward_scale: float = 1.0,
     ) -> None:
         """Make the pilot, and the environment anew if it is to be another."""
         rig = env.unwrapped
@@ -55,7 +57,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
             made = _made(rig, stations, options or {})
             env, rig = _exchanged(env, rig, made), made
         super().__init__(env)
-        self.rig = rig
+        self.rig, self._scale = rig, reward_scale
         self.pilot = Pilot(View.of(view), Form.of({"base": None} | dict(form)))
         told = rig.station
         entries = len(self.pilot.view.rows(told, self.pilot.form.base))
@@ -78,7 +80,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         command: Any = self.rig.action(volts)
         _, reward, terminated, truncated, info = self.env.step(command)
         entries = self.pilot.see(self.rig.reading, self.rig.time)
-        return entries, float(bounded(reward, terminated)), terminated, truncated, info
+        return entries, float(bounded(reward, terminated, self._scale)), terminated, truncated, info
 
 
 def _made(env: PMAEnv, stations: str, options: Mapping[str, Any]) -> PMAEnv:

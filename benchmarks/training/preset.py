@@ -27,7 +27,7 @@ ALGORITHMS = ("ppo", "sac", "td3", "tqc")
 WRAPPER = "benchmarks.training.piloted_env.PilotedEnv"
 """The only wrapper that a preset may name."""
 
-WRAPPED = {"view": True, "form": True, "stations": False, "options": False}
+WRAPPED = {"view": True, "form": True, "stations": False, "options": False, "reward_scale": False}
 """Its arguments, and whether they must be there."""
 
 AVERAGE = "benchmarks.training.averaging.WeightAverage"
@@ -59,6 +59,7 @@ class Preset:
         settings: of the algorithm.
         network: of its network.
         noise_std: standard deviation of the exploration's noise, where the algorithm needs one.
+        reward_scale: factor on the rewards that it learns from.
     """
 
     name: str
@@ -74,6 +75,7 @@ class Preset:
     settings: Mapping[str, Any]
     network: Mapping[str, Any]
     noise_std: float = 0.0
+    reward_scale: float = 1.0
 
     @property
     def task(self) -> str:
@@ -105,6 +107,8 @@ class Preset:
             "settings": dict(self.settings),
             "network": dict(self.network),
             "noise_std": self.noise_std,
+            # Trainings from before there was one go on.
+            **({"reward_scale": self.reward_scale} if self.reward_scale != 1.0 else {}),
         }
 
 
@@ -190,6 +194,7 @@ def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Prese
         {key: setting(algorithm, key, value) for key, value in given.items()},
         layers,
         float(noise),
+        _scale(wrapper.get("reward_scale", 1.0)),
     )
     _check_environment(found)
     return found
@@ -212,6 +217,11 @@ def _check_environment(preset: Preset) -> None:
             f"the environment's own view goes with a direct form, got {preset.form.kind}; take a "
             "tracking view or a direct form"
         )
+    if preset.view.kind == "environment" and preset.reward_scale != 1.0:
+        raise ValueError(
+            "the environment's own view goes with its own rewards, got reward_scale "
+            f"{preset.reward_scale:g}; leave it out or take a tracking view"
+        )
     if preset.form.base:
         base_of(preset.form)
 
@@ -233,6 +243,13 @@ def _arguments(what: str, given: object, only: str, known: Mapping[str, bool]) -
             f"got {', '.join(map(str, found)) or 'nothing'}"
         )
     return found
+
+
+def _scale(given: object) -> float:
+    found = real(f"reward_scale of {WRAPPER}", given)
+    if found <= 0.0:
+        raise ValueError(f"reward_scale of {WRAPPER} must be positive, got {given!r}")
+    return float(found)
 
 
 def _average(given: object) -> float:

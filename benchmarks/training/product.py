@@ -3,6 +3,7 @@
 from typing import Any
 
 from benchmarks.environment_info import ROOT, git_state
+from benchmarks.training.environments import pressures_kpa
 from benchmarks.training.export import policy_from_sb3
 from benchmarks.training.preset import Preset
 from benchmarks.training.run import Order, Trained
@@ -18,7 +19,8 @@ TITLES = {"ppo": "PPO", "sac": "SAC", "td3": "TD3", "tqc": "TQC"}
 def station_of(preset: Preset) -> Station:
     """The station of a preset as controllers are told of it."""
     options = {key: value for key, value in preset.options.items() if key != "task"}
-    environment = PMAEnv(preset.task, pressure_kpa=300.0, **options)
+    options.setdefault("pressure_kpa", pressures_kpa(preset)[0])
+    environment = PMAEnv(preset.task, **options)
     environment.reset(seed=0)
     return environment.station
 

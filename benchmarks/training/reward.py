@@ -13,11 +13,13 @@ then learn to stay at 0 V and never leave it.
 """
 
 
-def bounded(rewards: Any, terminated: Any) -> Any:  # noqa: ANN401
+def bounded(rewards: Any, terminated: Any, scale: float = 1.0) -> Any:  # noqa: ANN401
     """Rewards as they are learned from; of numbers or arrays.
 
     Args:
         rewards: of the environment.
         terminated: whether a limit broke.
+        scale: factor on what is left. Where errors stay large for many steps ahead, returns are
+            hundreds, which a critic does not reach in time and which drown the policy's gradient.
     """
-    return np.maximum(rewards, np.where(terminated, BROKEN_REWARD, LEAST_REWARD))
+    return scale * np.maximum(rewards, np.where(terminated, BROKEN_REWARD, LEAST_REWARD))

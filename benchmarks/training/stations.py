@@ -9,7 +9,9 @@ from benchmarks.comparison.recipe import Recipe
 from benchmarks.comparison.stations import draw_station
 from benchmarks.comparison.suite import frozen_suite
 from benchmarks.suite import SuiteError
+from pma_gym.envs.options import told_model
 from pma_gym.plant.model import Model, load_model
+from pma_gym.tasks import EXERCISES
 
 TRAINING = 128
 """How many stations a policy is trained on."""
@@ -19,6 +21,9 @@ VALIDATION_FIRST, VALIDATION = 10_000, 64
 
 OPERATOR = {"operator": {"share": 1.0}}
 """What an environment with an operator adds to its model."""
+
+ADDED = ("operator", "leg")
+"""Effects that an environment adds to its model: of somebody at the slide, of an exercise."""
 
 
 class Stations:
@@ -48,11 +53,11 @@ class Stations:
     def __call__(self, nominal: Model, generator: np.random.Generator) -> Model:
         """The station of an episode."""
         number = int(generator.integers(self.count))
-        return self.of(number, "operator" in nominal.parameters)
+        return self.of(number, tuple(name for name in ADDED if name in nominal.parameters))
 
-    def of(self, number: int, operated: bool = False) -> Model:
-        """A station by its number among these; with an operator at its slide if so asked."""
-        return _station(self.recipe, self.first + number, operated)
+    def of(self, number: int, added: tuple[str, ...] = ()) -> Model:
+        """A station by its number among these, with those of `ADDED` that are asked for."""
+        return _station(self.recipe, self.first + number, added)
 
 
 def training_recipe(suite: str) -> Recipe:
@@ -75,7 +80,12 @@ def _trained(recipe: Recipe) -> Recipe:
 
 
 @lru_cache(maxsize=4096)
-def _station(recipe: Recipe, number: int, operated: bool) -> Model:
-    if operated:
-        return _station(recipe, number, False).with_effects(OPERATOR)
-    return draw_station(recipe, number).model
+def _station(recipe: Recipe, number: int, added: tuple[str, ...]) -> Model:
+    if not added:
+        return draw_station(recipe, number).model
+    *others, last = added
+    model = _station(recipe, number, tuple(others))
+    if last == "operator":
+        return model.with_effects(OPERATOR)
+    # Any exercise will do: all have the leg that controllers are told of.
+    return told_model(EXERCISES["isokinetic_exercise"], model)

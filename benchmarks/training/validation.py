@@ -29,7 +29,10 @@ class Validation(NamedTuple):
 
 
 def measure_of(task: str) -> Measure:
-    """The suites' first measure of a task."""
+    """The suites' first measure of a task; of an exercise all phases together."""
+    found = task_of(task)
+    if found.exercise is not None:
+        return Measure(found.title, (task,), found.protocol.unit)
     return measures([task])[0]
 
 
@@ -60,8 +63,8 @@ def validate(model: Any, envs: VecEnv, task: str) -> Validation:  # noqa: ANN401
 
 def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
     """An episode's end as a row of a suite's journal."""
-    unit = task_of(task).protocol.unit
-    phases = {} if failed else info[f"rmse_by_phase_{unit}"]
+    suffix = task_of(task).protocol.suffix
+    phases = {} if failed else info[f"rmse_by_phase_{suffix}"]
     return {
         "task": task,
         "failure": "a limit" if failed else "",
@@ -70,7 +73,7 @@ def _row(task: str, info: dict[str, Any], failed: bool) -> dict[str, Any]:
 
 
 def unit_of(task: str) -> str:
-    """Unit of a task's errors, mm or deg."""
+    """Unit of a task's errors: mm, deg or N m."""
     unit = task_of(task).protocol.unit
     assert unit in SI_FACTORS
     return unit

@@ -222,7 +222,10 @@ def _set(*path_and_value):
         (_set("schema", 2), "schema must be 1, the one that is known here, got 2"),
         (_set("schema", True), "schema must be 1, .* got True"),
         (_set("name", ""), "name must be a text, got ''"),
-        (_set("task", "isotonic"), "task must be one of displacement, rotation, contraction, got"),
+        (
+            _set("task", "isotonic"),
+            "task must be one of displacement, .*contraction, isokinetic, moment, got",
+        ),
         (_set("network", []), r"network must be an object, got \[\]"),
         (_set("network", "layers", [12, 1]), "tensors: layers.0.bias has the shape"),
         (_set("network", "layers", [12, 64, 2]), "the last 1: a policy has one action"),

@@ -177,6 +177,7 @@ WRONG = {
         (*OF_WRAPPER, "options"),
         {"control_rate": 50.0},
     ),
+    r"reward_scale of .*PilotedEnv must be positive, got -1": ((*OF_WRAPPER, "reward_scale"), -1),
     r"stations give the environment its model already": (
         (*OF_WRAPPER, "options"),
         {"model": "serres2008"},

@@ -1,13 +1,17 @@
 """Ships the best policy of every task and loop, chosen on validation stations, with its card."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from benchmarks.training.stations import TRAINING, VALIDATION
 from benchmarks.training.study.judged import seed_folders
+from benchmarks.training.study.operators import table_of
+from controllers.designs import EXERCISE_KINDS
 from controllers.policy import POLICIES
 from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
+from pma_gym.envs import ENVIRONMENTS
 
 
 def best_policies(group: Path) -> list[Path]:
@@ -76,14 +80,9 @@ def card(policy: PolicyFile, seeds: int) -> str:
     validation = training["scores"]["validation"]
     preset = training["preset"]
     command = (
-        f"python -m benchmarks train --algo {training['algorithm']} --task {policy.task} "
+        f"python -m benchmarks train --algo {training['algorithm']} --task {_task(policy)} "
         f"--preset {preset} --seed {training['seed']}"
     )
-    rows = [
-        f"| {name} | {one['this']:.4g} {one['unit']} | {one['all_seeds'][0]:.4g} "
-        f"[{one['all_seeds'][1]:.4g}, {one['all_seeds'][2]:.4g}] |"
-        for name, one in training["scores"].get("suites", {}).items()
-    ]
     curve = [
         f"| {int(steps)} | {wall:.0f} | {error:.4g} |" for steps, wall, error in training["curve"]
     ]
@@ -106,12 +105,7 @@ def card(policy: PolicyFile, seeds: int) -> str:
             f"- **Code**: {training['code']}",
             f"- **Made again by**: `{command}`",
             "",
-            "Interquartile means of the RMSE; in brackets 95 % intervals over all seeds and the "
-            "suite's stations:",
-            "",
-            "| Suite | This policy | All seeds |",
-            "| :-- | --: | --: |",
-            *rows,
+            *(_operators(training["scores"]) or _suites(training["scores"])),
             "",
             "Learning curve:",
             "",
@@ -127,10 +121,49 @@ def card(policy: PolicyFile, seeds: int) -> str:
     )
 
 
+def _suites(scores: Mapping[str, Any]) -> list[str]:
+    rows = [
+        f"| {name} | {one['this']:.4g} {one['unit']} | {one['all_seeds'][0]:.4g} "
+        f"[{one['all_seeds'][1]:.4g}, {one['all_seeds'][2]:.4g}] |"
+        for name, one in scores.get("suites", {}).items()
+    ]
+    return [
+        "Interquartile means of the RMSE; in brackets 95 % intervals over all seeds and the "
+        "suite's stations:",
+        "",
+        "| Suite | This policy | All seeds |",
+        "| :-- | --: | --: |",
+        *rows,
+    ]
+
+
+def _operators(scores: Mapping[str, Any]) -> list[str]:
+    """Of an exercise: by operators whom no policy was trained with."""
+    if "operators" not in scores:
+        return []
+    figures, broken = scores["operators"], scores["validation"]["broken"]
+    return [
+        f"Mean RMSE over {figures['count']} random operators (`python -m "
+        "benchmarks.training.study.operators`), by phase; `Ended` counts episodes that a limit "
+        "or an unsafe moment or speed ended:",
+        "",
+        *table_of(figures),
+        "",
+        f"Of {2 * VALIDATION} validation episodes {broken} ended so.",
+    ]
+
+
+def _task(policy: PolicyFile) -> str:
+    """Name of the task that it was trained on."""
+    environment = policy.environment
+    return environment["kwargs"].get("task") or ENVIRONMENTS[environment["id"]]
+
+
 def _does(policy: PolicyFile) -> str:
     form = policy.form
+    actuator = "regulator" if policy.task in EXERCISE_KINDS else "motor"
     if form.kind == "increment":
-        return f"its action changes the motor voltage by up to {form.authority_v:g} V a step."
+        return f"its action changes the {actuator} voltage by up to {form.authority_v:g} V a step."
     if form.kind == "residual":
         return f"its action adds up to {form.authority_v:g} V to the voltage of {form.base}."
-    return "its action is the motor voltage, 0-10 V."
+    return f"its action is the {actuator} voltage, 0-10 V."
