@@ -1,4 +1,4 @@
-"""The command about the exercise device: `exercise`."""
+"""The commands about the exercise device: `exercise`, `safety` and `lag`."""
 
 import sys
 from pathlib import Path
@@ -8,8 +8,10 @@ import typer
 
 
 def register(app: typer.Typer) -> None:
-    """Add the command to the program."""
+    """Add the commands to the program."""
     app.command()(exercise)
+    app.command()(safety)
+    app.command()(lag)
 
 
 def exercise(
@@ -43,7 +45,7 @@ def exercise(
     from benchmarks.exercise.choice import Choice, ChoiceError
     from benchmarks.exercise.job import run_exercise
     from benchmarks.exercise.profile import ProfileError, held, read_profile
-    from pma_gym.studies.prescription import UnreachableError
+    from pma_gym.plant.prescription import UnreachableError
 
     try:
         if out.exists() and not out.is_dir():
@@ -54,5 +56,52 @@ def exercise(
         wanted = read_profile(profile) if profile else None if moment is None else held(moment)
         run_exercise(choice, wanted, out, Console())
     except (ChoiceError, ProfileError, UnreachableError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+
+
+def safety(
+    episodes: Annotated[int, typer.Option(help="With the safety layer.")] = 10_000,
+    bare: Annotated[int, typer.Option(help="Without it, to be compared with.")] = 1_000,
+    seed: Annotated[int, typer.Option(help="Of operators, stations and agents.")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the figures.")] = Path("results/safety"),
+) -> None:
+    """Count how often wild commands hurt the operator of the exercise device; a minute or two."""
+    from rich.console import Console
+
+    from benchmarks.exercise.safety_layer.job import SafetyError, run_safety
+
+    try:
+        if out.exists() and not out.is_dir():
+            raise SafetyError(f"--out {out} is a file; name a folder for the results")
+        run_safety(episodes, bare, seed, out, Console())
+    except SafetyError as error:
+        print(f"error: {error}", file=sys.stderr)
+        raise typer.Exit(2) from None
+
+
+def lag(
+    task: Annotated[str, typer.Argument(help="Name of an exercise.")] = "isokinetic_exercise",
+    operators: Annotated[
+        int, typer.Option(help="Whose course is searched through; 0: the linear bounds alone.")
+    ] = 8,
+    pressures: Annotated[
+        str, typer.Option(help="That episodes begin at (kPa), by commas; by the seed if empty.")
+    ] = "",
+    safety: Annotated[bool, typer.Option(help="Also behind the safety layer.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("results/lag"),
+) -> None:
+    """Bound what the regulator's lag makes impossible in an exercise; a minute an operator."""
+    from rich.console import Console
+
+    from benchmarks.exercise.lag.job import LagError, run_lag
+
+    try:
+        try:
+            listed = [float(part) for part in pressures.split(",") if part.strip()]
+        except ValueError:
+            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}") from None
+        run_lag(task, operators, listed, safety, out, Console())
+    except ValueError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(2) from None

@@ -1,0 +1,1 @@
+"""What the regulator's lag makes impossible in an exercise: three bounds."""

@@ -1,0 +1,188 @@
+"""`python -m benchmarks safety`: how often an exercise hurts, with the safety layer and without.
+
+Every episode has an operator, a station and an agent of its own, all by its seed. Half of the
+stations are `varied` (the environments' randomisation of that name), the others are further draws
+of the recipe of suite `robust`, with effects that no model has. The safe moment and the safe speed
+are watched at the end of every control step.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.exercise.safety_layer.wild import KINDS, PUMPING, kind_of, planned, pumped
+from benchmarks.hidden_effects.scoring import wilson
+from benchmarks.training.stations import Stations
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.options import Options
+from pma_gym.tasks import EXERCISES, LIMITS, Task
+from pma_gym.units import SI_FACTORS
+
+BLOCK = 250
+"""Episodes that run side by side."""
+
+FIRST_STATION, STATIONS = 30_000, 256
+"""Number of the first station drawn by the recipe, and how many there are: none of those that
+policies are trained, validated or judged on."""
+
+SETS = ("varied", "robust")
+"""Kinds of stations."""
+
+FIRST_SEED = 10_000_000
+"""Environment seed of the first episode of benchmark seed 0; the next benchmark seed begins as far
+on. Below it are those that the safety layer's numbers were found with."""
+
+
+@dataclass(frozen=True)
+class Tally:
+    """What came of the episodes of one task, of one kind of agent.
+
+    Attributes:
+        task: name of the task.
+        stations: kind of the stations, one of `SETS`.
+        agent: kind of the agent.
+        safety: whether the safety layer was there.
+        episodes: how many.
+        moments: how many of them exceeded the safe moment.
+        speeds: how many exceeded the safe speed.
+        others: how many broke a limit of the rig.
+        peak_moment_nm: the greatest moment at a joint (N m).
+        peak_speed_deg_s: the greatest speed of a joint (deg/s).
+    """
+
+    task: str
+    stations: str
+    agent: str
+    safety: bool
+    episodes: int
+    moments: int
+    speeds: int
+    others: int
+    peak_moment_nm: float
+    peak_speed_deg_s: float
+
+    @property
+    def violations(self) -> int:
+        """Episodes in which moment or speed was not safe."""
+        return self.moments + self.speeds
+
+
+@dataclass(frozen=True)
+class Safety:
+    """Everything that was measured.
+
+    Attributes:
+        seed: of the benchmark.
+        tallies: by task, kind of stations and kind of agent.
+    """
+
+    seed: int
+    tallies: tuple[Tally, ...]
+
+    def total(self, safety: bool) -> tuple[int, int, float]:
+        """Episodes, violations among them, and their largest likely share (Wilson, 95 %)."""
+        chosen = [tally for tally in self.tallies if tally.safety == safety]
+        episodes = sum(tally.episodes for tally in chosen)
+        violations = sum(tally.violations for tally in chosen)
+        return episodes, violations, wilson(violations, episodes)[1] if episodes else np.nan
+
+    def to_json(self) -> dict[str, object]:
+        """It as plain numbers and words."""
+        return {"seed": self.seed, "tallies": [asdict(tally) for tally in self.tallies]}
+
+
+def measure(
+    episodes: int,
+    seed: int,
+    safety: bool,
+    on_block: Callable[[int], None] = lambda done: None,
+    tasks: Sequence[str] = tuple(EXERCISES),
+) -> tuple[Tally, ...]:
+    """Run episodes and count.
+
+    Args:
+        episodes: how many, shared by the tasks.
+        seed: of the benchmark.
+        safety: whether the safety layer is there.
+        on_block: called with how many more are done.
+        tasks: names of the tasks.
+    Returns:
+        A tally for every task, kind of stations and kind of agent.
+    """
+    found: list[Tally] = []
+    groups = [(name, stations) for name in tasks for stations in SETS]
+    for at, (name, stations) in enumerate(groups):
+        numbers = np.arange(episodes)[at :: len(groups)]
+        # Kinds of agents go round in each group by themselves.
+        results = [
+            _run(EXERCISES[name], stations, safety, seed, first, block)
+            for first, block in _blocks(numbers, on_block)
+        ]
+        whole = np.concatenate(results) if results else np.zeros((0, 4))
+        found += [_tally((name, stations, kind), safety, whole) for kind in KINDS]
+    return tuple(found)
+
+
+def _blocks(
+    numbers: NDArray[np.int64], on_block: Callable[[int], None]
+) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    for first in range(0, len(numbers), BLOCK):
+        block = numbers[first : first + BLOCK]
+        yield first, block
+        on_block(len(block))
+
+
+def _options(stations: str, safety: bool) -> Options:
+    if stations == "varied":
+        return Options(randomisation="varied", safety=safety)
+    drawn = Stations("robust", FIRST_STATION, STATIONS)
+    return Options(randomisation=drawn, model=drawn.structure, safety=safety)
+
+
+def _run(
+    task: Task, stations: str, safety: bool, seed: int, first: int, numbers: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    """Run a block; shape (m, 4): number of the agent's kind, code of the end, peaks (SI)."""
+    options = _options(stations, safety)
+    count, every = len(numbers), np.arange(len(numbers))
+    engine = Engine(task, options, count)
+    start = FIRST_SEED * (seed + 1)
+    engine.seed(every, (start + numbers).tolist())
+    engine.reset(every)
+    order = first + every
+    steps = task.steps(options.control_rate_hz)
+    volts = np.array([planned(int(k), seed, steps, options.period) for k in order])
+    pumps = np.array([kind_of(int(k)) == PUMPING for k in order])
+    ends, peaks, going = np.zeros(count), np.zeros((count, 2)), np.ones(count, np.bool_)
+    for k in range(steps):
+        asked = volts[:, k]
+        if pumps.any():
+            asked = np.where(pumps, pumped(engine.numbers("spin"), asked), asked)
+        engine.actions[:count, 0] = 0.2 * asked - 1.0
+        engine.step()
+        over = going & engine.terminated
+        if over.any() or k == steps - 1:
+            last = over if k < steps - 1 else going
+            peaks[last, 0] = engine.numbers("peak_moment")[last]
+            peaks[last, 1] = engine.numbers("peak_speed")[last]
+            ends[over] = engine.numbers("ended")[over]
+            going &= ~over
+            engine.park(np.flatnonzero(over))
+    return np.column_stack([(order % len(KINDS)).astype(np.float64), ends, peaks])
+
+
+def _tally(name: tuple[str, str, str], safety: bool, whole: NDArray[np.float64]) -> Tally:
+    own = whole[whole[:, 0] == KINDS.index(name[-1])]
+    codes, rig = own[:, 1], float(len(LIMITS))
+    return Tally(
+        *name,
+        safety,
+        episodes=len(own),
+        moments=int(np.sum(codes == rig + 1.0)),
+        speeds=int(np.sum(codes == rig + 2.0)),
+        others=int(np.sum((codes > 0.0) & (codes <= rig))),
+        peak_moment_nm=float(own[:, 2].max(initial=0.0)),
+        peak_speed_deg_s=float(own[:, 3].max(initial=0.0)) / SI_FACTORS["deg"],
+    )

@@ -1,0 +1,98 @@
+"""The command `safety`: runs the episodes, prints what came of them, keeps the figures."""
+
+import json
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import Progress
+
+from benchmarks.exercise.safety_layer.episodes import Safety, Tally, measure
+from benchmarks.exercise.tables import NONE, terminal_table
+from benchmarks.files import write_text
+from pma_gym.pages.document import TextTable, to_markdown
+from pma_gym.tasks.exercise import SAFE_MOMENT, SAFE_SPEED
+from pma_gym.units import SI_FACTORS
+
+FIGURES = "safety.json"
+
+
+class SafetyError(ValueError):
+    """Episodes that cannot be run; the message says why."""
+
+
+def run_safety(episodes: int, bare: int, seed: int, out: Path, console: Console) -> Safety:
+    """Measure, print and write.
+
+    Args:
+        episodes: with the safety layer.
+        bare: without it, to be compared with.
+        seed: of the benchmark.
+        out: folder for `safety.json` and `safety.md`.
+        console: where to print.
+    Raises:
+        SafetyError: a number of episodes or a seed that is none.
+    """
+    for name, value, least in (("episodes", episodes, 1), ("bare", bare, 0), ("seed", seed, 0)):
+        if value < least:
+            raise SafetyError(f"--{name} must be a whole number from {least} on, got {value}")
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("Episodes", total=episodes + bare)
+
+        def advance(done: int) -> None:
+            progress.advance(task, done)
+
+        tallies = (*measure(episodes, seed, True, advance), *measure(bare, seed, False, advance))
+    found = Safety(seed, tallies)
+    shown = safety_table(found)
+    console.print(terminal_table(shown), "")
+    console.print(safety_words(found), highlight=False)
+    write_text(out / FIGURES, json.dumps(found.to_json(), indent=1) + "\n")
+    write_text(out / "safety.md", f"{to_markdown([shown], {}, '')}\n{safety_words(found)}\n")
+    console.print(f"Figures: {out / FIGURES}", highlight=False)
+    return found
+
+
+def safety_table(found: Safety) -> TextTable:
+    """A row for every task, kind of stations and agent."""
+    header = [
+        "Task",
+        "Stations",
+        "Agent",
+        "Layer | episodes",
+        "Layer | unsafe",
+        "Layer | N m",
+        "Layer | deg/s",
+    ]
+    header += ["None | episodes", "None | unsafe"]
+    bare = {(t.task, t.stations, t.agent): t for t in found.tallies if not t.safety}
+    rows = []
+    for tally in (t for t in found.tallies if t.safety):
+        without = bare.get((tally.task, tally.stations, tally.agent))
+        compared = [f"{without.episodes}", f"{without.violations}"] if without else [NONE, NONE]
+        rows.append([*_cells(tally), *compared])
+    limits = f"{SAFE_MOMENT:g} N m, {SAFE_SPEED / SI_FACTORS['deg']:g} deg/s"
+    title = f"Episodes with and without the safety layer; safe: up to {limits}"
+    return TextTable(title, header, rows, words=3)
+
+
+def _cells(tally: Tally) -> list[str]:
+    peaks = f"{tally.peak_moment_nm:.1f}", f"{tally.peak_speed_deg_s:.1f}"
+    name = tally.task.removesuffix("_exercise")
+    return [name, tally.stations, tally.agent, f"{tally.episodes}", f"{tally.violations}", *peaks]
+
+
+def safety_words(found: Safety) -> str:
+    """The whole in a sentence or two."""
+    episodes, violations, most = found.total(True)
+    bare, broken, _ = found.total(False)
+    said = (
+        f"With the safety layer {violations} of {episodes} episodes were unsafe "
+        f"(seed {found.seed}; at most {100.0 * most:.2g} % with 95 % confidence)"
+    )
+    return f"{said}; without it {broken} of {bare}." if bare else f"{said}."
+
+
+def read_safety(path: Path) -> Safety:
+    """Figures that `run_safety` kept."""
+    kept = json.loads(path.read_text(encoding="utf-8"))
+    return Safety(kept["seed"], tuple(Tally(**tally) for tally in kept["tallies"]))
