@@ -97,7 +97,7 @@ def test_what_is_foreseen_is_what_the_equations_give():
     horizon = Horizon(0.01, 2, 10, 0)
     outputs = np.eye(6)[:1]
     state, drift, command = foreseen(joint, outputs, horizon)
-    # A push held for good: the fastest angle that stiffness and damping allow, then its rest.
+    # A push held for good comes to rest where the two stiffnesses bear it.
     long = Horizon(0.01, 10, 60, 0)
     rest = foreseen(joint, outputs, long)[1][0, -1].sum()
     assert rest == pytest.approx(1.0 / (joint.stiffness + joint.operator), rel=1e-3)
