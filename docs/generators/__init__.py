@@ -23,7 +23,10 @@ from generators.exercise import (
     exercise_check,
     exercise_knee,
     exercise_makers,
+    exercise_people,
     exercise_ranges,
+    exercise_safety,
+    exercise_safety_words,
     exercise_worst,
 )
 from generators.files import calibrations, columns, raw_columns, tables
@@ -40,6 +43,7 @@ from generators.models import differences, identification, misfit, parameters, s
 from generators.policies import (
     policies_ablations,
     policies_judged,
+    policies_operators,
     policies_robustness,
     policies_shipped,
     policies_trained,
@@ -61,8 +65,9 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_ways, hidden_bound),
         *(policies_shipped, policies_judged, policies_trained),
-        *(policies_ablations, policies_robustness),
+        *(policies_ablations, policies_robustness, policies_operators),
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),
+        *(exercise_people, exercise_safety, exercise_safety_words),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

@@ -1,10 +1,16 @@
 """The exercise device's tables, computed as the page is rendered."""
 
+from pathlib import Path
+
 from benchmarks.exercise.choice import Choice
+from benchmarks.exercise.safety_layer.episodes import Safety
+from benchmarks.exercise.safety_layer.job import read_safety, safety_table, safety_words
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
+from generators.text import table
 from pma_gym.pages.document import TextTable, to_markdown
 from pma_gym.plant.model import load_model
 from pma_gym.studies.moment_ranges import check_moments
+from pma_gym.tasks import HUMAN_BOUNDS, PACED, PACING, Human, Population
 
 
 def exercise_check() -> str:
@@ -35,6 +41,35 @@ def exercise_knee() -> str:
 def exercise_makers() -> str:
     """Makers' figures beside the scaled ones."""
     return _markdown(makers_table(load_model("station")))
+
+
+def exercise_people() -> str:
+    """What operators are drawn from, in the two sorts of exercise."""
+    rows = [
+        [name, *(_between(people, name) for people in (PACED, PACING)), HUMAN_BOUNDS[name][2]]
+        for name in Human._fields
+        if name != "tremor_phase"
+    ]
+    return table(["Of the operator", "Speed prescribed", "Moment prescribed", "Unit"], rows)
+
+
+def _between(people: Population, name: str) -> str:
+    low, high = getattr(people.low, name), getattr(people.high, name)
+    return f"{low:.3g}" if low == high else f"{low:.3g}-{high:.3g}"
+
+
+def exercise_safety() -> str:
+    """How often wild commands hurt, with the safety layer and without."""
+    return _markdown(safety_table(_safety()))
+
+
+def exercise_safety_words() -> str:
+    """The same in a sentence."""
+    return safety_words(_safety())
+
+
+def _safety() -> Safety:
+    return read_safety(Path(__file__).parents[1] / "figures" / "exercise-safety.json")
 
 
 def _markdown(table: TextTable) -> str:

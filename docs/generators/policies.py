@@ -4,13 +4,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.training.study.operators import table_of
 from benchmarks.training.study.tables import (
     ablation_table,
     judged_table,
     robustness_table,
     training_table,
 )
-from controllers.policy import shipped_policies
+from controllers.policy import POLICIES, shipped_policies
 from controllers.policy_file import load_policy_file
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
@@ -45,6 +46,12 @@ def policies_ablations() -> str:
 def policies_robustness(task: str) -> str:
     """Errors under conditions that were not trained with."""
     return _written(robustness_table(_read(), task))
+
+
+def policies_operators(name: str) -> str:
+    """Errors of a shipped policy over an exercise's operators, beside constant pressure."""
+    policy = load_policy_file(POLICIES / f"{name}.json")
+    return "\n".join(table_of(policy.training["scores"]["operators"]))
 
 
 def policies_shipped() -> str:

@@ -1,15 +1,17 @@
 """The policies that ship: whole, with their cards, and as good as is asked of them."""
 
+import numpy as np
 import pytest
 
 from controllers import PPOPolicy
+from controllers.pid import nominal_offset
 from controllers.policy import shipped_policies
 from controllers.policy_file import load_policy_file
 from pma_gym.envs import PMAEnv
 
 
-def driven(environment, controller):
-    environment.reset(seed=7)
+def driven(environment, controller, seed=7):
+    environment.reset(seed=seed)
     controller.reset(environment.reference, environment.station)
     ended = False
     while not ended:
@@ -47,3 +49,26 @@ def test_the_late_loop_has_policies_of_its_own():
     assert driven(PMAEnv("displacement", pressure_kpa=300.0, **late), PPOPolicy())["rmse_mm"] < 0.4
     info = driven(PMAEnv("rotation", pressure_kpa=400.0, **disturbed), PPOPolicy())
     assert info["rmse_deg"] < 2.0
+
+
+class Constant:
+    """The regulator voltage that holds the pressure that a trial begins at."""
+
+    def reset(self, reference, station):
+        self.volts = nominal_offset(station)
+
+    def act(self, observation, time):
+        return self.volts
+
+
+def test_operators_are_held_to_the_pace_in_every_phase():
+    """Over eight operators the errors are half of those at constant pressure, or less."""
+    env = PMAEnv("isokinetic_exercise", pressure_kpa=400.0)
+
+    def pooled(controller):
+        rows = [
+            list(driven(env, controller, seed)["rmse_by_phase_deg"].values()) for seed in range(8)
+        ]
+        return np.sqrt(np.mean(np.square(rows), axis=0))
+
+    assert np.all(pooled(PPOPolicy()) <= 0.5 * pooled(Constant()))
