@@ -23,6 +23,12 @@ _FIXED: dict[str, tuple[str, str, Dashes]] = {
     "ilc": ("#D55E00", "d", "--"),
     "oracle": ("#000000", "*", ":"),
     "ppo": ("#56B4E9", "P", "-"),
+    # Those of exercises never meet those of other tasks above, but for the policy.
+    "constant_pressure": ("#CC79A7", "D", "-."),
+    "scheduled_pressure": ("#E69F00", "^", "-."),
+    "speed_pid": ("#0072B2", "v", "-."),
+    "moment_pid": ("#009E73", "o", "-."),
+    "exercise_mpc": ("#332288", "p", "--"),
 }
 _OTHERS: tuple[tuple[str, str, Dashes], ...] = (
     ("#CC79A7", "D", "-."),
@@ -68,8 +74,6 @@ def styles_of(labels: Mapping[str, str]) -> dict[str, Style]:
     """
     taken = {_FIXED[name][0] for name in labels if name in _FIXED}
     free = [other for other in _OTHERS if other[0] not in taken]
-    styles = {}
-    for name, label in labels.items():
-        own = _FIXED[name] if name in _FIXED else free[len(styles) % len(free)]
-        styles[name] = Style(label, *own)
-    return styles
+    others = [name for name in labels if name not in _FIXED]
+    own = {name: free[at % len(free)] for at, name in enumerate(others)} | _FIXED
+    return {name: Style(label, *own[name]) for name, label in labels.items()}
