@@ -188,7 +188,8 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
         if not (measure.returning or measure.alone):
             names = [row.name for row in each.rows]
             rows = spending(leaderboard.record, measure, names)
-            title = f"{capital(measure.tasks[0].replace("_", " "))}: whole trials"
+            name = measure.tasks[0].replace("_", " ")
+            title = f"{capital(name)}: whole trials"
             if len(measure.tasks) > 1:
                 title = f"{capital(measure.name)}: whole trials"
             blocks.append(spending_table(rows, title, measure.unit, leaderboard.labels))
