@@ -209,8 +209,8 @@ def _exercise_blocks(leaderboard: Leaderboard) -> list[Block]:
             blocks.append(table)
     text = (
         "Medians over the cases that did not fail, at the ends of the control steps. The angle is "
-        "compared with the dissertation's line, whatever is prescribed. Work is what the operator "
-        "does on the device, returned what it does on him."
+        "compared with the dissertation's line, whatever is prescribed. Work is what the joint "
+        "does on the device, returned what the device does on it."
     )
     return [Heading("Moment, speed, power"), Paragraph(text), *blocks] if blocks else []
 

@@ -16,8 +16,9 @@ class Leg(NamedTuple):
             0,
             5,
             "D. A. Winter 2009, table 4.1 (after Dempster): shank and foot 0.061 of the mass, "
-            "gyration about the knee 0.735 of a shank of 0.246 of the height; 0.45 at 75 kg and "
-            "1.78 m. Coefficients as another library has them; the length is from memory",
+            "gyration about the knee 0.735 of a shank of 0.246 of the height: 0.47 at 75 kg and "
+            "1.78 m, 0.42 after P. de Leva 1996; 0.45 lies between. Coefficients as another "
+            "library has them; the length is from memory",
             0.0,
             usual=0.45,
         ),

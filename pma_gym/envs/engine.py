@@ -215,7 +215,7 @@ class Engine:
 
     def _check_prescription(self, wanted: Sequence[Pressure]) -> None:
         """Refuse pressures at which an exercise's device cannot give what is prescribed."""
-        if self.task.exercise is None or self.task.exercise.prescription is None:
+        if self.task.exercise is None:
             return
         new = {repr(one): one for one in wanted if repr(one) not in self._possible}
         check_prescription(self.task, self.told, new.values())

@@ -8,47 +8,78 @@ from numpy.typing import NDArray
 
 from pma_gym.envs.circuit import DRAW
 from pma_gym.envs.options import Options, Pressure
-from pma_gym.plant.exercise import own_device, resistive_moment
+from pma_gym.plant.exercise import FULL_ANGLE, own_device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model
-from pma_gym.plant.prescription import UnreachableError, constant_moments, follow_from
+from pma_gym.plant.prescription import Miss, UnreachableError, constant_moments, follow_from
 from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, Plan, Task, plan_of
 
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
 """Where a prescription is compared with what the device can give (rad)."""
+
+STRETCH_SHARE = 0.5
+"""Share of the rig's limit by which 90 deg may stretch the muscle (assumption)."""
 
 Numbers = dict[str, NDArray[np.float64]]
 """Numbers of environments by their places, shape (m,) each."""
 
 
 def check_prescription(task: Task, model: Model, wanted: Iterable[Pressure]) -> None:
-    """Refuse a prescription that the device of a station cannot give.
+    """Refuse what the device of a station cannot give: a moment, or 90 deg at a pressure.
 
     Args:
         task: any task.
         model: the nominal model.
         wanted: pressures that episodes are to begin at, as the option `pressure_kpa`.
     Raises:
-        UnreachableError: at which angle, and the range of moments that can be had there.
+        UnreachableError: a moment, with the range of moments that can be had.
+        ValueError: a pressure at which the muscle does not reach 90 deg, with those at which it
+            does.
     """
     exercise = task.exercise
-    if exercise is None or exercise.prescription is None:
+    if exercise is None:
+        return
+    starts = sorted(_starts(task, wanted))
+    if exercise.prescription is None:
+        _check_reach(task, model, starts)
         return
     moments = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
-    for pressure in sorted(_starts(task, wanted)):
+    for pressure in starts:
         try:
             follow_from(model, own_device(model), ANGLES, moments, pressure, exercise.start_moment)
         except UnreachableError as error:
-            raise UnreachableError(error.miss, instead=_instead(model, pressure)) from None
+            words = _refusal(task, model, error.miss, pressure)
+            raise UnreachableError(error.miss, words=words) from None
 
 
-def _instead(model: Model, pressure: float) -> str:
-    """What constant moment an exercise can have that begins at a pressure (Pa), in words."""
+def _check_reach(task: Task, model: Model, starts: Sequence[float]) -> None:
+    """Refuse pressures at which 90 deg would stretch the muscle too far."""
+    every, most = pressure_grid(model), STRETCH_SHARE * model.parameters["limits"].stretch
+    given = resistive_moment(model, own_device(model), every, FULL_ANGLE)
+    allowed = every[given.contraction >= -most]
+    for pressure in starts:
+        if not allowed[0] <= pressure <= allowed[-1]:
+            raise ValueError(
+                f"task {task.name}: pressure_kpa must lie in {1e-3 * allowed[0]:g}-"
+                f"{1e-3 * allowed[-1]:g} kPa, where the muscle of model {model.name} reaches 90 "
+                f"deg, got {1e-3 * pressure:g}"
+            )
+
+
+def _refusal(task: Task, model: Model, miss: Miss, pressure: float) -> str:
+    """What an exercise cannot have that begins at a pressure (Pa), and what it can."""
     between = constant_moments(model, own_device(model), pressure)
-    begun = f"beginning at {1e-3 * pressure:.4g} kPa"
-    if between is None:
-        return f"; {begun} no one moment can be held from 0 to 90 deg, begin at a higher one"
-    low, high = between
-    return f"; {begun} one moment can be held from 0 to 90 deg from {low:g} to {high:g} N m"
+    can = "where no one moment can be held from 0 to 90 deg"
+    mend = "begin"
+    if between is not None:
+        low, high = between
+        can = f"where one moment can be held from 0 to 90 deg from {low:g} to {high:g} N m"
+        mend = "prescribe one of these, or begin"
+    lowest, highest = (1e-3 * start for start in task.starts)
+    return (
+        f"task {task.name}: {miss.wanted:g} N m at {math.degrees(miss.angle):.3g} deg cannot be "
+        f"had, beginning at {1e-3 * pressure:.4g} kPa, {can}; {mend} at another pressure_kpa "
+        f"(the task's: {lowest:g}-{highest:g})"
+    )
 
 
 def _starts(task: Task, wanted: Iterable[Pressure]) -> set[float]:

@@ -126,8 +126,11 @@ def parse_options(given: Mapping[str, Any]) -> Options:
     check_named("disturbances", options.disturbances, DISTURBANCES)
     if isinstance(options.human, Human):
         check_human(options.human)
-    else:
-        check_named("human", options.human, HUMANS)
+    elif options.human not in HUMANS:
+        raise ValueError(
+            f"human must be one of {', '.join(HUMANS)} or a pma_gym.tasks.Human, got "
+            f"{options.human!r}"
+        )
     check_pressure(options.pressure_kpa)
     return options
 
@@ -154,11 +157,13 @@ def parse_task(given: str | Task, options: Options) -> Task:
 def _check_exercise(task: Task, options: Options) -> None:
     """Refuse what an exercise cannot have, and what nothing else has a use for."""
     if task.exercise is None:
-        if options.human != "random":
-            raise ValueError(
-                f"human is the operator of an exercise, and task {task.name} has none; leave it "
-                "out, or take isokinetic_exercise, isotonic_exercise or profile_exercise"
-            )
+        for name, usual in (("human", "random"), ("safety", True)):
+            if getattr(options, name) != usual:
+                raise ValueError(
+                    f"{name} is of the operator of an exercise, and task {task.name} has none; "
+                    "leave it out, or take isokinetic_exercise, isotonic_exercise or "
+                    "profile_exercise"
+                )
         return
     if options.control_rate_hz < LOWEST_RATE_HZ:
         raise ValueError(
@@ -189,7 +194,8 @@ def rig_model(task: Task, options: Options) -> Model:
     operated = options.disturbing.operator_force != 0.0
     if model.plant != "station" and (operated or task.load or task.exercise):
         what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
-        why = "somebody pulls at its slide" if operated else "the motor holds a load"
+        held = "plays an operator" if task.exercise else "holds a load"
+        why = "somebody pulls at its slide" if operated else f"the motor {held}"
         raise ValueError(
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"

@@ -86,8 +86,9 @@ class Picture:
         (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
         # An excess lies on either side of what is prescribed.
-        lowest = -1.2 if protocol.quantity == "excess" else -0.12
-        axes.set_ylim(lowest * protocol.span / self._factor, 1.2 * protocol.span / self._factor)
+        lowest, highest = (-1.2, 2.4) if protocol.quantity == "excess" else (-0.12, 1.2)
+        span = protocol.span / self._factor
+        axes.set_ylim(lowest * span, highest * span)
         axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")
         axes.tick_params(labelbottom=False)
         axes.legend(

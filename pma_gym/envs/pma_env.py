@@ -151,8 +151,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     | `motor_voltage_v`, `regulator_voltage_v` | as heard by the station in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
     | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
-    | of an exercise: `moment_nm`, `operator_nm` | moment at the joint, and the operator's | N m |
-    | `speed_deg_s`, `power_w` | of the joint; that the operator gives | deg/s, W |
+    | of an exercise: `moment_nm`, `operator_nm` | at the joint; that the operator means | N m |
+    | `speed_deg_s`, `power_w` | of the joint; that it gives the device | deg/s, W |
     | if it prescribes a moment: `rotation_deg`, `prescribed_nm` | angle, moment | deg, N m |
     | and `excess_nm` for the position, `_nm` for `_mm` | moment less prescribed | N m |
     | at the end: `rmse_mm`, `rmse_deg` or `rmse_nm`, ... | see `episode_summary` | |
@@ -339,14 +339,15 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa).
 
         Contraction is from the muscle's resting length, extension from the trial's beginning;
-        rotation from where the cable begins to be wound in with no load.
+        rotation from where the cable begins to be wound in with no load, in an exercise from where
+        it begins.
         """
         truth = {name: self._number(f"true_{name}") for name in TRUTH}
         return truth | {"extension": self._number(self._datum) - truth["contraction"]}
 
     @property
     def position(self) -> float:
-        """True position that the task asks for (m or rad)."""
+        """True position that the task asks for (m, rad; N m for a moment's excess)."""
         truth = self.truth
         if self.task.protocol.quantity == "contraction":
             return truth["contraction"] - self._number(START)
@@ -356,8 +357,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def human(self) -> Human | None:
-        """The operator of this exercise; None without one. Not for controllers."""
-        if self.task.exercise is None:
+        """The operator of this exercise; None without one, or before. Not for controllers."""
+        if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
         return Human(*(self._number(f"human_{name}") for name in Human._fields))
 
@@ -412,7 +413,16 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
-        """Motor voltage that the station heard in every step so far (V), shape (steps,)."""
+        """Motor voltage that the station heard in every step so far (V), shape (steps,).
+
+        Raises:
+            AttributeError: in an exercise, whose operator is not written down step by step.
+        """
+        if self.task.exercise:
+            raise AttributeError(
+                "motor_voltages are not kept in an exercise, where the motor plays the operator; "
+                'collect info["motor_voltage_v"] of every step'
+            )
         if self.task.actuator == "motor":
             return self.voltages
         return np.full(self._count, self.motor_voltage)

@@ -23,11 +23,11 @@ TRUTH = ("contraction", "rotation", "load", "pressure")
 
 
 PEAKS = ("peak_moment", "peak_speed", "peak_power")
-"""Places of the greatest moment at a joint (N m), of its speed (rad/s) and of the operator's power
-(W), at the control steps' ends."""
+"""Places of the greatest moment at a joint (N m), of its speed (rad/s) and of the power between
+joint and device (W), either way, at the control steps' ends."""
 
 WORK = ("work", "returned")
-"""Places of the work that the operator did and that he took back (J)."""
+"""Places of the work that the joint did on the device and that it took back (J)."""
 
 TOLD = (
     *("told_radius", "told_drive_gain", "told_drive_offset"),

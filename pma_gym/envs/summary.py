@@ -129,8 +129,8 @@ def exercise_summaries(
         period: of the control steps (s).
     Returns:
         By name, shape (m,): `pace_rmse_deg` of the angle against its ideal line, over all phases;
-        `peak_moment_nm`, `peak_speed_deg_s`, `peak_power_w` at the control steps' ends; `work_j`
-        that the operator did and `returned_j` that he took back.
+        `peak_moment_nm`, `peak_speed_deg_s`, `peak_power_w` (either way) at the control steps'
+        ends; `work_j` that the joint did on the device and `returned_j` that it took back.
     """
     degree = SI_FACTORS["deg"]
     last = round(PACE.duration / period)

@@ -71,9 +71,9 @@ class UnreachableError(ValueError):
         miss: where, and what could be given there.
     """
 
-    def __init__(self, miss: Miss, among: int = 1, instead: str = "") -> None:
+    def __init__(self, miss: Miss, among: int = 1, words: str = "") -> None:
         nearest = f" (the nearest of {among} configurations)" if among > 1 else ""
-        super().__init__(f"{miss}{nearest}{instead}")
+        super().__init__(words or f"{miss}{nearest}")
         self.miss = miss
 
 

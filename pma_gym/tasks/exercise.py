@@ -39,7 +39,8 @@ PLAN_ANGLES = tuple(15.0 * _DEG * i for i in range(7))
 """Angles (rad) between which the operator's plan of an isokinetic exercise is linear."""
 
 LOWEST_RATE_HZ = 50.0
-"""Control steps a second that the motor needs to play somebody whose joint is stiff (Hz)."""
+"""Control steps a second that the motor needs to play the people that are drawn (Hz), whose joints
+have up to 60 N m/rad; a stiffer one needs more."""
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,10 @@ from pma_gym.units import SI_FACTORS
 _DEG, _KPA = SI_FACTORS["deg"], SI_FACTORS["kPa"]
 
 
+FARTHEST = 120.0 * _DEG
+"""Largest angle of a prescription's knots (rad): beyond the straight leg there is nobody."""
+
+
 def isokinetic_exercise(
     pressures: tuple[float, float] = (275 * _KPA, 575 * _KPA), name: str = "isokinetic_exercise"
 ) -> Task:
@@ -25,6 +29,7 @@ def isokinetic_exercise(
         pressures: range of the pressures that episodes begin at (Pa).
         name: name of the task.
     """
+    _check_pressures(pressures)
     exercise = Exercise(None, PACED, GUARD_PACED)
     return Task(name, ROTATION, *pressures, "regulator", exercise=exercise)
 
@@ -48,7 +53,9 @@ def moment_exercise(
     Raises:
         ValueError: names the rule, the unit and what came.
     """
+    angles, moments = [float(angle) for angle in angles], [float(moment) for moment in moments]
     _check_knots(angles, moments)
+    _check_pressures(start_pressures)
     phases = tuple(Phase(p.name, p.start, p.duration, 0.0, 0.0) for p in PACE.phases)
     protocol = Protocol(name, "excess", "N m", max(moments), phases)
     lowest, highest = TASKS["displacement"].lowest_pressure, TASKS["displacement"].highest_pressure
@@ -69,12 +76,26 @@ def isotonic_exercise(moment: float = 8.0, name: str = "isotonic_exercise") -> T
     return moment_exercise((0.0,), (moment,), (525 * _KPA, 575 * _KPA), name)
 
 
+def _check_pressures(pressures: Sequence[float]) -> None:
+    station = TASKS["displacement"]
+    low, high = station.lowest_pressure, station.highest_pressure
+    if len(pressures) != 2 or not low <= pressures[0] <= pressures[1] <= high:
+        raise ValueError(
+            f"start pressures of an exercise must be two in {low:g}-{high:g} Pa (kPa times 1000), "
+            f"the lower first, got {tuple(pressures)}"
+        )
+
+
 def _check_knots(angles: Sequence[float], moments: Sequence[float]) -> None:
     rule = "a prescription needs as many moments (N m) as angles (rad), one or more"
     if not angles or len(angles) != len(moments):
         raise ValueError(f"{rule}; got {len(moments)} moments and {len(angles)} angles")
-    if angles[0] != 0.0 or any(a >= b for a, b in zip(angles, angles[1:], strict=False)):
-        raise ValueError(f"angles (rad) of a prescription must rise from 0, got {list(angles)}")
+    rising = all(a < b for a, b in zip(angles, angles[1:], strict=False))
+    if angles[0] != 0.0 or not rising or not angles[-1] <= FARTHEST:
+        raise ValueError(
+            f"angles of a prescription must rise from 0 to {FARTHEST:.3g} rad at most (deg times "
+            f"pi / 180), got {list(angles)}"
+        )
     if not all(0.0 < moment < SAFE_MOMENT for moment in moments):
         raise ValueError(
             f"moments of a prescription must lie between 0 and the safe {SAFE_MOMENT:g} N m, got "

@@ -154,15 +154,15 @@ PACED = Population(
 )
 """People whom the device sets the pace.
 
-Strength: young adults scatter by about 24 % (200 +- 47 N m in men, Arthroscopy, Sports Medicine and
-Rehabilitation 2024), women have about 0.72 of it, and two weeks in bed take 15 % (U. Marusic and
-others 2021). Reaction: 0.21 s to a light (D. L. Woods and others 2015, Frontiers in Human
+Strength: young adults scatter by about 24 % (200 +- 47 N m in men, Arthroscopy, Sports Medicine
+and Rehabilitation 2024), women have about 0.72 of it, and two weeks in bed take 15 % (U. Marusic
+and others 2021). Reaction: 0.21 s to a light (D. L. Woods and others 2015, Frontiers in Human
 Neuroscience 9, 131); that people differ by so much is an assumption. Rise: a pulse takes 0.1 s, an
 unhurried one longer; an assumption. Unsteadiness: 2-4 % of the moment (B. L. Tracy and R. M. Enoka
-2002, Journal of Applied Physiology 92, 1004, from memory). Tremor: 8-12 Hz; its size is an
-assumption. Fatigue: L. Ma and others 2009, International Journal of Industrial Ergonomics 39, 211,
-with 1 in a minute, 0.5 of it the spread between men (at the shoulder; none was found of the knee).
-Effort and stiffness are assumptions: somebody who pushes and is moved.
+2002, Journal of Applied Physiology 92, 1004, from memory; here from 1.5 % on). Tremor: 8-12 Hz;
+its size is an assumption. Fatigue: L. Ma and others 2009, International Journal of Industrial
+Ergonomics 39, 211, with 1 in a minute, 0.5 of it the spread between men (at the shoulder; none was
+found of the knee). Effort and stiffness are assumptions: somebody who pushes and is moved.
 """
 
 PACING = Population(

@@ -16,7 +16,16 @@ from pma_gym.plant.exercise import own_device, resistive_moment
 from pma_gym.plant.knee import knee_share
 from pma_gym.plant.model import load_model
 from pma_gym.plant.prescription import UnreachableError
-from pma_gym.tasks import EXERCISES, PACE, PACED, PACING, Human, Mind, phase_rmse
+from pma_gym.tasks import (
+    EXERCISES,
+    PACE,
+    PACED,
+    PACING,
+    Human,
+    Mind,
+    moment_exercise,
+    phase_rmse,
+)
 from pma_gym.tasks.human import FORESIGHT_S, moved
 
 EXACT = PACED.typical._replace(effort=1.0, unsteadiness=0.0, tremor=0.0, fatigue=0.0, stiffness=0.0)
@@ -314,14 +323,28 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
 @pytest.mark.parametrize(
     ("task", "options", "message"),
     [
-        ("isotonic_exercise_20", {}, r"at 525 kPa one moment can be held .* from \d.* to \d.* N m"),
+        (
+            "isotonic_exercise_20",
+            {},
+            r"at 525 kPa, where one moment can be held .* from \d.* to \d",
+        ),
         ("isotonic_exercise_99", {}, r"must lie between 0 and the safe 24 N m, got \[99.0\]"),
         ("isokinetic_exercise", {"control_rate_hz": 20.0}, "at least 50 Hz .* got 20 Hz"),
         ("isotonic_exercise", {"preview": 3}, "goes by the angle: leave the option out, got 3"),
         ("isokinetic_exercise", {"model": "cascade"}, "needs the model of a station"),
-        ("isokinetic_exercise", {"human": "strong"}, "human must be one of random, typical, got"),
+        (
+            "isokinetic_exercise",
+            {"human": "strong"},
+            r"human must be one of random, typical or a pma_gym.tasks.Human",
+        ),
         ("isokinetic_exercise", {"safety": 1}, "safety must be true or false, got 1"),
-        ("rotation", {"human": "typical"}, "human is the operator of an exercise, and task rotat"),
+        (
+            "rotation",
+            {"human": "typical"},
+            "human is of the operator of an exercise, and task rot",
+        ),
+        ("rotation", {"safety": False}, "safety is of the operator of an exercise, and task rot"),
+        ("isokinetic_exercise", {"pressure_kpa": 150}, "must lie in .* reaches 90 deg, got 150"),
         ("isokinetic_exercise", {"regulator_action": True}, "is the regulator's already"),
         (
             "isokinetic_exercise",
@@ -344,9 +367,39 @@ def test_a_refused_moment_has_its_range():
 
 def test_pressures_of_an_episode_are_checked_too():
     env = PMAEnv("isotonic_exercise", pressure_kpa=550)
-    with pytest.raises(UnreachableError, match="at 200 kPa no one moment can be held"):
+    with pytest.raises(UnreachableError, match="at 200 kPa, where no one moment can be held"):
         env.reset(options={"pressure_kpa": 200})
     env.reset(options={"pressure_kpa": 575})
+
+
+@pytest.mark.parametrize(
+    ("angles", "moments", "pressures", "message"),
+    [
+        (
+            [0.0],
+            [5.0],
+            (450, 550),
+            r"in 150000-575000 Pa \(kPa times 1000\).* got \(450, 550\)",
+        ),
+        ([0.0], [5.0], (550e3, 450e3), "the lower first"),
+        ([0.0, 90.0], [5.0, 8.0], (450e3, 550e3), r"to 2.09 rad at most \(deg times pi / 180\)"),
+        ([0.0, math.nan], [5.0, 8.0], (450e3, 550e3), "must rise from 0"),
+        ([0.0, 1.0], [5.0], (450e3, 550e3), "got 1 moments and 2 angles"),
+    ],
+)
+def test_slips_in_a_task_of_ones_own_are_told(angles, moments, pressures, message):
+    with pytest.raises(ValueError, match=message):
+        moment_exercise(angles, moments, pressures)
+
+
+def test_a_task_of_ones_own_takes_arrays():
+    mine = moment_exercise(np.radians([0, 90]), np.array([5, 8]), (450e3, 550e3))
+    env = PMAEnv(mine)
+    assert env.human is None
+    env.reset(seed=1)
+    assert env.task.exercise.prescription.at(math.radians(45.0)) == pytest.approx(6.5)
+    with pytest.raises(AttributeError, match="collect info"):
+        _ = env.motor_voltages
 
 
 def test_an_id_makes_it():
