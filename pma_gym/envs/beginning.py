@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.circuit import DISTURB, DRAW
 from pma_gym.envs.options import Options, Pressure
+from pma_gym.envs.record import DISTURB, DRAW
 from pma_gym.kernels.random import philox, uniform
 from pma_gym.plant import settle
 from pma_gym.plant.model import Model

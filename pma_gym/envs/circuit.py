@@ -11,7 +11,7 @@ from functools import cached_property
 from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.envs.exercised import Exercised, held_volts
 from pma_gym.envs.observation import BOUND, ObservationTable, Prescribed, heard_position
-from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH, Record
+from pma_gym.envs.record import NOISE, OPERATOR, PARTS, START, TRUTH, Record
 from pma_gym.envs.scoring import position_of
 from pma_gym.kernels.generic import to_real, where
 from pma_gym.kernels.graph import CHANGING, HELD, Graph, Value
@@ -23,10 +23,6 @@ from pma_gym.plant.compose import COMMANDS, ZERO, Equations
 from pma_gym.plant.program import at_rest
 from pma_gym.tasks import PULSE_S, REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
-
-NOISE, TARE, DRAW, DISTURB = 0, 1, 2, 3
-"""Streams of random numbers: sensors in a step, sensors at rest, what an episode begins with, what
-disturbs it."""
 
 FORCE_OF_A_VOLT = 100.0
 """Jump of the operator's force (N) after which steps begin as small as after one of 1 V: about what

@@ -4,8 +4,8 @@ A number of all environments lies side by side, so that threads beside each othe
 other.
 """
 
-from pma_gym.envs.circuit import DRAW
 from pma_gym.envs.kernel import Plan, Writer, narrowed
+from pma_gym.envs.record import DRAW
 from pma_gym.kernels.control import DOUBLE, FLOAT, INDEX, INTEGER, Builder, Operand, integer, offset
 from pma_gym.kernels.graph import Kind, Value
 from pma_gym.kernels.llvm import Lanes

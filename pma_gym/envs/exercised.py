@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.envs.observation import Prescribed
-from pma_gym.envs.record import GUARDED
+from pma_gym.envs.record import GUARDED, NOISE, plan_of_places
 from pma_gym.kernels.generic import to_real, where
 from pma_gym.kernels.graph import Value
 from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
@@ -16,9 +16,6 @@ from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
     from pma_gym.envs.circuit import Circuit
-
-NOISE = 0
-"""Stream of a step's random numbers, which people share with the sensors."""
 
 
 def held_volts(volts: Value) -> Value:
@@ -50,12 +47,7 @@ class Exercised:
     @property
     def plan(self) -> Plan:
         """Moment that the exercise takes over the angle, as he knows it, as inputs."""
-        knots, slot = self.exercise.knots, self.circuit.slot
-        return Plan(
-            slot("plan_first"),
-            [slot(f"plan_angle_{i}") for i in range(knots)],
-            [slot(f"plan_slope_{i}") for i in range(knots - 1)],
-        )
+        return plan_of_places(self.circuit.slot, self.exercise)
 
     @property
     def prescribed(self) -> Prescribed | None:

@@ -6,9 +6,9 @@ from typing import Protocol
 
 from llvmlite import ir
 
-from pma_gym.envs.circuit import TARE, Circuit
+from pma_gym.envs.circuit import Circuit
 from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.record import Record
+from pma_gym.envs.record import TARE, Record
 from pma_gym.envs.scoring import COURSE, Course, Sampling, course, sampling
 from pma_gym.kernels.control import (
     DOUBLE,

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.circuit import DRAW
 from pma_gym.envs.options import Options, Pressure
+from pma_gym.envs.record import DRAW
 from pma_gym.plant.exercise import FULL_ANGLE, own_device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model
 from pma_gym.plant.prescription import Miss, UnreachableError, constant_moments, follow_from

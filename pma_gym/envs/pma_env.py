@@ -466,9 +466,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         found = summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}
         if self.task.exercise is None:
             return found
-        counts = {"count": np.array([self._count])}
-        numbers = {name: np.array([self._number(name)]) for name in exercise_places()[1:]}
-        other = exercise_summaries(counts | numbers, self.options.period)
+        numbers = {name: np.array([self._number(name)]) for name in exercise_places()}
+        other = exercise_summaries(numbers, np.array([self._count]), self.options.period)
         return found | {name: float(values[0]) for name, values in other.items()}
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]

@@ -1,12 +1,13 @@
 """What an environment remembers between two steps: a row of numbers, in named places."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
 from pma_gym.envs.options import Options
-from pma_gym.kernels.graph import Kind
-from pma_gym.tasks import PACE, Human, Mind, Task
+from pma_gym.kernels.graph import Kind, Value
+from pma_gym.tasks import PACE, Exercise, Human, Mind, Plan, Task
 
 Part = Literal["extension", "rotation", "load", "pressure"]
 PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
@@ -21,6 +22,10 @@ OPERATOR = "memory_operator"
 TRUTH = ("contraction", "rotation", "load", "pressure")
 """True outputs, in the order of the plant's."""
 
+
+NOISE, TARE, DRAW, DISTURB = 0, 1, 2, 3
+"""Streams of random numbers: sensors and an operator in a step, sensors at rest, what an episode
+begins with, what disturbs it."""
 
 PEAKS = ("peak_moment", "peak_speed", "peak_power")
 """Places of the greatest moment at a joint (N m), of its speed (rad/s) and of the power between
@@ -40,6 +45,20 @@ GUARDED = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
 """Places of what the safety layer remembers: the pressure that the nominal regulator has come to
 (Pa), the extension that it heard last (m), the speed that it found (rad/s), the moment of late
 (N m)."""
+
+
+def plan_of_places(number: Callable[[str], Value], exercise: Exercise) -> Plan:
+    """An operator's plan from the numbers at its places (`Record.plan`).
+
+    Args:
+        number: gives the value of a place.
+        exercise: whose plan it is.
+    """
+    return Plan(
+        number("plan_first"),
+        [number(f"plan_angle_{i}") for i in range(exercise.knots)],
+        [number(f"plan_slope_{i}") for i in range(exercise.knots - 1)],
+    )
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from pma_gym.envs.observation import Prescribed
-from pma_gym.envs.record import START
+from pma_gym.envs.record import START, plan_of_places
 from pma_gym.kernels.derivative import derivatives
 from pma_gym.kernels.graph import CHANGING, HELD, Value
 from pma_gym.kernels.substitute import substitute
@@ -70,16 +70,7 @@ def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Valu
 def held_plan(eq: Equations, task: Task) -> Plan:
     """The moment that an exercise prescribes over the angle, as inputs that a step holds."""
     assert task.exercise is not None
-
-    def held(name: str) -> Value:
-        return eq.graph.input(name, HELD)
-
-    knots = task.exercise.knots
-    return Plan(
-        held("plan_first"),
-        [held(f"plan_angle_{i}") for i in range(knots)],
-        [held(f"plan_slope_{i}") for i in range(knots - 1)],
-    )
+    return plan_of_places(lambda name: eq.graph.input(name, HELD), task.exercise)
 
 
 def _rate(eq: Equations, value: Value) -> Value:

@@ -116,16 +116,17 @@ def summaries(
 
 def exercise_places() -> list[str]:
     """Places of what `exercise_summaries` needs."""
-    return ["count", *PEAKS, *WORK, *(f"pace_{phase.name}" for phase in PACE.phases)]
+    return [*PEAKS, *WORK, *(f"pace_{phase.name}" for phase in PACE.phases)]
 
 
 def exercise_summaries(
-    numbers: Mapping[str, NDArray[np.float64]], period: float
+    numbers: Mapping[str, NDArray[np.float64]], counts: NDArray[np.int64], period: float
 ) -> dict[str, NDArray[np.float64]]:
     """What exercises came to beside their RMSE, at the door.
 
     Args:
         numbers: of `exercise_places` by name, shape (m,) each.
+        counts: control steps so far, shape (m,).
         period: of the control steps (s).
     Returns:
         By name, shape (m,): `pace_rmse_deg` of the angle against its ideal line, over all phases;
@@ -134,7 +135,7 @@ def exercise_summaries(
     """
     degree = SI_FACTORS["deg"]
     last = round(PACE.duration / period)
-    steps = np.minimum(numbers["count"], last)
+    steps = np.minimum(counts, last)
     squares = sum(numbers[f"pace_{phase.name}"] for phase in PACE.phases)
     return {
         "pace_rmse_deg": np.sqrt(squares / np.maximum(steps, 1)) / degree,

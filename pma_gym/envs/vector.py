@@ -265,9 +265,9 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         found = {name: values[indices] for name, values in self.station_info().items()}
         found |= summaries(self.task, sums, engine.numbers("sample")[indices])
         if self.task.exercise:
-            numbers = {name: engine.numbers(name)[indices] for name in exercise_places()[1:]}
-            numbers["count"] = engine.counts()[indices].astype(np.float64)
-            found |= exercise_summaries(numbers, self.options.period)
+            numbers = {name: engine.numbers(name)[indices] for name in exercise_places()}
+            counts = engine.counts()[indices]
+            found |= exercise_summaries(numbers, counts, self.options.period)
         codes = engine.numbers("ended")[indices].tolist()
         exercise, pairs = self.task.exercise, zip(indices, codes, strict=True)
         limits = [limit_in_words(engine.models[i], code, exercise) for i, code in pairs]
