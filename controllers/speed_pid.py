@@ -42,8 +42,8 @@ class SpeedPID:
 
     The sum waits while the pressure does not come to what was commanded (`Arrival`): the regulator
     gives no more, or the environment's safety layer lets no more through. Else it would grow all
-    the time that a slow operator needs to catch up: without it errors were 7, 37 and 4 %
-    larger by phase (64 operators, nominal station, gains close to these).
+    the time that a slow operator needs to catch up: without it errors are 16, 47 and 6 %
+    larger by phase (48 operators of seeds from 7000000 on, nominal station).
 
     Args:
         gains: its gains.

@@ -11,11 +11,11 @@ nominal device, and holds the pressure that is asked for within
 P is the pressure that the nominal regulator has come to by what was let through before: a pressure
 by the transducer, whose error the layer would follow, would drift. v is the joint's speed, M its
 moment, M_slow the moment of late, which is what the operator gives, and h the change of the moment
-by the pressure, linear in the angle. A pressure that falls lets the operator run ahead, one that rises pulls
-his leg back. What is let through is what would bring the joint, from its speed and with the moment
-that is not balanced yet, to the share s of the safe speed within I / b, I the leg's inertia. The
-pressure never falls so far that the cable would hang slack, which would let him run without any
-resistance. Where moment and speed disagree the moment counts.
+by the pressure, linear in the angle. A pressure that falls lets the operator run ahead, one that
+rises pulls his leg back. What is let through is what would bring the joint, from its speed and
+with the moment that is not balanced yet, to the share s of the safe speed within I / b, I the
+leg's inertia. The pressure never falls so far that the cable would hang slack, which would let him
+run without any resistance. Where moment and speed disagree the moment counts.
 
 Source:
     Our own. The form is that of a control barrier function (A. D. Ames and others 2017, "Control
