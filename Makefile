@@ -8,7 +8,7 @@ PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 
-EXTRAS = rl,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
+EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
 CORE = $(VENV)/.core-installed
 FULL = $(VENV)/.all-installed
