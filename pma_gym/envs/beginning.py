@@ -11,6 +11,7 @@ from pma_gym.kernels.random import philox, uniform
 from pma_gym.plant import settle
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.program import Program
 from pma_gym.tasks import Events, Task
 
 Settled = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -63,10 +64,17 @@ def holding_voltages(
     return np.array([regulator_voltage(model, pressure) for model, pressure in pairs])
 
 
+KEPT = 4096
+"""How many stations at rest are kept: who trains on drawn stations meets each again and again."""
+
+_KEPT: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
+
+
 def settled_at_no_load(
     nominal: Plant,
     models: Sequence[Model],
     pressures: NDArray[np.float64],
+    regulator: NDArray[np.float64],
     vectors: NDArray[np.float64] | None,
 ) -> Settled:
     """Stations at rest with 0 V on the motor.
@@ -75,17 +83,35 @@ def settled_at_no_load(
         nominal: the plant of the nominal model.
         models: each station's model.
         pressures: gauge pressures (Pa), shape (m,).
+        regulator: regulator voltages that hold them (V), shape (m,).
         vectors: the models' numbers, shape (m, numbers); None if all are nominal.
+    Raises:
+        ValueError: no contraction balances the drive's load.
     """
     found = settle.at_no_load(nominal, pressures, vectors)
     if found is not None:
         return found
-    conditions = []
-    for model, pressure in zip(models, pressures.tolist(), strict=True):
-        plant = nominal if model is nominal.model else Plant(model)
-        conditions.append(plant.settle(motor_voltage=0.0, pressure=pressure))
-    zero = np.array([condition.zero_contraction for condition in conditions])
-    return np.array([condition.state for condition in conditions]), zero
+    numbers = np.tile(nominal.vector, (len(models), 1)) if vectors is None else vectors
+    keys = [
+        (nominal.program, row.tobytes(), volts)
+        for row, volts in zip(numbers, regulator.tolist(), strict=True)
+    ]
+    # By what a rest depends on. Those that are asked for twice at once are searched for once.
+    new = {key: i for i, key in enumerate(keys) if key not in _KEPT}
+    fresh: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
+    if new:
+        at = list(new.values())
+        rested = settle.all_at_rest(nominal, np.zeros(len(at)), regulator[at], numbers[at])
+        fresh = dict(zip(new, zip(*rested, strict=True), strict=True))
+    for key, (state, zero) in fresh.items():
+        if np.isnan(zero) or np.isnan(state).any():
+            # Says what does not balance.
+            Plant(models[new[key]]).settle(motor_voltage=0.0, regulator_voltage=key[2])
+    all_of = [fresh.get(key) or _KEPT[key] for key in keys]
+    for key in list(_KEPT)[: max(len(_KEPT) + len(fresh) - KEPT, 0)]:
+        del _KEPT[key]
+    _KEPT.update(fresh)
+    return np.array([state for state, _ in all_of]), np.array([zero for _, zero in all_of])
 
 
 def settled_under_load(

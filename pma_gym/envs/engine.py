@@ -262,7 +262,7 @@ class Engine:
     ) -> Settled:
         models = [self.models[i] for i in indices.tolist()]
         if not self.rest_motor:
-            return settled_at_no_load(self.nominal, models, pressures, vectors)
+            return settled_at_no_load(self.nominal, models, pressures, regulator, vectors)
         held = self.rest_motor, regulator, pressures, vectors
         states, zero = settled_under_load(self.nominal, *held)
         if self.task.exercise:

@@ -106,6 +106,11 @@ class Program:
         self._functions()
 
     @cached_property
+    def places(self) -> dict[str, int]:
+        """Where a model's vector has which number; the tolerance comes first."""
+        return {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
+
+    @cached_property
     def held(self) -> System:
         """The system with commands held."""
         return system(self.model, ramped=False)
@@ -155,9 +160,8 @@ class Program:
 
         The vector begins with the tolerance.
         """
-        places = {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
         return {
-            value.id: builder.load(offset(builder, vector, places[value.data]), typ=DOUBLE)
+            value.id: builder.load(offset(builder, vector, self.places[value.data]), typ=DOUBLE)
             for value in live_inputs(values)
             if value.level == FIXED
         }
@@ -233,9 +237,8 @@ class Program:
             [("count", INTEGER), ("pressures", POINTER), ("loads", POINTER)]
             + [("vectors", POINTER), ("stride", INTEGER), ("out", POINTER)],
         )
-        names = parameter_names(self.model)
         stretch, contraction = (
-            names.index(f"limits.{name}") + 1 for name in ("stretch", "contraction")
+            self.places[f"limits.{name}"] for name in ("stretch", "contraction")
         )
         with loop(b, count) as row:
             vector = offset(b, vectors, b.mul(row, stride))

@@ -7,7 +7,6 @@ import numpy as np
 
 from pma_gym.effects.effect import signals
 from pma_gym.effects.hanging_load import GRAVITY
-from pma_gym.plant.program import parameter_names
 
 if TYPE_CHECKING:
     from pma_gym.plant.plant import Plant
@@ -431,6 +430,5 @@ def at_no_load(
 def _columns(plant: "Plant", vectors: np.ndarray | None, effect: str) -> dict[str, np.ndarray]:
     """An effect's parameters, one each or one for all."""
     numbers = plant.vector[None, :] if vectors is None else vectors
-    names = parameter_names(plant.model)
-    fields = plant.model.parameters[effect]._fields
-    return {field: numbers[:, 1 + names.index(f"{effect}.{field}")] for field in fields}
+    fields, places = plant.model.parameters[effect]._fields, plant.program.places
+    return {field: numbers[:, places[f"{effect}.{field}"]] for field in fields}

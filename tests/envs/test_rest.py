@@ -1,0 +1,68 @@
+"""Stations at rest when an episode begins: in a batch as alone, kept as searched anew."""
+
+import numpy as np
+import pytest
+
+from benchmarks.training.stations import Stations
+from pma_gym.envs import PMAVectorEnv, beginning
+from pma_gym.envs.beginning import holding_voltages, settled_at_no_load
+from pma_gym.plant.plant import Plant, vector
+
+PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
+
+
+@pytest.fixture(scope="module")
+def drawn():
+    stations = Stations("robust", 0, 3)
+    models = [stations.of(0), stations.of(1), stations.of(2), stations.of(1)]
+    return Plant(stations.structure), models
+
+
+@pytest.fixture(autouse=True)
+def nothing_kept(monkeypatch):
+    monkeypatch.setattr(beginning, "_KEPT", {})
+
+
+def begun(nominal, models, pressures=PRESSURES):
+    numbers = np.array([vector(model, nominal.tolerance) for model in models])
+    return settled_at_no_load(
+        nominal, models, pressures, holding_voltages(models, pressures), numbers
+    )
+
+
+def test_each_rests_as_its_own_plant_does_first_and_again(drawn):
+    for _ in range(2):
+        states, zeros = begun(*drawn)
+        for model, pressure, state, zero in zip(drawn[1], PRESSURES, states, zeros, strict=True):
+            rest = Plant(model).settle(0.0, float(pressure))
+            assert rest.state.tobytes() == state.tobytes() and rest.zero_contraction == zero
+
+
+def test_equal_stations_at_equal_pressures_are_searched_for_once(drawn):
+    begun(*drawn)
+    assert len(beginning._KEPT) == 3
+
+
+def test_the_oldest_go_first(drawn, monkeypatch):
+    monkeypatch.setattr(beginning, "KEPT", 3)
+    nominal, models = drawn
+    begun(nominal, models[:2], PRESSURES[:2])
+    first = next(iter(beginning._KEPT))
+    begun(nominal, models[:2], 1.5 * PRESSURES[:2])
+    assert len(beginning._KEPT) == 3 and first not in beginning._KEPT
+
+
+def test_what_does_not_balance_is_named(drawn):
+    nominal, models = drawn
+    strong = models[0].replace({"sarosi_force.offset_n": 2e3})
+    with pytest.raises(ValueError, match="balances a load"):
+        begun(nominal, [strong], PRESSURES[:1])
+
+
+def test_episodes_do_not_tell_whether_a_rest_was_kept():
+    stations = Stations("robust", 0, 2)
+    options = {"randomisation": stations, "model": stations.structure}
+    envs = PMAVectorEnv(4, "displacement", pressure_kpa=[150.0, 300.0], **options)
+    first, _ = envs.reset(seed=3)
+    again, _ = envs.reset(seed=3)
+    assert beginning._KEPT and first.tobytes() == again.tobytes()
