@@ -2,8 +2,9 @@
 
 The loop is that of the nominal plant, linearised near rest at a place of the stroke, sampled at the
 control rate with the sensor's lag and all delays in it (`benchmarks.tuning.plant`), and of the
-controller's own linear law (`controllers.controller.LinearController`). What is not in it: voltage
-limits, feed-forward, hysteresis and dry friction, and how gains change as the reference moves.
+controller's own linear law (`controllers.controller.LinearController`). The task's actuator, motor
+or regulator, closes it. What is not in it: voltage limits, feed-forward, hysteresis and dry
+friction, and how gains change as the reference moves.
 """
 
 import math
@@ -58,15 +59,18 @@ class Loop(NamedTuple):
         name: of the controller.
         share: place, as a share of the stroke.
         direction: of the motion.
-        plant: measured position (m or rad) by voltage (V).
+        plant: measured position (m or rad) by the actuator's voltage (V).
+        load: measured position (m or rad) by the motor's voltage (V), through which loads come; of
+            a loop of the motor the plant again.
         law: voltage (V) by error (m or rad).
-        margins: of the two, closed by negative feedback.
+        margins: of plant and law, closed by negative feedback.
     """
 
     name: str
     share: float
     direction: str
     plant: control.StateSpace
+    load: control.StateSpace
     law: control.StateSpace
     margins: Margins
 
@@ -89,7 +93,7 @@ class Condition(NamedTuple):
 
     @property
     def pictured(self) -> list[Loop]:
-        """Loops in the middle of the stroke, as the motor pulls."""
+        """Loops in the middle of the stroke, in the first direction of motion."""
         found = [loop for loop in self.everywhere if loop.share == MIDDLE]
         return [loop for loop in found if loop.direction == found[0].direction]
 
@@ -117,12 +121,12 @@ def loops(
     linear = [each for each in controllers if isinstance(each, LinearController)]
     found = []
     for place in _different(linearised(station, shares)):
-        plant = sampled(place, station)
+        plant, load = sampled(place, station), sampled(place, station, "motor")
         for each in linear:
             law = each.linear(station, place.share * station.task.protocol.span)
             check_law(each.name, law, station.period)
             known = margins(plant, law)
-            found.append(Loop(each.name, place.share, place.direction, plant, law, known))
+            found.append(Loop(each.name, place.share, place.direction, plant, load, law, known))
     return found
 
 
@@ -220,9 +224,12 @@ def reference_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
 
 
 def load_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
-    """Times (s) and measured position (m or rad) after a disturbance of 1 V at the actuator."""
-    law: Any = loop.law
-    return _step(control.feedback(loop.plant, law), duration)
+    """Times (s) and measured position (m or rad) after a step of 1 V of the motor's voltage.
+
+    The law says nothing about that volt: a load that the motor could have made.
+    """
+    held: Any = control.feedback(1, loop.plant * loop.law)
+    return _step(held * loop.load, duration)
 
 
 def _step(system: Any, duration: float) -> tuple[NDArray, NDArray]:  # noqa: ANN401

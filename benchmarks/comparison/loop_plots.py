@@ -32,6 +32,25 @@ STEP_S = 1.0
 LOAD_N = 50.0
 """Load step that is pictured (N): the size of an operator's pulse in suite `hard`."""
 
+COLUMN_IN, AXIS_IN = 3.4, 0.8
+"""Width of a pressure's panels, and of what stands beside them all (inches)."""
+
+
+def loop_title(found: Sequence[Condition]) -> str:
+    """What people call the task of loops: its name, and the load that the regulator works against.
+
+    >>> from pma_gym.plant.model import load_model
+    >>> from pma_gym.tasks import EVERY_TASK
+    >>> nominal = load_model("station")
+    >>> for name in ("rotation", "triangle_low"):
+    ...     print(loop_title([Condition(Station(nominal, EVERY_TASK[name], 3e5, 0.01), [])]))
+    Rotation
+    Triangle low, against 150 N
+    """
+    task = found[0].station.task
+    words = capital(task.name.replace("_", " "))
+    return f"{words}, against {task.load:g} N" if task.actuator == "regulator" else words
+
 
 def margin_table(found: Sequence[Condition], labels: Labels) -> TextTable:
     """The least margins over the stroke of every controller at every pressure."""
@@ -44,8 +63,7 @@ def margin_table(found: Sequence[Condition], labels: Labels) -> TextTable:
             mine = [loop for loop in condition.everywhere if loop.name == name]
             if mine:
                 rows.append([labels.get(name, name), *_margin_cells(condition, mine)])
-    task = capital(found[0].station.task.name)
-    title = f"{task}: least margins at 5, 50 and 95 % of the stroke"
+    title = f"{loop_title(found)}: least margins at 5, 50 and 95 % of the stroke"
     return TextTable(title, header, rows)
 
 
@@ -69,7 +87,7 @@ def _margin_cells(condition: Condition, mine: Sequence[Loop]) -> list[str]:
 def loop_plot(found: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
     """Bode plots and step responses: a column a pressure."""
     unit = found[0].station.task.protocol.unit
-    with picture(11.0, 11.2) as canvas:
+    with picture(COLUMN_IN * len(found) + AXIS_IN, 11.2) as canvas:
         axes: Any = canvas.subplots(4, len(found), sharex="row", sharey="row", squeeze=False)
         for column, condition in zip(axes.T, found, strict=True):
             for loop in condition.pictured:
@@ -98,7 +116,7 @@ def loop_plot(found: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
             Line2D([], [], color=styles[n].color, linestyle=styles[n].line, label=styles[n].label)
             for n in names
         ]
-        legend_below(canvas, handles, min(len(handles), 6))
+        legend_below(canvas, handles, min(len(handles), 2 * len(found)))
         return png(canvas)
 
 

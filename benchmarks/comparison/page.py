@@ -3,7 +3,7 @@
 from benchmarks.comparison.errors import PERCENT, is_bound, task_of
 from benchmarks.comparison.fingerprint import code_digest
 from benchmarks.comparison.leaderboard import Leaderboard
-from benchmarks.comparison.loop_plots import loop_plot, margin_table
+from benchmarks.comparison.loop_plots import loop_plot, loop_title, margin_table
 from benchmarks.comparison.plots import (
     distribution_plot,
     improvement_plot,
@@ -226,7 +226,7 @@ def _loop_blocks(leaderboard: Leaderboard) -> list[Block]:
     blocks: list[Block] = [Heading("For the engineer: loops and margins"), Paragraph(text)]
     for task, found in leaderboard.loops.items():
         caption = (
-            f"{capital(task)}: Bode plot of the loop in the middle of the stroke, response to "
+            f"{loop_title(found)}: Bode plot of the loop in the middle of the stroke, response to "
             "a step of the reference and to a step of the load; unstable loops have no step."
         )
         blocks += [margin_table(found, leaderboard.labels), Picture(f"loops_{task}", caption)]

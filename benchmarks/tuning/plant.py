@@ -13,6 +13,7 @@ from pma_gym.envs import Station
 from pma_gym.envs.options import motor_at_rest
 from pma_gym.plant.linear import linearize_at, operating_point
 from pma_gym.plant.plant import Condition, Plant
+from pma_gym.tasks import Actuator
 
 SENSORS = {"extension": "lvdt", "rotation": "potentiometer", "contraction": "lvdt"}
 """Sensor by what is followed."""
@@ -88,14 +89,19 @@ def _contracted(
     return plant.settle(motor, regulator_voltage=voltage), (motor, voltage)
 
 
-def sampled(place: Place, station: Station) -> control.StateSpace:
-    """Measured position (m or rad) by the actuator's voltage (V) in discrete time, delays in it.
+def sampled(place: Place, station: Station, actuator: Actuator | None = None) -> control.StateSpace:
+    """Measured position (m or rad) by an actuator's voltage (V) in discrete time, delays in it.
 
     The voltage is held over each period; the sensor's lag and the station's delays of actions and
     readings are part of the plant.
+
+    Args:
+        place: the plant there.
+        station: its task, sensors, period and delays.
+        actuator: whose voltage; the task's if None.
     """
     quantity = station.task.protocol.quantity
-    one: Any = place.system[quantity, f"{station.task.actuator}_voltage"]
+    one: Any = place.system[quantity, f"{actuator or station.task.actuator}_voltage"]
     sensor = station.model.parameters.get(SENSORS[quantity])
     if sensor is not None:
         one = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0]) * one
