@@ -320,14 +320,17 @@ def design(
     again: Annotated[
         bool, typer.Option(help="Also what the file has already; else only what is missing.")
     ] = False,
+    only: Annotated[
+        str, typer.Option(help="Designs by suite and kind of task, such as 'hard/*'.")
+    ] = "*",
 ) -> None:
     """Search the settings of controllers on training stations; without --out, the shipped file."""
-    from benchmarks.design import DesignError, run_design
+    from benchmarks.design import run_design
     from controllers.designs import DESIGNS_FILE
 
     try:
-        complete = run_design(_listed(controllers), out or DESIGNS_FILE, seed, jobs, again)
-    except DesignError as error:
+        complete = run_design(_listed(controllers), out or DESIGNS_FILE, seed, jobs, again, only)
+    except ValueError as error:
         _refuse(error)
     raise typer.Exit(0 if complete else INTERRUPTED)
 

@@ -15,14 +15,16 @@ For every controller with settings, loop and kind of task:
 
 Training stations are drawn with a seed of their own: no suite scores them. The same seed gives the
 same settings on the same machine and versions. Every search that ends is written at once; the same
-command goes on with those that are missing.
+command goes on with those that are missing. Single designs are made anew by `--again` with
+`--controllers lqg,mpc`, `--only 'hard/*'` or both; all others stay as they are.
 """
 
+import difflib
 import inspect
 import json
 import math
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -38,6 +40,8 @@ from benchmarks.comparison.suite import FrozenSuite, frozen_suite
 from benchmarks.files import write_text
 from benchmarks.processes import run_all
 from benchmarks.rollout import Rollout, rollout
+from benchmarks.tune import CONTROLLERS as TUNED
+from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from controllers import CONTROLLERS
 from controllers.designs import KINDS, SCHEMA, loop_name
@@ -83,7 +87,12 @@ class Search:
     @property
     def name(self) -> str:
         """What tells it from the others."""
-        return f"{self.controller}/{self.suite}/{self.kind}"
+        return f"{self.controller}/{self.table}"
+
+    @property
+    def table(self) -> str:
+        """Suite and kind of task, as `only` names them: `hard/rotation`."""
+        return f"{self.suite}/{self.kind}"
 
 
 @dataclass(frozen=True)
@@ -113,7 +122,9 @@ class _Drill:
     seed: int
 
 
-def run_design(controllers: list[str], out: Path, seed: int, jobs: int, again: bool) -> bool:
+def run_design(
+    controllers: list[str], out: Path, seed: int, jobs: int, again: bool, only: str = "*"
+) -> bool:
     """Search the settings of controllers and write them; those of others stay.
 
     Args:
@@ -122,15 +133,19 @@ def run_design(controllers: list[str], out: Path, seed: int, jobs: int, again: b
         seed: of the noise.
         jobs: processes.
         again: also what the file has already.
+        only: which designs, by suite and kind of task: patterns such as `hard/*` by commas.
     Returns:
         Whether all of it was done; Ctrl-C leaves what is done in the file.
     Raises:
-        DesignError: a controller without settings.
+        ValueError: a pattern matches nothing.
+        DesignError: a controller without settings, a broken file, or a search that failed.
     """
     document = _read(out)
-    searches = list(_searches(controllers or designable(), seed))
-    if not again:
-        searches = [s for s in searches if s.name not in document["provenance"]]
+    asked = searches_of(controllers or designable(), seed, only)
+    searches = [s for s in asked if again or s.name not in document["provenance"]]
+    if len(searches) < len(asked):
+        there = len(asked) - len(searches)
+        print(f"{out} has {there} of {len(asked)} designs asked for; --again makes them anew")
     with Progress() as progress:
         bar = progress.add_task("Designing", total=len(searches))
 
@@ -160,17 +175,40 @@ def _bounds(controller: str) -> Mapping[str, tuple[float, float]]:
     return getattr(inspect.getmodule(CONTROLLERS[controller]), "BOUNDS", {})
 
 
-def _searches(controllers: list[str], seed: int) -> Iterator[Search]:
-    for controller in controllers:
-        if controller not in CONTROLLERS or not _bounds(controller):
-            raise DesignError(
-                f"{controller!r} has no settings to search; those that have: "
-                f"{', '.join(designable())}"
-            )
-        for suite in SUITES:
-            quantities = {_task_quantity(name) for name in frozen_suite(suite).tasks}
-            for kind in sorted(KINDS[quantity] for quantity in quantities):
-                yield Search(controller, suite, kind, seed)
+def searches_of(controllers: Iterable[str], seed: int, only: str = "*") -> list[Search]:
+    """The searches of controllers, each once, in the suites and kinds of task that patterns match.
+
+    Raises:
+        ValueError: a pattern matches nothing.
+        DesignError: a controller that has no settings, or that there is not.
+    """
+    names = list(dict.fromkeys(controllers))
+    for name in names:
+        _check_designable(name)
+    found = [search for name in names for search in _searches(name, seed)]
+    wanted = chosen((search.table for search in found), only)
+    return [search for search in found if search.table in wanted]
+
+
+def _check_designable(controller: str) -> None:
+    known = designable()
+    if controller in known:
+        return
+    near = difflib.get_close_matches(controller, known, 1)
+    mend = f"; did you mean {near[0]}?" if near else ""
+    if controller in TUNED:
+        mend = "; its gains are tuned: python -m benchmarks tune"
+    raise DesignError(
+        f"controllers must have settings to search, got {controller!r}; there are "
+        f"{', '.join(known)}{mend}"
+    )
+
+
+def _searches(controller: str, seed: int) -> Iterator[Search]:
+    for suite in SUITES:
+        quantities = {_task_quantity(name) for name in frozen_suite(suite).tasks}
+        for kind in sorted(KINDS[quantity] for quantity in quantities):
+            yield Search(controller, suite, kind, seed)
 
 
 def _task_quantity(task: str) -> str:
@@ -281,7 +319,12 @@ def _training(suite: FrozenSuite, number: int) -> Model:
 def _read(path: Path) -> dict[str, Any]:
     document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
     if path.exists():
-        document |= json.loads(path.read_text(encoding="utf-8"))
+        try:
+            document |= json.loads(path.read_text(encoding="utf-8"))
+        except (ValueError, TypeError) as error:
+            raise DesignError(
+                f"{path} is no file of settings ({error}); delete it or name another"
+            ) from error
     if document["schema"] != SCHEMA:
         raise DesignError(f"{path} must have schema {SCHEMA}; delete it or name another")
     return document

@@ -28,7 +28,6 @@ Rows that are done are kept in a file beside that of the gains; after Ctrl-C the
 on from there.
 """
 
-import fnmatch
 import hashlib
 import json
 import platform
@@ -44,6 +43,7 @@ from scipy.optimize import minimize
 
 from benchmarks.files import write_text
 from benchmarks.processes import run_all
+from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import Cost
 from benchmarks.tuning.job import Job
 from benchmarks.tuning.kept import KeptRows, name_of
@@ -128,7 +128,7 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
     """The rows of the tables asked for.
 
     Raises:
-        ValueError: there are none.
+        ValueError: a pattern matches none.
     """
     rows = [
         Job(model, task, controller, pressure, seed, rate, delay)
@@ -139,10 +139,7 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
         for controller in CONTROLLERS
         for pressure in pressures
     ]
-    names = {f"{row.loop}/{row.kind}": None for row in rows}
-    wanted = {name for pattern in only.split(",") for name in fnmatch.filter(names, pattern)}
-    if not wanted:
-        raise ValueError(f"only must match a table, got {only!r}; tables: {', '.join(names)}")
+    wanted = chosen((f"{row.loop}/{row.kind}" for row in rows), only)
     return [row for row in rows if f"{row.loop}/{row.kind}" in wanted]
 
 
