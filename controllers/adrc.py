@@ -1,18 +1,14 @@
 """Active disturbance rejection: all that the model does not know is one state, and cancelled."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.designs import designed
+from controllers.lag_control import LagControl
 from controllers.lags import LagObserver, Place
-from controllers.motion import NominalMotion, nominal_motion
-from controllers.pid import VOLTAGE_LIMIT, nominal_offset
-from pma_gym.envs import Reading, Station
-
-if TYPE_CHECKING:
-    import control
+from controllers.motion import NominalMotion
+from controllers.pid import nominal_offset
 
 
 class Settings(NamedTuple):
@@ -42,7 +38,7 @@ DEFAULTS = {
 """Settings by kind of task for what `controllers/designs.json` does not give."""
 
 
-class ADRC:
+class ADRC(LagControl[Settings]):
     """Cancels an estimated disturbance, and is left with a known lag to control.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
@@ -95,41 +91,29 @@ class ADRC:
 
     name = "adrc"
 
-    def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
-
-    def reset(self, reference: Reference, station: Station) -> None:
-        """Compute the gains of all places, and forget everything else."""
-        self._design(nominal_motion(reference, station))
-
     def _design(self, motion: NominalMotion) -> None:
         settings = self._given or designed(self.name, motion.station, DEFAULTS)
         self._motion, self._share = motion, settings.feedforward
         self._bandwidth = settings.controller_bandwidth
         self._offset = nominal_offset(motion.station)
         self._observer = LagObserver(motion, settings.observer_bandwidth)
-        self._feedback = [self._gains(place) for place in self._observer.places]
+        self._feedback = [self._gains_of(place) for place in self._observer.places]
 
-    def _gains(self, place: Place) -> np.ndarray:
+    def _gains_of(self, place: Place) -> np.ndarray:
         """Gains on z at a place: K on (x) or (x, x'), and what cancels d."""
         gains = place.cancelled(self._motion.station.period)
         pole = self._observer.pole(place.lags, self._bandwidth)
         gains[: self._observer.order] = place.feedback(pole)
         return gains
 
-    def act(self, observation: Reading, time: float) -> float:
-        """Voltage (V) of the task's actuator to hold for the next control period."""
-        observer = self._observer
-        ahead = observer.see(observation, time)
-        planned = self._planned(time)
-        wanted = planned - float(self._feedback[observer.at] @ ahead)
-        voltage = min(max(wanted, 0.0), VOLTAGE_LIMIT)
-        observer.send(voltage - planned)
-        return voltage
+    def _gains(self, at: int) -> np.ndarray:
+        return self._feedback[at]
+
+    def _wanted(self, planned: float, z: np.ndarray) -> float:
+        return planned - float(self._feedback[self._observer.at] @ z)
 
     def _planned(self, time: float) -> float:
-        """Feed-forward (V) to send at a time (s)."""
-        whole = self._motion.command(time)
+        whole = super()._planned(time)
         if self._share == 1.0:
             return whole
         station, lags = self._motion.station, self._observer.places[self._observer.at].lags
@@ -137,10 +121,3 @@ class ADRC:
         way = self._motion.planned(begins + station.period) - self._motion.planned(begins)
         moving = self._offset + sum(lags.constants) * way / (station.period * lags.gain)
         return self._share * whole + (1.0 - self._share) * moving
-
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
-        """The feedback near a position (m or rad), without limits: volts by error."""
-        made = ADRC(self._given)
-        made._design(nominal_motion(station.task.protocol.at, station))
-        at = made._observer.nearest(position)
-        return made._observer.linear(at, made._feedback[at])

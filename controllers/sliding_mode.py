@@ -1,18 +1,13 @@
 """Sliding mode control with a boundary layer and a disturbance observer."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from controllers.controller import Reference
 from controllers.designs import designed
+from controllers.lag_control import LagControl
 from controllers.lags import LagObserver, Place
-from controllers.motion import NominalMotion, nominal_motion
-from controllers.pid import VOLTAGE_LIMIT
-from pma_gym.envs import Reading, Station
-
-if TYPE_CHECKING:
-    import control
+from controllers.motion import NominalMotion
 
 
 class Settings(NamedTuple):
@@ -58,7 +53,7 @@ class Surface(NamedTuple):
     switching: np.ndarray
 
 
-class SlidingMode:
+class SlidingMode(LagControl[Settings]):
     """Drives the error to a surface s = 0 on which it dies out, and holds it there.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
@@ -114,13 +109,6 @@ class SlidingMode:
 
     name = "sliding_mode"
 
-    def __init__(self, settings: Settings | None = None) -> None:
-        self._given = settings
-
-    def reset(self, reference: Reference, station: Station) -> None:
-        """Compute the surfaces of all places, and forget everything else."""
-        self._design(nominal_motion(reference, station))
-
     def _design(self, motion: NominalMotion) -> None:
         settings = self._given or designed(self.name, motion.station, DEFAULTS)
         self._motion, self._most = motion, settings.switching
@@ -131,25 +119,14 @@ class SlidingMode:
             for place, pole in zip(observer.places, poles, strict=True)
         ]
 
-    def act(self, observation: Reading, time: float) -> float:
-        """Voltage (V) of the task's actuator to hold for the next control period."""
-        observer, most = self._observer, self._most
-        ahead = observer.see(observation, time)
-        surface = self._surfaces[observer.at]
-        pushed = min(max(float(surface.switching @ ahead), -most), most)
-        planned = self._motion.command(time)
-        wanted = planned - float(surface.equivalent @ ahead) - pushed
-        voltage = min(max(wanted, 0.0), VOLTAGE_LIMIT)
-        observer.send(voltage - planned)
-        return voltage
+    def _gains(self, at: int) -> np.ndarray:
+        # Within the layer.
+        return self._surfaces[at].equivalent + self._surfaces[at].switching
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
-        """The feedback near a position (m or rad) within the layer: volts by error."""
-        made = SlidingMode(self._given)
-        made._design(nominal_motion(station.task.protocol.at, station))
-        at = made._observer.nearest(position)
-        surface = made._surfaces[at]
-        return made._observer.linear(at, surface.equivalent + surface.switching)
+    def _wanted(self, planned: float, z: np.ndarray) -> float:
+        surface, most = self._surfaces[self._observer.at], self._most
+        pushed = min(max(float(surface.switching @ z), -most), most)
+        return planned - float(surface.equivalent @ z) - pushed
 
 
 def _surface(place: Place, pole: float, period: float) -> Surface:
