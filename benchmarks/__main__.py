@@ -155,7 +155,7 @@ def report(
 @app.command()
 def add(
     controller: Annotated[str, typer.Argument(help="path/to/file.py:ClassName")],
-    suite: Annotated[str, typer.Option(help="Suites by commas; all frozen ones if empty.")] = "",
+    suite: Annotated[str, typer.Option(help="Suites by commas; all but `many` if empty.")] = "",
     jobs: Jobs = 2,
     results: Annotated[
         Path, typer.Option(help="Folder with a folder of results for each suite.")
@@ -171,6 +171,7 @@ def add(
 
     try:
         frozen = [frozen_suite(name) for name in _listed(suite) or suite_names()]
+        frozen = [one for one in frozen if suite or not one.only_by_name]
         code = run_add(own_contender(controller), frozen, results, jobs, Console())
     except (ControllerError, SuiteError) as error:
         _refuse(error)

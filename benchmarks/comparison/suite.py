@@ -23,7 +23,7 @@ from pma_gym.tasks import EVERY_TASK, named_task
 SCHEMA = 2
 """Of the files of suites that compare controllers; `reproduction.toml` has schema 1."""
 
-UNFROZEN = ("title", "controllers", "targets")
+UNFROZEN = ("title", "controllers", "targets", "only_by_name")
 """Entries of a suite's file that move no figure: they may change without a new version."""
 
 NOMINAL = -1
@@ -112,6 +112,7 @@ class FrozenSuite:
         entries: who is compared, in the order of the tables.
         targets: what is asked of them.
         digest: of all numbers, controllers and targets apart.
+        only_by_name: whether it is so long that it runs only where it is named.
     """
 
     source: str
@@ -127,6 +128,7 @@ class FrozenSuite:
     entries: tuple[Entry, ...]
     targets: tuple[Target, ...]
     digest: str
+    only_by_name: bool = False
 
     @cached_property
     def episodes(self) -> tuple[Episode, ...]:
@@ -252,6 +254,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         entries=tuple(_entry(entry) for entry in document["controllers"]),
         targets=tuple(parse_target(given) for given in document.get("targets", ())),
         digest=_digest(json.dumps(frozen, sort_keys=True)),
+        only_by_name=document.get("only_by_name", False),
     )
 
 

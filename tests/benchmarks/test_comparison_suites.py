@@ -20,6 +20,7 @@ from pma_gym.plant.model import dump_model, load_model
 FROZEN = {
     "exercise": (1, "49d1beb5bb79f358"),
     "hard": (1, "5d4a45c32d00556d"),
+    "many": (1, "63ad7ef6fdeffd17"),
     "nominal": (1, "70c3860b11692535"),
     "pressure": (1, "9dcd1244347becaf"),
     "robust": (1, "c64a456aac73a6d3"),
@@ -47,6 +48,14 @@ def test_no_number_moves_without_a_new_version():
         assert (suite.version, suite.digest) == (version, digest), (
             f"{name}.toml has other numbers than version {version} had; give it a new version"
         )
+
+
+def test_many_draws_the_stations_of_robust_and_more():
+    many, robust = frozen_suite("many"), frozen_suite("robust")
+    assert many.recipe == robust.recipe and len(many.stations) > 30 * len(robust.stations)
+    one = many.station(63).model
+    assert dump_model(one) == dump_model(robust.station(63).model)
+    assert [s.name for s in map(frozen_suite, suite_names()) if s.only_by_name] == ["many"]
 
 
 def acting(model):
