@@ -82,11 +82,11 @@ def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):
         folder.mkdir(parents=True)
         policy = trained(station, seed, error)
         save_policy_file(policy, folder / policy.name)
-    (best,) = best_policies(tmp_path / "group")
+    (best,) = best_policies([tmp_path / "group"])
     assert best.parent.name == "seed-1"
     pooled = {"by_seed": [3.0, 2.0, 4.0], "mean": [3.0, 2.5, 3.5], "unit": "mm"}
     figures = {"seeds": 3, "judged": {"robust": {"displacement": pooled}}}
-    (path,) = ship(tmp_path / "group", figures, tmp_path / "shipped")
+    (path,) = ship([tmp_path / "group"], {"group": figures}, tmp_path / "shipped")
     shipped = load_policy_file(path)
     assert shipped.training["seed"] == 1
     assert shipped.training["scores"]["suites"]["robust: displacement"]["this"] == 2.0
@@ -94,6 +94,26 @@ def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):
     assert "--task displacement --preset" in words and "--seed 1" in words
     assert "| robust: displacement | 2 mm | 3 [2.5, 3.5] |" in words
     assert card(shipped, 3) == words
+
+
+def test_of_several_algorithms_the_best_ships_and_replaces_the_other(station, tmp_path):
+    pooled = {"by_seed": [3.0], "mean": [3.0, 2.5, 3.5], "unit": "mm"}
+    figures = {"seeds": 1, "judged": {"robust": {"displacement": pooled}}}
+    groups = {"sac-residual": 0.02, "td3-residual": 0.03}
+    for group, error in groups.items():
+        folder = tmp_path / group / "seed-0"
+        folder.mkdir(parents=True)
+        name = f"displacement-100hz-{group.partition('-')[0]}"
+        save_policy_file(replace(trained(station, 0, error), name=name), folder / name)
+    shipped = tmp_path / "shipped"
+    shipped.mkdir()
+    save_policy_file(trained(station), shipped / "displacement-100hz-td3")
+    save_policy_file(trained(station), shipped / "displacement-100hz-ppo")
+    ship([tmp_path / group for group in groups], dict.fromkeys(groups, figures), shipped)
+    assert {p.stem for p in shipped_policies(shipped)} == {
+        "displacement-100hz-ppo",
+        "displacement-100hz-sac",
+    }
 
 
 def test_a_policy_file_and_a_folder_are_contenders(station, tmp_path):

@@ -56,7 +56,7 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
     algorithms = {cell.group: cell.algorithm for cell in cells()}
     for group, algorithm in algorithms.items():
         wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
-        if not wanted:
+        if not wanted or not (out / group).is_dir():
             continue
         for suite in suites.split(",") if suites else SUITES:
             judge_group(out / group, algorithm, suite, jobs, Console())
@@ -72,7 +72,7 @@ def conditions(out: Out = OUT) -> None:
     from benchmarks.training.study.robustness import robustness
     from benchmarks.training.study.ship import best_policies
 
-    best = {path.stem.rpartition("-")[0]: path for path in best_policies(out / SHIPPED_GROUP)}
+    best = {path.stem.rpartition("-")[0]: path for path in best_policies([out / SHIPPED_GROUP])}
     tasks = ("displacement", "rotation")
     found = {task: robustness(task, {"ppo": best[f"{task}-100hz"]}) for task in tasks}
     write_text(out / CONDITIONS, json.dumps(found, indent=1) + "\n")
@@ -84,7 +84,7 @@ def report(
     figures: Annotated[Path, typer.Option(help="JSON file of all figures.")] = FIGURES,
     ship: Annotated[bool, typer.Option(help="Also put the best policies where they ship.")] = False,
 ) -> None:
-    """Collect all figures and draw the curves."""
+    """Collect all figures and draw the curves; groups that are not in the folder keep theirs."""
     import json
 
     from benchmarks.files import write_text
@@ -94,13 +94,17 @@ def report(
     from benchmarks.training.study.ship import ship as ship_policies
 
     found = study_figures(out)
+    if figures.exists():
+        kept = json.loads(figures.read_text(encoding="utf-8"))["groups"]
+        found["groups"] = kept | found["groups"]
     found["pid"] = pid_errors(out)
     found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
     found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
-    for group in (SHIPPED_GROUP, *ALSO_SHIPPED) if ship else ():
-        for path in ship_policies(out / group, found["groups"][group]):
+    for names in ((SHIPPED_GROUP,), ALSO_SHIPPED) if ship else ():
+        there = [out / name for name in names if (out / name).is_dir()]
+        for path in ship_policies(there, found["groups"]):
             print(path)
 
 

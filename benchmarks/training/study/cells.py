@@ -11,6 +11,9 @@ from controllers.form import MIDDLE_V, Form
 HEADLINE = "ppo"
 """Algorithm with the most seeds."""
 
+OFF_POLICY = ("sac", "td3", "tqc")
+"""Algorithms that learn from what is past, over and over."""
+
 HEADLINE_SEEDS, OTHER_SEEDS = 10, 5
 """Training seeds of the headline algorithm and of everything else."""
 
@@ -26,7 +29,7 @@ class Cell(NamedTuple):
         title: what reports call it.
         algorithm: one of `ALGORITHMS`.
         preset: name of the preset.
-        task: displacement or rotation.
+        task: name of the task.
         seeds: how many.
         change: what is changed of the preset; "" for nothing.
         steps: control steps; 0 for the preset's.
@@ -67,11 +70,21 @@ def cells() -> list[Cell]:
         for preset in ("increment", "increment-late"):
             group = f"{HEADLINE}-increment"
             found.append(Cell(group, "PPO", HEADLINE, preset, task, HEADLINE_SEEDS))
-    for algorithm in ("sac", "td3", "tqc"):
+    for algorithm in OFF_POLICY:
+        title = f"{algorithm.upper()}, residual"
+        for task in ("displacement", "rotation", "isokinetic_exercise"):
+            group = residual_group(algorithm)
+            found.append(Cell(group, title, algorithm, "residual", task, OTHER_SEEDS))
+    for algorithm in OFF_POLICY:
         group, title = f"{algorithm}-increment", algorithm.upper()
         found.append(Cell(group, title, algorithm, "increment", "displacement", OTHER_SEEDS))
     found += ablations("displacement")
     return found
+
+
+def residual_group(algorithm: str) -> str:
+    """Group of the trainings of an algorithm that add to a classical controller."""
+    return f"{algorithm}-residual"
 
 
 def ablations(task: str) -> list[Cell]:

@@ -64,6 +64,7 @@ def _group(folder: Path, members: list[Cell]) -> dict[str, Any]:
     return {
         "title": first.title,
         "algorithm": first.algorithm,
+        "code": sorted({file.training["code"] for files in policies.values() for file in files}),
         "seeds": len(seeds),
         "judged": judged,
         "variation_v_per_s": smooth,

@@ -10,18 +10,19 @@ from benchmarks.comparison.job import run_comparison
 from benchmarks.comparison.journal import JOURNAL, read_rows
 from benchmarks.comparison.suite import FrozenSuite, frozen_suite
 from benchmarks.contender import parse_contenders
+from benchmarks.training.study.cells import OFF_POLICY, residual_group
 from benchmarks.training.study.pooled import Pool
 
 SHIPPED_GROUP = "ppo-increment"
 """Group of the headline algorithm: its best policies ship, and have a column in the tables."""
 
-ALSO_SHIPPED = ("tqc-increment",)
-"""Groups whose best policies ship too: the best of the algorithms that learn from what is past."""
+ALSO_SHIPPED = tuple(residual_group(algorithm) for algorithm in OFF_POLICY)
+"""Groups of which the best policy of each task and loop ships too."""
 
 PID_FOLDER = "pid"
 """Folder of the PID's results, which learning curves are compared with."""
 
-SUITES = ("nominal", "robust", "hard")
+SUITES = ("nominal", "robust", "hard", "exercise")
 """Suites that policies are judged by."""
 
 

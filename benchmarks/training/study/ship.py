@@ -1,6 +1,6 @@
 """Ships the best policy of every task and loop, chosen on validation stations, with its card."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,40 +14,48 @@ from controllers.policy_file import PolicyFile, load_policy_file, save_policy_fi
 from pma_gym.envs import ENVIRONMENTS
 
 
-def best_policies(group: Path) -> list[Path]:
+def best_policies(groups: Sequence[Path]) -> list[Path]:
     """Of each task and loop the policy with the least validation error.
 
     Args:
-        group: folder of the seeds.
+        groups: folders of seeds; of several the best of all.
     """
-    folders = seed_folders(group)
+    found: dict[str, list[Path]] = {}
+    for group in groups:
+        for folder in seed_folders(group):
+            for path in folder.glob("*.json"):
+                found.setdefault(path.stem.rpartition("-")[0], []).append(path)
     return [
-        min(
-            (folder / name for folder in folders if (folder / name).exists()),
-            key=lambda path: _validation(load_policy_file(path)),
-        )
-        for name in sorted(path.name for path in folders[0].glob("*.json"))
+        min(sorted(paths), key=lambda path: _validation(load_policy_file(path)))
+        for _, paths in sorted(found.items())
     ]
 
 
-def ship(group: Path, figures: dict[str, Any], folder: Path = POLICIES) -> list[Path]:
-    """Copy the best seeds' policies to the folder that ships, each with its card.
+def ship(groups: Sequence[Path], figures: Mapping[str, Any], folder: Path = POLICIES) -> list[Path]:
+    """Copy the best policies to the folder that ships, each with its card.
+
+    What another algorithm of these groups shipped for the same task and loop goes.
 
     Args:
-        group: folder of the seeds.
-        figures: the group's, from `study_figures`: suites' scores go into the files.
+        groups: folders of seeds, of which the best of all ships.
+        figures: of each group by name, from `study_figures`: suites' scores go into the files.
         folder: where to.
     Returns:
         The .json files.
     """
     folder.mkdir(exist_ok=True)
+    algorithms = {group.name.partition("-")[0] for group in groups}
     found = []
-    for best in best_policies(group):
-        policy = load_policy_file(best)
-        scores = dict(policy.training["scores"]) | {"suites": _scores(policy, figures)}
+    for best in best_policies(groups):
+        policy, own = load_policy_file(best), figures[best.parent.parent.name]
+        scores = dict(policy.training["scores"]) | {"suites": _scores(policy, own)}
         shipped = replace(policy, training=dict(policy.training) | {"scores": scores})
+        stem = best.stem.rpartition("-")[0]
+        for algorithm in algorithms:
+            for old in folder.glob(f"{stem}-{algorithm}.*"):
+                old.unlink()
         path = save_policy_file(shipped, folder / best.name)
-        path.with_suffix(".md").write_text(card(shipped, figures["seeds"]), encoding="utf-8")
+        path.with_suffix(".md").write_text(card(shipped, own["seeds"]), encoding="utf-8")
         found.append(path)
     return found
 

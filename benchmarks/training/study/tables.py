@@ -52,8 +52,10 @@ def training_table(figures: Mapping[str, Any], limits: Mapping[str, float]) -> T
         for name, trained in group["trained"].items():
             kind = name.partition("-")[0]
             errors, walls = trained["validation"], trained["wall_s"]
-            late = "delay" in name
-            when = None if late else reached(trained["curve"], limits[kind])
+            below = ""
+            if kind in limits and "delay" not in name:
+                when = reached(trained["curve"], limits[kind])
+                below = "never" if when is None else f"{when:.0f}"
             rows.append(
                 [
                     f"{group['title']}: {name.rpartition('-')[0]}",
@@ -61,7 +63,7 @@ def training_table(figures: Mapping[str, Any], limits: Mapping[str, float]) -> T
                     f"{trained['steps'] / 1e6:.2g}",
                     f"{sum(walls) / len(walls):.0f}",
                     f"{min(errors):.3g} to {max(errors):.3g} {trained['unit']}",
-                    "" if late else ("never" if when is None else f"{when:.0f}"),
+                    below,
                 ]
             )
     header = [
