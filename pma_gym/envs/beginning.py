@@ -1,6 +1,7 @@
 """How episodes begin: what is drawn, and where a station stands settled."""
 
 from collections.abc import Sequence
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,7 @@ def holding_voltages(
 KEPT = 4096
 """How many stations at rest are kept: who trains on drawn stations meets each again and again."""
 
+_KEEPING = Lock()
 _KEPT: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
 
 
@@ -97,7 +99,9 @@ def settled_at_no_load(
         for row, volts in zip(numbers, regulator.tolist(), strict=True)
     ]
     # By what a rest depends on. Those that are asked for twice at once are searched for once.
-    new = {key: i for i, key in enumerate(keys) if key not in _KEPT}
+    # Others may drop what was there a moment ago: what is there is taken once.
+    rests = {key: kept for key in keys if (kept := _KEPT.get(key)) is not None}
+    new = {key: i for i, key in enumerate(keys) if key not in rests}
     fresh: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
     if new:
         at = list(new.values())
@@ -107,11 +111,13 @@ def settled_at_no_load(
         if np.isnan(zero) or np.isnan(state).any():
             # Says what does not balance.
             Plant(models[new[key]]).settle(motor_voltage=0.0, regulator_voltage=key[2])
-    all_of = [fresh.get(key) or _KEPT[key] for key in keys]
-    for key in list(_KEPT)[: max(len(_KEPT) + len(fresh) - KEPT, 0)]:
-        del _KEPT[key]
-    _KEPT.update(fresh)
-    return np.array([state for state, _ in all_of]), np.array([zero for _, zero in all_of])
+    with _KEEPING:
+        _KEPT.update(fresh)
+        for key in list(_KEPT)[: max(len(_KEPT) - KEPT, 0)]:
+            del _KEPT[key]
+    rests |= fresh
+    states, zeros = zip(*(rests[key] for key in keys), strict=True)
+    return np.array(states), np.array(zeros)
 
 
 def settled_under_load(
