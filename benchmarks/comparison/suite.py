@@ -185,7 +185,7 @@ def kind_of(task: str) -> str:
     return designs.kind_of(found)
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=4096)
 def _station(recipe: Recipe, number: int) -> DrawnStation:
     return draw_station(recipe, number)
 
