@@ -65,7 +65,7 @@ class ShippedPolicy:
     """The shipped policy of an algorithm for the task and loop at hand, whatever they are.
 
     Args:
-        algorithm: `ppo`, `sac`, `td3`, `tqc`: how the file's name ends.
+        algorithm: `ppo`, `ppo_memory`, `sac`, `td3`, `tqc`: how the file's name ends.
         folder: where the files are.
 
     Attributes:
@@ -103,12 +103,13 @@ class ShippedPolicy:
         # Gains of the nearest loop serve; a network's weights hold for the loop that made them.
         name = f"{task_kind(station)}-{loop_name(station)}-{self.name}"
         if name not in self._policies:
-            shipped = [path.stem for path in shipped_policies(self._folder)]
+            stems = [path.stem for path in shipped_policies(self._folder)]
+            shipped = [stem for stem in stems if stem.endswith(f"-{self.name}")]
             if name not in shipped:
                 raise PolicyError(
-                    f"no policy {name} is shipped (kind of task, loop, algorithm), only "
-                    f"{', '.join(shipped) or 'none at all'}; take a task, control rate and delay "
-                    "of these"
+                    f"no policy {name} is shipped (kind of task, loop, algorithm), of {self.name} "
+                    f"only {', '.join(shipped) or 'none at all'}; take a task, control rate and "
+                    "delay of these"
                 )
             self._policies[name] = Policy(self._folder / f"{name}.json")
         return self._policies[name]
@@ -124,6 +125,18 @@ class PPOPolicy(ShippedPolicy):
 
     def __init__(self) -> None:
         super().__init__("ppo")
+
+
+class PPOMemory(ShippedPolicy):
+    """Those for suite `hard` that see back further than its pulses last.
+
+    They have learned that a pulse of the operator's lasts 0.5 s, as all do there, and meet its end
+    half-way. Where pulses last otherwise `PPOPolicy`, which sees less far back, is better; the
+    documentation's page on policies has the figures.
+    """
+
+    def __init__(self) -> None:
+        super().__init__("ppo_memory")
 
 
 def shipped_policies(folder: Path = POLICIES) -> list[Path]:

@@ -12,10 +12,12 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from benchmarks.training.preset import PresetError, load_preset
+from benchmarks.training.preset import Preset, PresetError, load_preset
 from benchmarks.training.product import policy_name, policy_of
 from benchmarks.training.run import Order, Point, Trained, train
 from benchmarks.training.validation import unit_of
+from controllers.designs import kind_of
+from controllers.pilot import base_of
 from controllers.policy_file import save_policy_file
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.tasks import EXERCISES, named_task
@@ -51,10 +53,24 @@ def ordered(
     found = load_preset(preset, algorithm, environment)
     if options:
         found = found.changed(options={**found.options, **options})
+    _check_base(found)
     check_device(device)
     if steps is not None:
         found = found.changed(steps=steps)
     return Order(found, seed, device, threads, patience)
+
+
+def _check_base(preset: Preset) -> None:
+    """Refuse a residual on a controller that is not for the task."""
+    made = named_task(preset.task)
+    assert made is not None
+    kinds = getattr(base_of(preset.form), "kinds", ()) if preset.form.base else ()
+    if kinds and kind_of(made) not in kinds:
+        raise PresetError(
+            f"preset {preset.name} adds to the voltage of {preset.form.base}, which is for tasks "
+            f"of kind {' and '.join(kinds)}, got {preset.task}, of kind {kind_of(made)}; take "
+            "another task, or a preset whose form is no residual, such as increment"
+        )
 
 
 def _environment_of(task: str) -> tuple[str, dict[str, str]]:

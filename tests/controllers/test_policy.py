@@ -129,8 +129,8 @@ def test_the_shipped_policy_is_the_one_for_the_task_and_loop(written, station, r
 def test_a_loop_that_nothing_is_shipped_for_is_refused(written, station, tmp_path):
     written()
     message = (
-        "no policy displacement-50hz-ppo is shipped (kind of task, loop, algorithm), only "
-        "displacement-100hz-ppo; take a task, control rate and delay of these"
+        "no policy displacement-50hz-ppo is shipped (kind of task, loop, algorithm), of ppo "
+        "only displacement-100hz-ppo; take a task, control rate and delay of these"
     )
     shipped = ShippedPolicy("ppo", tmp_path)
     shipped.reset(lambda time: 0.0, station())

@@ -99,10 +99,18 @@ def test_a_jump_of_the_regulator_never_breaks_the_rig():
     assert max(pressures_kpa(late)) == 550
 
 
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_a_residual_on_a_controller_of_other_tasks_is_refused(algorithm):
+    with pytest.raises(PresetError, match="speed_pid, which is for tasks of kind isokinetic, got"):
+        ordered(algorithm, "isotonic_exercise", "residual", 0, None, "cpu", 1, 0)
+    assert ordered(algorithm, "exercise", "residual", 0, None, "cpu", 1, 0).preset.form.base
+
+
 @pytest.mark.parametrize("task", [DISPLACEMENT, ROTATION])
-def test_who_meets_pulses_remembers_one(task):
-    late = load_preset("increment-late", "ppo", task)
-    assert late.view.history / late.rate_hz > PULSE_S
+def test_the_long_memory_holds_a_pulse_and_the_short_one_does_not(task):
+    late, memory = (load_preset(f"increment-{name}", "ppo", task) for name in ("late", "memory"))
+    assert late.view.history / late.rate_hz < PULSE_S < memory.view.history / memory.rate_hz
+    assert late.options["disturbances"] == memory.options["disturbances"]
 
 
 # -- refused ---------------------------------------------------------------------------------------

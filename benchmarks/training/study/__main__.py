@@ -48,15 +48,25 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
     from rich.console import Console
 
     from benchmarks.training.study.cells import cells
-    from benchmarks.training.study.judged import SUITES, judge_pid
+    from benchmarks.training.study.judged import SUITES, judge_pid, seed_folders
     from benchmarks.training.study.judged import judge as judge_group
 
+    algorithms = {cell.group: cell.algorithm for cell in cells()}
+    strange = [name for name in groups.split(",") if groups and name not in algorithms]
+    if strange:
+        print(
+            f"error: groups must be of {', '.join(algorithms)}, got {', '.join(strange)}",
+            file=sys.stderr,
+        )
+        raise typer.Exit(2)
     if not groups:
         judge_pid(out, jobs, Console())
-    algorithms = {cell.group: cell.algorithm for cell in cells()}
     for group, algorithm in algorithms.items():
         wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
-        if not wanted or not (out / group).is_dir():
+        if not wanted:
+            continue
+        if not seed_folders(out / group):
+            print(f"{group}: no policy in {out / group}, train it first", file=sys.stderr)
             continue
         for suite in suites.split(",") if suites else SUITES:
             judge_group(out / group, algorithm, suite, jobs, Console())
@@ -88,23 +98,25 @@ def report(
     import json
 
     from benchmarks.files import write_text
+    from benchmarks.training.study.cells import cells
     from benchmarks.training.study.figures import pid_errors, study_figures, variation
-    from benchmarks.training.study.judged import ALSO_SHIPPED, PID_FOLDER, SHIPPED_GROUP
+    from benchmarks.training.study.judged import PID_FOLDER, SHIPPED
     from benchmarks.training.study.pictures import write_curves
     from benchmarks.training.study.ship import ship as ship_policies
 
     found = study_figures(out)
     if figures.exists():
         kept = json.loads(figures.read_text(encoding="utf-8"))["groups"]
-        found["groups"] = kept | found["groups"]
+        merged = kept | found["groups"]
+        names = dict.fromkeys(cell.group for cell in cells())
+        found["groups"] = {name: merged[name] for name in names if name in merged}
     found["pid"] = pid_errors(out)
     found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
     found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
-    for names in ((SHIPPED_GROUP,), ALSO_SHIPPED) if ship else ():
-        there = [out / name for name in names if (out / name).is_dir()]
-        for path in ship_policies(there, found["groups"]):
+    for names, suffix in SHIPPED if ship else ():
+        for path in ship_policies([out / name for name in names], found["groups"], suffix):
             print(path)
 
 

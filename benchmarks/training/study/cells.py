@@ -11,6 +11,13 @@ from controllers.form import MIDDLE_V, Form
 HEADLINE = "ppo"
 """Algorithm with the most seeds."""
 
+HEADLINE_PRESETS = {
+    "increment": "PPO",
+    "increment-late": "PPO",
+    "increment-memory": "PPO, long memory",
+}
+"""Presets of the headline algorithm, and what reports call its policies."""
+
 OFF_POLICY = ("sac", "td3", "tqc")
 """Algorithms that learn from what is past, over and over."""
 
@@ -66,10 +73,10 @@ CHANGES: dict[str, Callable[[Preset], Preset]] = {
 def cells() -> list[Cell]:
     """All of the study, what others build on first."""
     found = []
-    for task in ("displacement", "rotation"):
-        for preset in ("increment", "increment-late"):
-            group = f"{HEADLINE}-increment"
-            found.append(Cell(group, "PPO", HEADLINE, preset, task, HEADLINE_SEEDS))
+    for preset, title in HEADLINE_PRESETS.items():
+        for task in ("displacement", "rotation"):
+            group = f"{HEADLINE}-{preset}"
+            found.append(Cell(group, title, HEADLINE, preset, task, HEADLINE_SEEDS))
     for algorithm in OFF_POLICY:
         title = f"{algorithm.upper()}, residual"
         for task in ("displacement", "rotation", "isokinetic_exercise"):

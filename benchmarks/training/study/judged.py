@@ -14,10 +14,16 @@ from benchmarks.training.study.cells import OFF_POLICY, residual_group
 from benchmarks.training.study.pooled import Pool
 
 SHIPPED_GROUP = "ppo-increment"
-"""Group of the headline algorithm: its best policies ship, and have a column in the tables."""
+"""Group of the headline algorithm at 100 Hz: its best policies have a column in the tables."""
 
-ALSO_SHIPPED = tuple(residual_group(algorithm) for algorithm in OFF_POLICY)
-"""Groups of which the best policy of each task and loop ships too."""
+SHIPPED: tuple[tuple[tuple[str, ...], str], ...] = (
+    ((SHIPPED_GROUP,), ""),
+    (("ppo-increment-late",), ""),
+    (("ppo-increment-memory",), "_memory"),
+    (tuple(residual_group(algorithm) for algorithm in OFF_POLICY), ""),
+)
+"""Groups of which together the best policy of each task and loop ships, and what is added to its
+name, by which it is told from the algorithm's other policy for the same task and loop."""
 
 PID_FOLDER = "pid"
 """Folder of the PID's results, which learning curves are compared with."""

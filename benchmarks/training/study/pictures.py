@@ -25,11 +25,13 @@ def curves_picture(
     axes = figure.subplots(1, len(policies), squeeze=False)[0]
     for axis, policy in zip(axes, policies, strict=True):
         unit = ""
-        groups = [g for n, g in figures["groups"].items() if not n.startswith("ablation-")]
-        for colour, group in zip(COLOURS, groups, strict=False):
-            trained = group["trained"].get(f"{policy}-{group['algorithm']}")
-            if trained is None:
-                continue
+        drawn = [
+            (group, group["trained"][f"{policy}-{group['algorithm']}"])
+            for name, group in figures["groups"].items()
+            if not name.startswith("ablation-")
+            and f"{policy}-{group['algorithm']}" in group["trained"]
+        ]
+        for colour, (group, trained) in zip(COLOURS[: len(drawn)], drawn, strict=True):
             curve, unit = trained["curve"], trained["unit"]
             label = f"{group['title']}, {len(trained['seeds'])} seeds"
             axis.plot(curve["wall_s"], curve["error"], color=colour, label=label)
