@@ -4,7 +4,7 @@ from dataclasses import MISSING, fields
 
 from generators.text import code, entries, sections, summary, table
 from pma_gym.envs import Options, PMAEnv
-from pma_gym.tasks import DISTURBANCES, EVERY_TASK, RANDOMISATIONS, REWARDS
+from pma_gym.tasks import DISTURBANCES, EVERY_TASK, PULSE_S, RANDOMISATIONS, REWARDS
 from pma_gym.units import SI_FACTORS
 
 
@@ -48,7 +48,10 @@ def disturbances() -> str:
         if sizes.regulator_step:
             said.append(f"jumps of the regulator by {sizes.regulator_step / 1e3:g} kPa")
         if sizes.operator_force:
-            said.append(f"pulses of {sizes.operator_force:g} N at the slide, 0.5 s long")
+            said.append(
+                f"pulses of {sizes.operator_force:g} N at the slide, {PULSE_S[0]:g} to "
+                f"{PULSE_S[1]:g} s long"
+            )
         rows.append([code(name), ", ".join(said)])
     return table(["Disturbances", "What comes at random times, with a random sign"], rows)
 

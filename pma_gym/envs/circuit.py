@@ -3,7 +3,6 @@
 From the action to the drive, from the plant's state to reading, observation, reward and end.
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -21,7 +20,7 @@ from pma_gym.plant import sensors
 from pma_gym.plant.attempt import first_size
 from pma_gym.plant.compose import COMMANDS, ZERO, Equations
 from pma_gym.plant.program import at_rest
-from pma_gym.tasks import PULSE_S, REWARDS, broken, missed_reward
+from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 
 FORCE_OF_A_VOLT = 100.0
@@ -133,11 +132,10 @@ class Circuit:
     def _pulse(self) -> Value:
         """Force of the operator in the step that begins (N)."""
         now, force = to_real(self.slot("count")), self.graph.constant(0.0)
-        last = math.ceil(PULSE_S * self.record.options.control_rate_hz - 1e-9)
         for name in self.record.events:
             if name.startswith("pulse_step_"):
-                begun = self.slot(name)
-                during = (now >= begun) & (now < begun + last)
+                ended = self.slot(name.replace("_step", "_end"))
+                during = (now >= self.slot(name)) & (now < ended)
                 force = force + where(during, self.slot(name.replace("_step", "")), 0.0)
         return force
 

@@ -319,6 +319,10 @@ class Engine:
             for i in range(times.shape[1]):
                 self._set(indices, f"{what}_step_{i}", np.ceil(times[:, i] * rate))
                 self._set(indices, f"{what}_{i}", sizes[:, i])
+        # As many steps whatever it begins with: a pulse is as long for every controller.
+        begun, lasting = np.ceil(events.pulse_times * rate), events.pulse_lengths * rate
+        for i in range(begun.shape[1]):
+            self._set(indices, f"pulse_end_{i}", begun[:, i] + np.ceil(lasting[:, i] - 1e-9))
 
     def _events(self, indices: NDArray[np.int64]) -> Events:
         """What disturbs the episodes of environments."""

@@ -150,15 +150,19 @@ class Record:
 
     @cached_property
     def events(self) -> list[str]:
-        """Places of what disturbs: of each event its control step and its size.
+        """Places of what disturbs: of each event its control step and its size, of a pulse its end.
 
-        The step is a whole number, kept as a real: which is the same in every precision.
+        A step is a whole number, kept as a real: which is the same in every precision.
         """
         disturbing, duration = self.options.disturbing, self.task.duration
         steps, pulses = disturbing.regulator_steps(duration), disturbing.pulses(duration)
         return [
             *(f"{what}_{i}" for i in range(steps) for what in ("jump_step", "jump")),
-            *(f"{what}_{i}" for i in range(pulses) for what in ("pulse_step", "pulse")),
+            *(
+                f"{what}_{i}"
+                for i in range(pulses)
+                for what in ("pulse_step", "pulse_end", "pulse")
+            ),
         ]
 
     @cached_property

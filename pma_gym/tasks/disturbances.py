@@ -12,8 +12,12 @@ from pma_gym.units import SI_FACTORS
 SPACING_S = 2.5
 """An event of each sort comes at a random time in every such part of an episode (s)."""
 
-PULSE_S = 0.5
-"""How long a pulse lasts (s)."""
+PULSE_S = 0.2, 0.8
+"""Shortest and longest pulse (s); each has a length of its own between them, drawn evenly.
+
+An assumption: how long a person pulls is nobody's constant, and a controller that has learned one
+length would be praised for knowing the test.
+"""
 
 
 class Disturbances(NamedTuple):
@@ -47,6 +51,7 @@ class Disturbances(NamedTuple):
         """
         steps, pulses = self.regulator_steps(duration), self.pulses(duration)
         shares = _shares(keys, streams, max(steps, pulses))
+        lengths = PULSE_S[0] + (PULSE_S[1] - PULSE_S[0]) * shares[4]
         part = duration / max(_count(duration), 1)
         starts = part * np.arange(max(steps, pulses))
         signs = np.where(shares[1] < 0.5, -1.0, 1.0)
@@ -54,12 +59,13 @@ class Disturbances(NamedTuple):
         away = np.arange(steps) % 2 == 0
         jumps = np.where(away, signs[:, :steps], -np.roll(signs[:, :steps], 1, axis=1))
         pulse_signs = np.where(shares[3] < 0.5, -1.0, 1.0)
-        late = shares[2] * max(part - PULSE_S, 0.0)
+        late = shares[2] * np.maximum(part - lengths, 0.0)
         return Events(
             (starts + shares[0] * part)[:, :steps],
             self.regulator_step * jumps,
             (starts + late)[:, :pulses],
             (self.operator_force * pulse_signs)[:, :pulses],
+            lengths[:, :pulses],
         )
 
 
@@ -69,14 +75,16 @@ class Events(NamedTuple):
     Attributes:
         step_times: when the regulator jumps (s), shape (n, steps).
         step_sizes: by how much (Pa): away from its line and back in turn.
-        pulse_times: when pulses of 0.5 s begin (s), shape (n, pulses).
+        pulse_times: when pulses begin (s), shape (n, pulses).
         pulse_forces: force on the slide during them (N); positive shortens the muscle.
+        pulse_lengths: how long they last (s).
     """
 
     step_times: NDArray[np.float64]
     step_sizes: NDArray[np.float64]
     pulse_times: NDArray[np.float64]
     pulse_forces: NDArray[np.float64]
+    pulse_lengths: NDArray[np.float64]
 
 
 def _count(duration: float) -> int:
@@ -86,13 +94,17 @@ def _count(duration: float) -> int:
 def _shares(
     keys: NDArray[np.int64], streams: NDArray[np.int64], count: int
 ) -> tuple[NDArray[np.float64], ...]:
-    """Four random numbers between 0 and 1 for each event, shape (n, count) each."""
+    """Random numbers between 0 and 1, more than needed for each event, shape (n, count) each."""
     shape = len(streams), count
     words = [np.broadcast_to(keys[:, [i]].astype(np.uint64), shape) for i in range(2)]
     events = np.broadcast_to(np.arange(count, dtype=np.uint64), shape)
     streamed = np.broadcast_to(streams[:, None].astype(np.uint64), shape)
     nothing = np.zeros(shape, np.uint64)
-    return uniforms(philox((events, streamed, nothing, nothing), (words[0], words[1])))
+    return tuple(
+        share
+        for part in (nothing, nothing + 1)
+        for share in uniforms(philox((events, streamed, part, nothing), (words[0], words[1])))
+    )
 
 
 _STEP, _FORCE = 25.0 * SI_FACTORS["kPa"], 50.0
@@ -104,4 +116,4 @@ DISTURBANCES: dict[str, Disturbances] = {
     "regulator_and_operator": Disturbances(_STEP, _FORCE),
 }
 """What disturbs episodes, by name: jumps of the regulator by 25 kPa away from its line and back,
-and pulses of 50 N at the slide, both at random times and of random sign."""
+and pulses of 50 N at the slide of 0.2 to 0.8 s, both at random times and of random sign."""

@@ -19,7 +19,7 @@ from pma_gym.plant.model import dump_model, load_model
 
 FROZEN = {
     "exercise": (1, "49d1beb5bb79f358"),
-    "hard": (1, "5d4a45c32d00556d"),
+    "hard": (2, "3ebf19022f089b3f"),
     "many": (1, "63ad7ef6fdeffd17"),
     "nominal": (1, "70c3860b11692535"),
     "pressure": (1, "9dcd1244347becaf"),
