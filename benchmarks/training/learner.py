@@ -11,6 +11,9 @@ from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNo
 from stable_baselines3.common.vec_env import VecEnv
 
 from benchmarks.training.preset import Preset, PresetError
+from benchmarks.training.zoo_text import ACTIVATIONS
+
+_ACTIVATIONS = {name: getattr(torch.nn, name.removeprefix("nn.")) for name in ACTIVATIONS}
 
 
 def learner(preset: Preset, envs: VecEnv, seed: int, device: str = "cpu") -> BaseAlgorithm:
@@ -33,6 +36,8 @@ def learner(preset: Preset, envs: VecEnv, seed: int, device: str = "cpu") -> Bas
     if preset.algorithm != "ppo" and "train_freq" in settings:
         settings["train_freq"] = int(settings["train_freq"])
     policy: Any = dict(preset.network)
+    if "activation_fn" in policy:
+        policy["activation_fn"] = _ACTIVATIONS[policy["activation_fn"]]
     make = _classes()[preset.algorithm]
     model = make("MlpPolicy", envs, policy_kwargs=policy, seed=seed, device=device, **settings)
     made.append(model)

@@ -5,6 +5,8 @@ import math
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from benchmarks.training.zoo_text import ACTIVATIONS, network_text
+
 _COMMON = {"batch_size", "gamma", "learning_rate"}
 _REPLAY = _COMMON | {"buffer_size", "gradient_steps", "learning_starts", "tau", "train_freq"}
 
@@ -45,7 +47,7 @@ SHARES = {"gae_lambda", "gamma", "tau"}
 FALLING = {"clip_range", "learning_rate"}
 """Those that may fall: "lin_0.001" falls linearly from 0.001 to 0."""
 
-NETWORK = {"net_arch", "log_std_init", "n_critics", "n_quantiles"}
+NETWORK = {"activation_fn", "net_arch", "log_std_init", "n_critics", "n_quantiles"}
 """Settings of the network."""
 
 
@@ -87,13 +89,23 @@ def _worded(algorithm: str, key: str, value: str) -> str:
 def network(given: object) -> dict[str, Any]:
     """Settings of the network, checked.
 
+    Args:
+        given: a mapping, or text such as the zoo evaluates; the latter alone can name an activation
+            in a way that the zoo understands too.
+
     Raises:
-        ValueError: text, or one that is unknown or of the wrong kind.
+        ValueError: one that is unknown or of the wrong kind.
     """
+    if isinstance(given, str):
+        given = network_text(given)
     if not isinstance(given, Mapping) or not set(given) <= NETWORK:
         raise ValueError(
-            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {given!r}; "
-            "text that the zoo would evaluate is not read here"
+            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {given!r}"
+        )
+    activation = given.get("activation_fn", ACTIVATIONS[0])
+    if activation not in ACTIVATIONS:
+        raise ValueError(
+            f"activation_fn must be one of {', '.join(ACTIVATIONS)}, got {activation!r}"
         )
     arch = given.get("net_arch", [])
     for layers in arch.values() if isinstance(arch, Mapping) else [arch]:

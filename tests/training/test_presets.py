@@ -1,6 +1,7 @@
 """Every preset makes a learner; one that cannot be used is refused with what is wrong in it."""
 
 import copy
+from dataclasses import replace
 
 import pytest
 
@@ -18,9 +19,9 @@ from benchmarks.training.learner import learner
 from benchmarks.training.piloted_env import PilotedEnv
 from benchmarks.training.preset import ALGORITHMS, PRESETS, PresetError, load_preset, preset_names
 from benchmarks.training.product import station_of
+from benchmarks.training.settings import network
 from controllers.view import View
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.tasks import PULSE_S
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
 ROTATION = "pma_gym/IsokineticRotation-v0"
@@ -93,6 +94,17 @@ def test_the_zoo_makes_the_same_environment():
     assert env.pilot.view == preset.view and env.pilot.form == preset.form
 
 
+def test_text_of_the_zoo_is_read_as_the_zoo_reads_it():
+    text = "dict(net_arch=dict(pi=[64], vf=[32, 32]), activation_fn=nn.ReLU, log_std_init=-1.5)"
+    evaluated = eval(text, {"nn": torch.nn, "dict": dict})
+    assert evaluated.pop("activation_fn") is torch.nn.ReLU
+    assert network(text) == evaluated | {"activation_fn": "nn.ReLU"}
+    preset = load_preset("increment", "ppo", DISPLACEMENT)
+    model = learner(replace(preset, network=network(text)), Spaces(preset), seed=0)
+    kinds = [type(layer).__name__ for layer in model.policy.mlp_extractor.policy_net]
+    assert kinds == ["Linear", "ReLU"]
+
+
 def test_a_jump_of_the_regulator_never_breaks_the_rig():
     assert max(pressures_kpa(load_preset("increment", "ppo", DISPLACEMENT))) > 550
     late = load_preset("increment-late", "ppo", DISPLACEMENT)
@@ -104,13 +116,6 @@ def test_a_residual_on_a_controller_of_other_tasks_is_refused(algorithm):
     with pytest.raises(PresetError, match="speed_pid, which is for tasks of kind isokinetic, got"):
         ordered(algorithm, "isotonic_exercise", "residual", 0, None, "cpu", 1, 0)
     assert ordered(algorithm, "exercise", "residual", 0, None, "cpu", 1, 0).preset.form.base
-
-
-@pytest.mark.parametrize("task", [DISPLACEMENT, ROTATION])
-def test_the_long_memory_holds_a_pulse_and_the_short_one_does_not(task):
-    late, memory = (load_preset(f"increment-{name}", "ppo", task) for name in ("late", "memory"))
-    assert late.view.history / late.rate_hz < PULSE_S < memory.view.history / memory.rate_hz
-    assert late.options["disturbances"] == memory.options["disturbances"]
 
 
 # -- refused ---------------------------------------------------------------------------------------
@@ -169,9 +174,19 @@ WRONG = {
         ("callback", 0, AVERAGE, "share"),
         2,
     ),
-    r"policy_kwargs must be a mapping .*text that the zoo would evaluate is not read": (
+    r"policy_kwargs must be a mapping of activation_fn, .*got \{'arch': \[64\]\}": (
         ("policy_kwargs",),
-        "dict(net_arch=[64, 64])",
+        {"arch": [64]},
+    ),
+    r"policy_kwargs may have dict.*got \"__import__\('os'\).system\('ls'\)\"; nothing is": (
+        ("policy_kwargs",),
+        "dict(net_arch=[64], activation_fn=__import__('os').system('ls'))",
+    ),
+    r"policy_kwargs is no Python text \(.*got 'dict\('": (("policy_kwargs",), "dict("),
+    r"policy_kwargs must be a dict\(...\), got '\[64\]'": (("policy_kwargs",), "[64]"),
+    r"activation_fn must be one of nn.ReLU, nn.Tanh, got 'relu'": (
+        ("policy_kwargs", "activation_fn"),
+        "relu",
     ),
     r"net_arch must be a list such as \[64, 64\], got 64": (("policy_kwargs", "net_arch"), 64),
     r"policy must be MlpPolicy": (("policy",), "CnnPolicy"),

@@ -1,0 +1,57 @@
+"""The zoo's way to write a network, as Python text, read without evaluating anything.
+
+rl-baselines3-zoo evaluates `policy_kwargs` where it is text, for only so can YAML name a class:
+
+    policy_kwargs: "dict(net_arch=[64, 64], activation_fn=nn.ReLU)"
+
+Files from strangers are data, so here the text is parsed, and nothing but `dict(...)`, lists,
+numbers and the names of activations has a meaning.
+"""
+
+import ast
+
+ACTIVATIONS = ("nn.ReLU", "nn.Tanh")
+"""Activations that a policy file can hold, by the names that the zoo knows them by."""
+
+
+def network_text(text: str) -> dict[str, object]:
+    """What a text of `policy_kwargs` says.
+
+    Returns:
+        Its keywords; an activation by its name, one of `ACTIVATIONS`.
+
+    Raises:
+        ValueError: what is no such text, or says more.
+    """
+    try:
+        found = _value(ast.parse(text.strip(), mode="eval").body)
+    except (SyntaxError, RecursionError) as error:
+        raise ValueError(f"policy_kwargs is no Python text ({error}), got {text!r}") from error
+    if not isinstance(found, dict):
+        raise ValueError(f"policy_kwargs must be a dict(...), got {text!r}")
+    return found
+
+
+def _value(node: ast.expr) -> object:
+    """Value of a part of the text."""
+    match node:
+        case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords):
+            return {_key(one): _value(one.value) for one in keywords}
+        case ast.List(elts=parts):
+            return [_value(part) for part in parts]
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
+            return number
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
+            return -number
+        case ast.Attribute() if ast.unparse(node) in ACTIVATIONS:
+            return ast.unparse(node)
+    raise ValueError(
+        "policy_kwargs may have dict(...), lists, numbers and the activations "
+        f"{', '.join(ACTIVATIONS)}, got {ast.unparse(node)!r}; nothing is evaluated here"
+    )
+
+
+def _key(keyword: ast.keyword) -> str:
+    if keyword.arg is None:
+        raise ValueError("policy_kwargs must name each setting, got **; write dict(name=value)")
+    return keyword.arg
