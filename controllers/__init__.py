@@ -12,7 +12,7 @@ from controllers.moment_pid import MomentPID
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
-from controllers.policy import Policy, PPOMemory, PPOPolicy, ShippedPolicy
+from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.scheduled_pressure import ConstantPressure, ScheduledPressure
 from controllers.sliding_mode import SlidingMode
 from controllers.speed_pid import SpeedPID
@@ -29,7 +29,6 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "mpc": PreviewMPC,
     "ilc": ILC,
     "ppo": PPOPolicy,
-    "ppo_memory": PPOMemory,
     "oracle": Oracle,
     "constant_pressure": ConstantPressure,
     "scheduled_pressure": ScheduledPressure,
@@ -51,7 +50,6 @@ __all__ = [
     "ImprovedFeedforward",
     "MomentPID",
     "Oracle",
-    "PPOMemory",
     "PPOPolicy",
     "Policy",
     "PreviewMPC",

@@ -65,7 +65,7 @@ class ShippedPolicy:
     """The shipped policy of an algorithm for the task and loop at hand, whatever they are.
 
     Args:
-        algorithm: `ppo`, `ppo_memory`, `sac`, `td3`, `tqc`: how the file's name ends.
+        algorithm: `ppo`, `sac`, `td3`, `tqc`: how the file's name ends.
         folder: where the files are.
 
     Attributes:
@@ -125,18 +125,6 @@ class PPOPolicy(ShippedPolicy):
 
     def __init__(self) -> None:
         super().__init__("ppo")
-
-
-class PPOMemory(ShippedPolicy):
-    """Those for suite `hard` that see back further than its pulses last.
-
-    They have learned that a pulse of the operator's lasts 0.5 s, as all do there, and meet its end
-    half-way. Where pulses last otherwise `PPOPolicy`, which sees less far back, is better; the
-    documentation's page on policies has the figures.
-    """
-
-    def __init__(self) -> None:
-        super().__init__("ppo_memory")
 
 
 def shipped_policies(folder: Path = POLICIES) -> list[Path]:

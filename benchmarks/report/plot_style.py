@@ -23,7 +23,6 @@ _FIXED: dict[str, tuple[str, str, Dashes]] = {
     "ilc": ("#D55E00", "d", "--"),
     "oracle": ("#000000", "*", ":"),
     "ppo": ("#56B4E9", "P", "-"),
-    "ppo_memory": ("#56B4E9", "X", "--"),
     # Those of exercises never meet those of other tasks above, but for the policy.
     "constant_pressure": ("#CC79A7", "D", "-."),
     "scheduled_pressure": ("#E69F00", "^", "-."),

@@ -9,16 +9,13 @@ from functools import lru_cache
 import numpy as np
 
 from benchmarks.bound import achievable_bound
-from controllers import CONTROLLERS, PPOMemory
+from controllers import CONTROLLERS
 from pma_gym.plant.model import load_model
 
 RIVALS = [
     make
     for make in CONTROLLERS.values()
-    if not hasattr(make, "see")
-    and "rotation" in getattr(make, "kinds", ["rotation"])
-    # It is for the loop of suite `hard`.
-    and make is not PPOMemory
+    if not hasattr(make, "see") and "rotation" in getattr(make, "kinds", ["rotation"])
 ]
 
 bound_of = lru_cache(achievable_bound)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from controllers import Policy, PPOMemory, PPOPolicy
+from controllers import Policy, PPOPolicy
 from controllers.pid import nominal_offset
 from controllers.policy import shipped_policies
 from controllers.policy_file import load_policy_file
@@ -27,8 +27,7 @@ def test_each_loads_and_has_a_card_that_says_how_to_make_it_again(path):
     policy = load_policy_file(path)
     training = policy.training
     card = path.with_suffix(".md").read_text(encoding="utf-8")
-    algorithm = training["algorithm"] + "_memory" * (training["preset"] == "increment-memory")
-    assert policy.name == path.stem and policy.name.endswith(f"-{algorithm}")
+    assert policy.name == path.stem and policy.name.endswith(f"-{training['algorithm']}")
     assert f"--preset {training['preset']} --seed {training['seed']}`" in card
     assert training["code"] in card and "+" not in training["code"]
 
@@ -50,16 +49,6 @@ def test_the_late_loop_has_policies_of_its_own():
     assert driven(PMAEnv("displacement", pressure_kpa=300.0, **late), PPOPolicy())["rmse_mm"] < 0.4
     info = driven(PMAEnv("rotation", pressure_kpa=400.0, **disturbed), PPOPolicy())
     assert info["rmse_deg"] < 2.0
-
-
-def test_a_long_memory_is_better_where_pulses_last_as_long_as_in_training():
-    loop = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-    env = PMAEnv("rotation", pressure_kpa=400.0, disturbances="operator", **loop)
-    errors = [
-        np.mean([driven(env, controller, seed)["rmse_deg"] for seed in range(4)])
-        for controller in (PPOMemory(), PPOPolicy())
-    ]
-    assert errors[0] < errors[1]
 
 
 @pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)

@@ -86,7 +86,7 @@ def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):
     assert best.parent.name == "seed-1"
     pooled = {"by_seed": [3.0, 2.0, 4.0], "mean": [3.0, 2.5, 3.5], "unit": "mm"}
     figures = {"seeds": 3, "judged": {"robust": {"displacement": pooled}}}
-    (path,) = ship([tmp_path / "group"], {"group": figures}, folder=tmp_path / "shipped")
+    (path,) = ship([tmp_path / "group"], {"group": figures}, tmp_path / "shipped")
     shipped = load_policy_file(path)
     assert shipped.training["seed"] == 1
     assert shipped.training["scores"]["suites"]["robust: displacement"]["this"] == 2.0
@@ -109,7 +109,7 @@ def test_of_several_algorithms_the_best_ships_and_replaces_the_other(station, tm
     shipped.mkdir()
     save_policy_file(trained(station), shipped / "displacement-100hz-td3")
     save_policy_file(trained(station), shipped / "displacement-100hz-ppo")
-    ship([tmp_path / group for group in groups], dict.fromkeys(groups, figures), folder=shipped)
+    ship([tmp_path / group for group in groups], dict.fromkeys(groups, figures), shipped)
     assert {p.stem for p in shipped_policies(shipped)} == {
         "displacement-100hz-ppo",
         "displacement-100hz-sac",

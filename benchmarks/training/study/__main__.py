@@ -115,8 +115,8 @@ def report(
     found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
-    for names, suffix in SHIPPED if ship else ():
-        for path in ship_policies([out / name for name in names], found["groups"], suffix):
+    for names in SHIPPED if ship else ():
+        for path in ship_policies([out / name for name in names], found["groups"]):
             print(path)
 
 

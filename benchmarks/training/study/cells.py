@@ -14,7 +14,6 @@ HEADLINE = "ppo"
 HEADLINE_PRESETS = {
     "increment": "PPO",
     "increment-late": "PPO",
-    "increment-memory": "PPO, long memory",
 }
 """Presets of the headline algorithm, and what reports call its policies."""
 

@@ -16,14 +16,12 @@ from benchmarks.training.study.pooled import Pool
 SHIPPED_GROUP = "ppo-increment"
 """Group of the headline algorithm at 100 Hz: its best policies have a column in the tables."""
 
-SHIPPED: tuple[tuple[tuple[str, ...], str], ...] = (
-    ((SHIPPED_GROUP,), ""),
-    (("ppo-increment-late",), ""),
-    (("ppo-increment-memory",), "_memory"),
-    (tuple(residual_group(algorithm) for algorithm in OFF_POLICY), ""),
+SHIPPED: tuple[tuple[str, ...], ...] = (
+    (SHIPPED_GROUP,),
+    ("ppo-increment-late",),
+    tuple(residual_group(algorithm) for algorithm in OFF_POLICY),
 )
-"""Groups of which together the best policy of each task and loop ships, and what is added to its
-name, by which it is told from the algorithm's other policy for the same task and loop."""
+"""Groups of which together the best policy of each task and loop ships."""
 
 PID_FOLDER = "pid"
 """Folder of the PID's results, which learning curves are compared with."""

@@ -12,7 +12,6 @@ from controllers.designs import EXERCISE_KINDS
 from controllers.policy import POLICIES
 from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.tasks import PULSE_S
 
 
 def best_policies(groups: Sequence[Path]) -> list[Path]:
@@ -35,7 +34,6 @@ def best_policies(groups: Sequence[Path]) -> list[Path]:
 def ship(
     groups: Sequence[Path],
     figures: Mapping[str, Any],
-    suffix: str = "",
     folder: Path = POLICIES,
 ) -> list[Path]:
     """Copy the best policies to the folder that ships, each with its card.
@@ -45,7 +43,6 @@ def ship(
     Args:
         groups: folders of seeds, of which the best of all ships; some may not be there.
         figures: of each group by name, from `study_figures`: suites' scores go into the files.
-        suffix: added to the policies' names.
         folder: where to.
     Returns:
         The .json files.
@@ -58,12 +55,11 @@ def ship(
         policy, own = load_policy_file(best), figures[best.parent.parent.name]
         scores = dict(policy.training["scores"]) | {"suites": _scores(policy, own)}
         stem, _, own_algorithm = best.stem.rpartition("-")
-        name = best.stem + suffix
         training = dict(policy.training) | {"scores": scores}
-        shipped = replace(policy, name=name, training=training)
-        path = save_policy_file(shipped, folder / f"{name}.json")
+        shipped = replace(policy, name=best.stem, training=training)
+        path = save_policy_file(shipped, folder / f"{best.stem}.json")
         for algorithm in algorithms - {own_algorithm}:
-            for old in folder.glob(f"{stem}-{algorithm}{suffix}.*"):
+            for old in folder.glob(f"{stem}-{algorithm}.*"):
                 old.unlink()
         path.with_suffix(".md").write_text(card(shipped, own["seeds"]), encoding="utf-8")
         found.append(path)
@@ -131,26 +127,12 @@ def card(policy: PolicyFile, seeds: int) -> str:
             "| --: | --: | --: |",
             *curve,
             "",
-            *_memory(policy),
             "Limits: for this control rate and delay alone (others are refused), for stations like "
             "those of the recipe; at a limit of the rig it knows no more than its training showed "
             "it. How busy its voltage is stands in docs/policies.md. Never run on a real rig.",
             "",
         ]
     )
-
-
-def _memory(policy: PolicyFile) -> list[str]:
-    """What a memory that is longer than the disturbances' pulses has learned of them."""
-    kwargs = policy.environment["kwargs"]
-    seen_s = policy.view.history / kwargs["control_rate_hz"]
-    if "operator" not in str(kwargs.get("disturbances", "none")) or seen_s < PULSE_S:
-        return []
-    return [
-        f"It sees {seen_s:g} s back and has learned that a pulse of the operator's lasts "
-        f"{PULSE_S:g} s. With shorter or longer ones it is worse, see docs/policies.md.",
-        "",
-    ]
 
 
 def _suites(scores: Mapping[str, Any]) -> list[str]:
