@@ -1,5 +1,7 @@
 """Stations at rest when an episode begins: in a batch as alone, kept as searched anew."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -50,6 +52,17 @@ def test_the_oldest_go_first(drawn, monkeypatch):
     first = next(iter(beginning._KEPT))
     begun(nominal, models[:2], 1.5 * PRESSURES[:2])
     assert len(beginning._KEPT) == 3 and first not in beginning._KEPT
+
+
+def test_threads_that_drop_what_others_take_find_the_same(drawn, monkeypatch):
+    alone = begun(*drawn)
+    # Room for one of three: every thread drops what another has just kept.
+    monkeypatch.setattr(beginning, "KEPT", 1)
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda _: begun(*drawn), range(24)))
+    for states, zeros in together:
+        assert states.tobytes() == alone[0].tobytes() and zeros.tobytes() == alone[1].tobytes()
+    assert len(beginning._KEPT) == 1
 
 
 def test_what_does_not_balance_is_named(drawn):
