@@ -17,6 +17,9 @@ HEADLINE_PRESETS = {
 }
 """Presets of the headline algorithm, and what reports call its policies."""
 
+EXERCISE_PRESET, EXERCISE_TASK = "increment", "isokinetic_exercise"
+"""The headline algorithm's preset for an exercise, and the exercise that is studied."""
+
 OFF_POLICY = ("sac", "td3", "tqc")
 """Algorithms that learn from what is past, over and over."""
 
@@ -76,9 +79,12 @@ def cells() -> list[Cell]:
         for task in ("displacement", "rotation"):
             group = f"{HEADLINE}-{preset}"
             found.append(Cell(group, title, HEADLINE, preset, task, HEADLINE_SEEDS))
+    group = f"{HEADLINE}-{EXERCISE_PRESET}"
+    title = HEADLINE_PRESETS[EXERCISE_PRESET]
+    found.append(Cell(group, title, HEADLINE, EXERCISE_PRESET, EXERCISE_TASK, HEADLINE_SEEDS))
     for algorithm in OFF_POLICY:
         title = f"{algorithm.upper()}, residual"
-        for task in ("displacement", "rotation", "isokinetic_exercise"):
+        for task in ("displacement", "rotation", EXERCISE_TASK):
             group = residual_group(algorithm)
             found.append(Cell(group, title, algorithm, "residual", task, OTHER_SEEDS))
     for algorithm in OFF_POLICY:
