@@ -6,6 +6,7 @@ from pma_gym.effects.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.contractile_force import CONTRACTILE_FORCE
 from pma_gym.effects.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.creep import CREEP, SLOW_CREEP
+from pma_gym.effects.current_imbalance import CURRENT_IMBALANCE
 from pma_gym.effects.damping import DAMPING, SYMMETRIC_DAMPING
 from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
 from pma_gym.effects.drive import DRIVE
@@ -98,6 +99,7 @@ CATALOGUE: dict[str, Effect] = {
         RESIDUAL_LOAD,
         DRIVE_LAG,
         TORQUE_RIPPLE,
+        CURRENT_IMBALANCE,
         BEARING_FRICTION,
         ROTOR,
         HANGING_LOAD,

@@ -20,6 +20,7 @@ _RANGES = {
     "contraction": 0.03,
     "velocity": 0.1,
     "angle": 1.0,
+    "motor_angle": -0.5,
     "spin": 4.0,
     "pressure": 300e3,
     "pressure_asked": 310e3,
@@ -60,7 +61,9 @@ PLACES: dict[str, Place] = {
     "drive_shape": Place(("load", "motor_voltage", "velocity", "spin", "pressure"), "load"),
     "drive_delay": Place(("load_asked", "motor_voltage"), "load_asked"),
     "drive_lag": Place(("load_command", "motor_voltage"), "load_command"),
-    "drive_ripple": Place(("load_arriving", "angle", "spin", "velocity", "motor_voltage"), 0.0),
+    "drive_ripple": Place(
+        ("load_arriving", "angle", "motor_angle", "spin", "velocity", "motor_voltage"), 0.0
+    ),
     "regulator_delay": Place(("pressure_asked", "regulator_voltage"), "pressure_asked"),
     "regulator_pace": Place(("pressure", "pressure_command", "regulator_time_constant"), 1.0),
     "chamber": Place(("pressure", "contraction", "velocity"), 0.0),

@@ -249,7 +249,8 @@ def _station(search: _Search) -> None:
     search["contraction"] = _balance(search, np.maximum(load, 0.0))
     search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
     ripples = [e for e in search.plant.model.effects.values() if e.port == RIPPLE and e.law]
-    if any("angle" in signals(effect.law) for effect in ripples if effect.law):
+    angles = {"angle", "motor_angle"}
+    if any(angles & set(signals(effect.law)) for effect in ripples if effect.law):
         _settle_by_angle(search)
 
 

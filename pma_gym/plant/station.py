@@ -70,6 +70,7 @@ def write_equations(equations: Equations) -> None:
     eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     eq.let("stretch", rotor.radius * eq["angle"] + (eq["contraction"] - eq["zero_contraction"]))
+    eq.let("motor_angle", eq["angle"] - eq["zero_contraction"] / rotor.radius)
     eq.let("stretch_rate", rotor.radius * eq["spin"] + eq["velocity"])
     eq.let("cable_tension", eq.one("cable"))
     eq.let("muscle_force", eq.total("muscle_force"))

@@ -19,6 +19,7 @@ TYPICAL = {
     "drive_saturation": {"limit_n": 150.0},
     "drive_lag": {"share": 1.0, "time_constant_ms": 10.0},
     "torque_ripple": {"amplitude_percent": 1.0, "periods": 24.0, "phase_deg": 30.0},
+    "current_imbalance": {"amplitude_percent": 2.5, "periods": 6.0, "phase_deg": 30.0},
     "regulator_rate_limit": {"limit_kpa_per_s": 100.0},
     "filling": {"exponent": 1.4, **BRAID},
     "lvdt_error": {"gain_percent": 1.0, "offset_mm": 0.5},

@@ -12,6 +12,7 @@ WITHOUT_MEMORY = (
     "drive_dead_zone",
     "drive_saturation",
     "torque_ripple",
+    "current_imbalance",
     "regulator_rate_limit",
     "regulator_deadband",
     "nonlinear_stiffness",

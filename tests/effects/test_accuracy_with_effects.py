@@ -22,6 +22,7 @@ EVERY = (
     "bearing_friction",
     "potentiometer_backlash",
     "torque_ripple",
+    "current_imbalance",
     "regulator_rate_limit",
     "filling",
 )

@@ -42,6 +42,7 @@ SIGNALS = {
     "load_command": (0.0, 1000.0),
     "load_arriving": (0.0, 1000.0),
     "angle": (-0.1, 2.5),
+    "motor_angle": (-2.7, 0.5),
     "spin": (-4.0, 4.0),
     "regulator_time_constant": (0.01, 0.2),
 }
