@@ -17,6 +17,7 @@ from benchmarks.measured.blind import Proposal, Undecidable, undecidable
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
+from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.steps import Step, folds, steps
 from benchmarks.measured.tables import print_measured
 from benchmarks.measured.trials import measured_dataset
@@ -67,6 +68,7 @@ class Measured:
         steps: models with one effect more at a time.
         folds: rms errors of all effects with every pressure left out once, by figure.
         floors: scatter between repeats, by figure.
+        smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
         blind: effects that I2 and I3 cannot tell beside the amended model.
         proposals: experiments that would show them.
         reverse: what explains the misfit of the identified station in tables 21-30, round by round.
@@ -79,6 +81,7 @@ class Measured:
     steps: list[Step]
     folds: dict[str, float]
     floors: dict[str, float]
+    smooth: dict[str, float]
     blind: list[Undecidable]
     proposals: list[Proposal]
     reverse: list[list[Explanation]]
@@ -150,6 +153,7 @@ def run_measured(
         stepped,
         left_out,
         floors(),
+        smooth_errors(*judged),
         blind,
         proposals,
         reverse,

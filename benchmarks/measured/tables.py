@@ -58,13 +58,15 @@ def equals(found: Round, name: str) -> list[str]:
 
 
 def error_rows(result: "Measured") -> Rows:
-    """Errors on pressures that took no part, model after model, with the scatter of repeats."""
+    """Errors on pressures that took no part, model after model, and what they may be held to."""
     rows = [
         (_label(step.name), *(f"{step.unseen[key]:.2f}" for key, _ in COLUMNS))
         for step in result.steps
     ]
     every = tuple(f"{result.folds[key]:.2f}" for key, _ in COLUMNS)
     rows.append(("all effects, every pressure left out once", *every))
+    smooth = tuple(f"{result.smooth[key]:.2f}" for key, _ in COLUMNS)
+    rows.append(("any smooth function of the commands", *smooth))
     rows.append(("scatter of the repeats", *(f"{result.floors[key]:.2f}" for key, _ in COLUMNS)))
     return rows
 
@@ -225,7 +227,8 @@ def verdict_words(result: "Measured") -> Iterator[str]:
     yield (
         f"Extension at pressures that took no part: {first.unseen['extension_mm']:.2f} mm as "
         f"given, {got:.2f} mm with {len(last.effects)} effects; target {TARGET_MM:g} mm: {met}; "
-        f"repeats scatter by {result.floors['extension_mm']:.2f} mm."
+        f"a smooth function of the commands misses {result.smooth['extension_mm']:.2f} mm, repeats "
+        f"scatter by {result.floors['extension_mm']:.2f} mm."
     )
     yield (
         f"Rotation: {first.unseen['rotation_deg']:.2f} deg as given, "

@@ -10,10 +10,18 @@ from rich.console import Console
 from benchmarks.measured import rounds as of_rounds
 from benchmarks.measured.blind import Proposal, Undecidable
 from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, worked
-from benchmarks.measured.job import DIAGNOSED_KPA, UNSEEN_KPA, Measured, diagnosed, write_trials
+from benchmarks.measured.job import (
+    DIAGNOSED_KPA,
+    UNSEEN_KPA,
+    Measured,
+    diagnosed,
+    judged_at,
+    write_trials,
+)
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import NOTHING, Explanation, Summary
 from benchmarks.measured.rounds import ADDED, Round, rounds
+from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
 from benchmarks.measured.trials import measured_dataset
@@ -69,6 +77,14 @@ def test_the_three_element_model_misses_extension_by_a_centimetre(every):
     assert len(errors["extension_mm"]) == 396
     assert repeat_scatter(every)["extension_mm"] == pytest.approx(0.62, abs=0.05)
     assert rms(limit_errors(load_model("station"), every)["extension_mm"]) < 1.2
+
+
+def test_a_smooth_function_says_what_no_law_of_the_muscle_can_mend():
+    """Beyond repeats, held-out extension is 0.2 mm off by the commands, none by the load."""
+    found = smooth_errors(judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA))
+    assert found["extension_mm"] == pytest.approx(0.77, abs=0.05)
+    assert found["extension_at_load_mm"] == pytest.approx(0.59, abs=0.05)
+    assert found["rotation_deg"] == pytest.approx(2.2, abs=0.2)
 
 
 def test_what_is_diagnosed_holds_no_pressure_that_it_is_judged_on():
@@ -211,6 +227,7 @@ def test_the_page_and_the_tables_say_what_was_found():
         steps=[step("as given", (), 9.9), step("creep", ("creep",), 0.7)],
         folds={key: 0.8 for key, _ in COLUMNS},
         floors={key: 0.6 for key, _ in COLUMNS},
+        smooth={key: 0.7 for key, _ in COLUMNS},
         blind=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
         proposals=[Proposal("pressure steps", ("regulator_delay",), 0.2)],
         reverse=[explained],
