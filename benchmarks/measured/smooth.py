@@ -6,6 +6,7 @@ commands (a ripple of the motor), or it changes from session to session.
 """
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,9 @@ Array = NDArray[np.float64]
 
 RESTARTS = 3
 """How often the search for lengths begins anew."""
+
+LENGTHS: Any = np.array([1.0, 2.0])
+"""Where the search for lengths begins (V of the regulator, V of the motor)."""
 
 ROUGHEST = 0.05
 """Shortest length that is tried, in volts of either command."""
@@ -45,7 +49,7 @@ def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:
     asked, truth = _rows(unseen, figure, at_load)
     spread = float(values.std())
     kernel = ConstantKernel(spread**2, (1e-2 * spread**2, 1e3 * spread**2)) * RBF(
-        np.array([1.0, 2.0]), (ROUGHEST, 50.0)
+        LENGTHS, (ROUGHEST, 50.0)
     ) + WhiteKernel(0.01 * spread**2, (1e-6 * spread**2, spread**2))
     process = GaussianProcessRegressor(kernel, n_restarts_optimizer=RESTARTS, random_state=0)
     process.fit(known, values - values.mean())
