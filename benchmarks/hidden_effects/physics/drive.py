@@ -44,13 +44,14 @@ class CurrentLag(Hidden):
         if step == 0.0:
             self.held, self.before = loads[0].copy(), loads[0].copy()
             return loads
-        # Between two times the load is what it is half-way; so the lag is no half step shorter.
-        half_way = 0.5 * (loads + np.concatenate([self.before[None], loads[:-1]]))
+        # Exact for a load that is linear between two times, whatever the lag.
         out = loads.copy()
         for i in np.flatnonzero(self.time > 1e-6):
             keep = float(np.exp(-step / self.time[i]))
-            memory = [keep * self.held[i]]
-            out[:, i], _ = lfilter([1.0 - keep], [1.0, -keep], half_way[:, i], zi=memory)
+            share = (1.0 - keep) * self.time[i] / step
+            now, past = 1.0 - share, share - keep
+            memory = [keep * self.held[i] + past * self.before[i]]
+            out[:, i], _ = lfilter([now, past], [1.0, -keep], loads[:, i], zi=memory)
         self.held, self.before = out[-1].copy(), loads[-1].copy()
         return out
 

@@ -147,7 +147,9 @@ class _Sensors:
         bandwidths = np.repeat(np.array(BANDWIDTH)[:, None], lanes, axis=1)
         for effect in hidden:
             bandwidths = effect.bandwidths(bandwidths)
-        self.keep = np.exp(-2.0 * np.pi * bandwidths * moment.step)
+        # As late, on a ramp, as the sensor itself; an exponential of the step would be later.
+        late, half = 1.0 / (2.0 * np.pi * bandwidths), 0.5 * moment.step
+        self.keep = (late - half) / (late + half)
         self.hidden = hidden
         signals = [moment.contraction, moment.angle, moment.tension, moment.pressure]
         rest = [signal[None, :] for signal in signals]
