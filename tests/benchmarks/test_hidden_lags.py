@@ -12,10 +12,10 @@ STEP = 1.0 / (RATE * SUBSTEPS)
 
 @pytest.mark.parametrize("lag_ms", [0.02, 0.1, 0.3, 1.0, 10.0])
 def test_a_drive_lags_a_ramp_by_its_time_constant(lag_ms):
-    time = (np.arange(4000) + 0.5) * STEP
+    time = (np.arange(4000, dtype=np.float64) + 0.5) * STEP
     lag = CurrentLag(np.array([lag_ms * 1e-3]))
     lag.loads(np.zeros((1, 1)), 0.0)
-    late = np.concatenate([lag.loads(part, STEP) for part in np.split(time[:, None], 8)])
+    late = np.concatenate([lag.loads(part, STEP) for part in time.reshape(8, -1, 1)])
     assert time[-1] - late[-1, 0] == pytest.approx(lag_ms * 1e-3, abs=1e-8)
 
 
