@@ -54,7 +54,7 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         if look.resolvable is None or look.resolvable > 1.0
     )
     fit = found.selection.fit
-    parameters = _moved(found, fit)
+    parameters = _moved(found, fit) if found.fewest is None else _off(found, found.fewest.fit)
     off = any(moved.significant for moved in parameters.values())
     verdict = verdict_of(found, left, laws, blind, bool(coarse), off)
     effects = (*_effects(found), *coarse) if verdict == "effect" else ()
@@ -79,7 +79,11 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         next_experiment=_following(found, verdict, blind) if propose else None,
         model=model,
         given=found.given,
-        not_identifiable=_not_identifiable(found, fit),
+        not_identifiable={
+            path: why
+            for path, why in _not_identifiable(found, fit).items()
+            if path not in parameters
+        },
         blind=blind,
         law=residual_law(laws[0]) if verdict == "unknown" and telling(found, laws) else None,
         tones=tones(found) if verdict == "unknown" else {},
@@ -135,6 +139,22 @@ def _moved(found: Findings, fit: Fitted) -> Mapping[str, Moved]:
                 Moved(float(before), _estimate(found, fit, path), bool(score > MOVED)),
             )
     return {path: each for path, (_, each) in sorted(moved.items(), key=lambda item: -item[1][0])}
+
+
+def _off(found: Findings, fit: Fitted) -> Mapping[str, Moved]:
+    """The fewest parameters that explain the trials, the surest first."""
+    start = values(found.given, fit.paths)
+    moved = {
+        path: Moved(float(before), _estimate(found, fit, path), True)
+        for path, before in zip(fit.paths, start, strict=True)
+    }
+    spread = dict(zip(fit.paths, np.sqrt(np.diag(fit.covariance)), strict=True))
+    return dict(
+        sorted(
+            moved.items(),
+            key=lambda item: -abs(item[1].now.value - item[1].start) / spread[item[0]],
+        )
+    )
 
 
 def _not_identifiable(found: Findings, fit: Fitted) -> Mapping[str, str]:
@@ -212,6 +232,8 @@ def _amended(found: Findings, verdict: Verdict) -> Model:
         return found.given
     keep = verdict in ("effect", "unknown")
     fit = found.selection.fit if keep else found.refitted
+    if found.fewest is not None:
+        fit = found.fewest.fit
     notes = dict(fit.model.notes)
     for path in fit.paths:
         value, error = fit.estimate(path)

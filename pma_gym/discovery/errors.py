@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.evidence import PIECE_S
+from pma_gym.discovery.evidence import PIECE_S, Pieces
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.suspects import Suspect
 
@@ -37,21 +37,40 @@ def covariance(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Array:
     known = np.isfinite(np.diag(fit.covariance))
     pulls = pieces.products[:, 1:, 0][:, known]
     inverse = fit.covariance[np.ix_(known, known)]
-    squares = np.diag(inverse).copy()
-    trials = len(bench.trials)
-    order = np.arange(len(pulls)) - np.searchsorted(pieces.trial, pieces.trial)
+    squares = widened(np.diag(inverse), pulls, inverse, clusters(pieces))
+    wider = np.ones(len(known))
+    wider[known] = np.sqrt(squares / np.diag(inverse))
+    return fit.covariance * np.outer(wider, wider)
+
+
+def clusters(pieces: Pieces) -> list[NDArray[np.int64]]:
+    """Of every piece, its stretch of time; and its trial, where there are trials enough."""
+    order = np.arange(len(pieces.trial)) - np.searchsorted(pieces.trial, pieces.trial)
     stretch = order // round(STRETCH_S / PIECE_S)
-    clusters = [pieces.trial * (stretch.max() + 1) + stretch]
-    if trials >= LEAST_TRIALS:
-        clusters.append(pieces.trial)
-    for cluster in clusters:
-        _, index = np.unique(cluster, return_inverse=True)
+    found = [pieces.trial * (stretch.max() + 1) + stretch]
+    if len(np.unique(pieces.trial)) >= LEAST_TRIALS:
+        found.append(pieces.trial)
+    return found
+
+
+def widened(
+    squares: Array, pulls: Array, inverse: Array, groups: Sequence[NDArray[np.int64]]
+) -> Array:
+    """Squared errors, or those by how pulls scatter between clusters where these are larger.
+
+    Args:
+        squares: of the curvature, shape (p,).
+        pulls: of every piece at every parameter, shape (pieces, p).
+        inverse: of the curvature, shape (p, p).
+        groups: the cluster of every piece, in each way of making clusters.
+    """
+    for group in groups:
+        _, index = np.unique(group, return_inverse=True)
         count = int(index.max()) + 1
+        if count < 2:
+            continue
         summed = np.zeros((count, pulls.shape[1]))
         np.add.at(summed, index, pulls)
         moves = summed @ inverse
         squares = np.maximum(squares, count / (count - 1.0) * np.sum(moves**2, axis=0))
-    found = fit.covariance.copy()
-    wider = np.ones(len(known))
-    wider[known] = np.sqrt(squares / np.diag(inverse))
-    return found * np.outer(wider, wider)
+    return squares

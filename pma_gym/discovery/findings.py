@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pma_gym.data.dataset import NamedTrial
+from pma_gym.discovery.fewest import Fewest
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import Level
 from pma_gym.discovery.held_out import Unseen
@@ -28,6 +29,7 @@ class Findings:
         suspects: the catalogue.
         searched: whether effects were looked for.
         seed: of simulated chance.
+        fewest: the parameters that are off, where nothing else is; None where something may be.
         rivals: of each effect.
         unseen: what the amended model says of trials that it was not fitted to.
         unseen_without: the same without the effects.
@@ -42,6 +44,7 @@ class Findings:
     suspects: tuple[Suspect, ...]
     searched: bool
     seed: int
+    fewest: Fewest | None = None
     rivals: tuple[tuple[Rival, ...], ...] = ()
     unseen: Unseen | None = None
     unseen_without: Unseen | None = None
@@ -50,3 +53,11 @@ class Findings:
     def looks(self) -> tuple[Look, ...]:
         """The first looks at the whole catalogue, the most promising first."""
         return self.selection.stages[0].looks if self.selection.stages else ()
+
+    @property
+    def proposed(self) -> tuple[Bench, Fitted]:
+        """The fit that is proposed, and on which bench: of few parameters, else the selection's."""
+        few = self.fewest
+        if few is None or not few.fit.paths:
+            return self.selection.bench, self.selection.fit
+        return few.bench, few.fit

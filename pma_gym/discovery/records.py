@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
     """Every trial as measured, and as three models have it."""
-    bench, selection = found.bench, found.selection
+    bench, (proposing, proposed) = found.bench, found.proposed
     evidence = bench.evidence(found.given)
     before = evidence.readings(values(found.given, bench.own.free))
     unseen, without = found.unseen, found.unseen_without
@@ -27,9 +27,7 @@ def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
     after = (
         unseen.readings
         if unseen is not None
-        else selection.bench.evidence(selection.fit.model, selection.chosen).readings(
-            selection.fit.values
-        )
+        else proposing.evidence(proposed.model, found.selection.chosen).readings(proposed.values)
     )
     assert refitted is not None and after is not None
     records = []

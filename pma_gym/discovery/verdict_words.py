@@ -3,6 +3,7 @@
 import numpy as np
 
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
@@ -199,6 +200,12 @@ def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]
         said.append(
             f"Of what was slow in the residual, {percent(left)} is left by "
             f"{effect_names([suspect.name for suspect in selection.chosen])}."
+        )
+    if found.fewest is not None:
+        said.append(
+            f"Parameters that are off: {len(found.fewest.fit.paths)} of {len(bench.own.free)} are "
+            f"needed to explain these trials, each with odds of {ODDS:g} to 1 or more; the others "
+            "are as they were given, and the intervals hold if they are."
         )
     if found.unseen is not None:
         said.append(

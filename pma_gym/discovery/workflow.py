@@ -10,6 +10,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer import answer
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.fewest import Fewest, fewest
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import initial_floors
@@ -136,6 +137,7 @@ class _Work:
             suspects=tuple(every),
             searched=search,
             seed=self.seed,
+            fewest=self._timed("fewest", lambda: _fewest(selection)),
         )
         found = self._timed("confirmation", lambda: self._confirmed(found))
         diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
@@ -186,8 +188,7 @@ class _Work:
             for place in range(len(selection.chosen))
         ]
         left_out = unseen(
-            selection.bench,
-            selection.fit,
+            *found.proposed,
             selection.chosen,
             lambda done, total: self._tell("trials left out", done, total),
         )
@@ -213,6 +214,14 @@ def _nothing(bench: Bench, refitted: Fitted) -> Selection:
     """A selection from no suspects."""
     noise = relearnt(bench, refitted, ())
     return Selection((), (), refitted, replace(bench, noise=noise), refitted)
+
+
+def _fewest(selection: Selection) -> Fewest | None:
+    """The parameters that are off, where effects were looked for and nothing speaks for one."""
+    if not selection.stages or selection.chosen:
+        return None
+    first = selection.stages[0]
+    return None if first.gate or first.missing else fewest(selection.bench, selection.fit)
 
 
 def _check_size(logged: Sequence[Logged], free: Sequence[str]) -> None:
