@@ -226,6 +226,18 @@ KINDS: dict[str, Kind] = {
         ),
         5.0,
     ),
+    "current_imbalance": Kind(
+        lambda g, most: {
+            "amplitude_percent": _log(g, 1.0, 4.0),
+            "periods": 2.0 * float(g.integers(1, 5)),
+            "phase_deg": g.uniform(-180.0, 180.0),
+        },
+        ("amplitude_percent",),
+        lambda p: drive.Imbalance(
+            p["amplitude_percent"] * 1e-2, one(p["periods"]), one(p["phase_deg"]) * DEGREE
+        ),
+        5.0,
+    ),
     "potentiometer_backlash": Kind(
         lambda g, most: {"width_deg": _log(g, 0.3, 2.0)},
         ("width_deg",),

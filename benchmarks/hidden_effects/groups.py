@@ -7,6 +7,7 @@ GROUPS: tuple[frozenset[str], ...] = (
     frozenset({"regulator_delay", "regulator_rate_limit", "pressure_transducer_lag"}),
     frozenset({"drive_dead_zone", "cable_slack"}),
     frozenset({"nonlinear_stiffness", "passive_stretch"}),
+    frozenset({"torque_ripple", "current_imbalance"}),
 )
 """At most three each; an effect in none stands alone."""
 

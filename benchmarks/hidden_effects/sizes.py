@@ -26,6 +26,7 @@ SAME: dict[str, tuple[str, ...]] = {
     "drive_lag": ("time_constant_ms",),
     "drive_delay": ("delay_ms",),
     "torque_ripple": ("amplitude_percent",),
+    "current_imbalance": ("amplitude_percent",),
     "potentiometer_backlash": ("width_deg",),
 }
 """Parameters by effect that bear the same name and mean the same."""

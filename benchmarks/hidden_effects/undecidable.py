@@ -82,6 +82,7 @@ WITNESS: dict[str, str] = {
     "load_dependent_damping": _SINES,
     "nonlinear_stiffness": _SINES,
     "torque_ripple": _SINES,
+    "current_imbalance": _SINES,
 }
 """Effects of the block, and how the protocol of the library begins that would show each."""
 

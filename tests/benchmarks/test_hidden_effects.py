@@ -48,6 +48,7 @@ TYPICAL = {
     "drive_lag": {"time_constant_ms": 10.0},
     "drive_delay": {"delay_ms": 10.0},
     "torque_ripple": {"amplitude_percent": 0.8, "periods": 12.0, "phase_deg": 40.0},
+    "current_imbalance": {"amplitude_percent": 2.7, "periods": 6.0, "phase_deg": 20.0},
     "potentiometer_backlash": {"width_deg": 2.0},
     "lvdt_lag": {"longer_ms": 20.0},
     "potentiometer_lag": {"longer_ms": 20.0},
@@ -65,6 +66,7 @@ SHAPES = {
     "drive_delay": {"share": 1.0},
     "regulator_delay": {"share": 1.0},
     "torque_ripple": {"periods": 12.0, "phase_deg": 40.0},
+    "current_imbalance": {"periods": 6.0, "phase_deg": 20.0},
     # exp(-P / 100 kPa) and (P / 200 kPa)^-3 meet at 200 kPa.
     "warm_up": {"force_n": 170.0, "fade_kpa": 100.0, "repeats": 0.87, "repeat": 0.0},
     "nonlinear_stiffness": {"linear": 0.5, "quadratic": 0.33},

@@ -80,6 +80,19 @@ class Ripple(Hidden):
         return self.share * moment.load * np.cos(self.periods * moment.angle + self.phase)
 
 
+class Imbalance(Hidden):
+    """The motor's pull varies with where its shaft stands, the same at every pressure."""
+
+    def __init__(self, share: Array, periods: float, phase: float) -> None:
+        """Take shares of all lanes, periods a turn, phase (rad)."""
+        self.share, self.periods, self.phase = share, periods, phase
+
+    def pull(self, moment: Moment) -> Array:
+        """The part that varies; the shaft is turned back by what the muscle has shortened."""
+        shaft = moment.angle - moment.resting / moment.rig["radius"]
+        return self.share * moment.load * np.cos(self.periods * shaft + self.phase)
+
+
 class BearingFriction(Hidden):
     """Dry friction of the motor's bearing, which the load cell does not feel."""
 

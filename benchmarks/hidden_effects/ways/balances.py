@@ -197,6 +197,11 @@ def _drive(ready: Prepared, m: Motion) -> tuple[Array, Sequence[Array], Terms]:
     for periods in PERIODS:
         terms[f"torque_ripple:sin {periods}"] = m.load * np.sin(periods * m.angle)
         terms[f"torque_ripple:cos {periods}"] = m.load * np.cos(periods * m.angle)
+    for periods in (2, 4, 6, 8):
+        # A taut cable ties the shaft to the slide.
+        shaft = -m.x / rotor.radius
+        terms[f"current_imbalance:sin {periods}"] = m.load * np.sin(periods * shaft)
+        terms[f"current_imbalance:cos {periods}"] = m.load * np.cos(periods * shaft)
     return residual, (asked, m.turn, m.spin), terms
 
 
