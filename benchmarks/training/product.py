@@ -64,7 +64,7 @@ def _kwargs(preset: Preset, station: Station) -> dict[str, Any]:
 def _training(order: Order, trained: Trained) -> dict[str, Any]:
     course, state = trained.course, git_state(ROOT)
     commit = str(state["commit"])[:12] + ("+" if state["dirty"] else "")
-    error, broken, reward = trained.final
+    error, broken, reward, mean = trained.final
     return {
         "algorithm": order.preset.algorithm,
         "preset": order.preset.name,
@@ -76,6 +76,7 @@ def _training(order: Order, trained: Trained) -> dict[str, Any]:
         "scores": {
             "validation": {
                 "error": error,
+                "mean": mean,
                 "unit": unit_of(order.preset.task),
                 "broken": broken,
                 "reward": reward,

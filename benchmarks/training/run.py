@@ -5,6 +5,7 @@ leg's number. So a training that was killed goes on from its last checkpoint to 
 """
 
 import json
+import math
 import time
 from collections.abc import Callable, Mapping
 from contextlib import closing
@@ -58,6 +59,7 @@ class Point(NamedTuple):
         error: of the validation (mm or deg).
         broken: validation episodes that broke a limit.
         reward: mean reward of a validation episode.
+        mean: mean error of all validation episodes (mm or deg); NaN in checkpoints without it.
     """
 
     steps: int
@@ -65,6 +67,7 @@ class Point(NamedTuple):
     error: float
     broken: int
     reward: float
+    mean: float = math.nan
 
 
 @dataclass(frozen=True)

@@ -96,6 +96,18 @@ def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):
     assert card(shipped, 3) == words
 
 
+def test_a_policy_that_loses_a_station_now_and_then_does_not_ship(station, tmp_path):
+    for seed, (error, mean) in {0: (0.021, 0.03), 1: (0.02, 0.4), 2: (0.03, 0.05)}.items():
+        policy = trained(station, seed, error)
+        scores = {"validation": policy.training["scores"]["validation"] | {"mean": mean}}
+        policy = replace(policy, training=dict(policy.training) | {"scores": scores})
+        folder = tmp_path / f"seed-{seed}"
+        folder.mkdir()
+        save_policy_file(policy, folder / policy.name)
+    (best,) = best_policies([tmp_path])
+    assert best.parent.name == "seed-0"
+
+
 def test_of_several_algorithms_the_best_ships_and_replaces_the_other(station, tmp_path):
     pooled = {"by_seed": [3.0], "mean": [3.0, 2.5, 3.5], "unit": "mm"}
     figures = {"seeds": 1, "judged": {"robust": {"displacement": pooled}}}

@@ -15,7 +15,10 @@ from pma_gym.envs import ENVIRONMENTS
 
 
 def best_policies(groups: Sequence[Path]) -> list[Path]:
-    """Of each task and loop the policy with the least validation error.
+    """Of each task and loop the policy with the least mean error over validation episodes.
+
+    Of all episodes: an interquartile mean would not see a policy that loses one station in twenty.
+    Where some were trained before that mean was kept, it is the interquartile mean after all.
 
     Args:
         groups: folders of seeds; of several the best of all.
@@ -26,7 +29,7 @@ def best_policies(groups: Sequence[Path]) -> list[Path]:
             for path in folder.glob("*.json"):
                 found.setdefault(path.stem.rpartition("-")[0], []).append(path)
     return [
-        min(sorted(paths), key=lambda path: _validation(load_policy_file(path)))
+        _best({path: load_policy_file(path) for path in sorted(paths)})
         for _, paths in sorted(found.items())
     ]
 
@@ -66,8 +69,10 @@ def ship(
     return found
 
 
-def _validation(policy: PolicyFile) -> float:
-    return float(policy.training["scores"]["validation"]["error"])
+def _best(policies: Mapping[Path, PolicyFile]) -> Path:
+    scores = {path: one.training["scores"]["validation"] for path, one in policies.items()}
+    key = "mean" if all("mean" in each for each in scores.values()) else "error"
+    return min(scores, key=lambda path: float(scores[path][key]))
 
 
 def _scores(policy: PolicyFile, figures: dict[str, Any]) -> dict[str, Any]:
@@ -114,8 +119,7 @@ def card(policy: PolicyFile, seeds: int) -> str:
             f"- **Trained on**: {TRAINING} stations drawn by the recipe of suite `robust` with its "
             f"training seed; {training['steps']} control steps, {training['wall_s']:.0f} s on one "
             f"core of a machine that did other things too; seed {training['seed']}, the best of "
-            f"{seeds} on {VALIDATION} validation stations ({validation['error']:.4g} "
-            f"{validation['unit']}).",
+            f"{seeds} on {VALIDATION} validation stations ({_validated(validation)}).",
             f"- **Code**: {training['code']}",
             f"- **Made again by**: `{command}`",
             "",
@@ -133,6 +137,14 @@ def card(policy: PolicyFile, seeds: int) -> str:
             "",
         ]
     )
+
+
+def _validated(validation: Mapping[str, Any]) -> str:
+    """Errors on validation stations; by which one the policy was chosen."""
+    error, unit = f"{validation['error']:.4g}", validation["unit"]
+    if "mean" not in validation:
+        return f"{error} {unit}"
+    return f"mean {validation['mean']:.4g} {unit}, interquartile mean {error} {unit}"
 
 
 def _suites(scores: Mapping[str, Any]) -> list[str]:
