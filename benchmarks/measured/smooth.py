@@ -1,8 +1,8 @@
-"""How well any smooth function of the commands does on pressures that it has not seen.
+"""How well a smooth function of the commands does on pressures that it has not seen.
 
-It knows no physics and takes no more than smoothness, so that what it misses on pressures left out,
-beyond the scatter of the repeats, is no matter of a better force law: either it is rough in the
-commands (a ripple of the motor), or it changes from session to session.
+It knows no physics and takes no more than smoothness: an error that a model should at least reach.
+What it misses beyond the repeats may be rough in the commands (a ripple of the motor), change from
+session to session, or lie too far between the pressures.
 """
 
 from collections.abc import Sequence
@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.gaussian_process import GaussianProcessRegressor
-from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from benchmarks.measured.held_out import AT_LOAD, FIGURES, LOADED, rms
 from pma_gym.data.dataset import Dataset
@@ -45,6 +43,9 @@ def smooth_errors(seen: Dataset, unseen: Dataset) -> dict[str, float]:
 
 
 def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:
+    from sklearn.gaussian_process import GaussianProcessRegressor
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
+
     known, values = _rows(seen, figure, at_load)
     asked, truth = _rows(unseen, figure, at_load)
     spread = float(values.std())
@@ -71,4 +72,5 @@ def _rows(data: Dataset, figure: str, at_load: bool) -> tuple[Array, Array]:
     ]
     regulator = [each.commands["regulator_voltage"][0] for each in trials]
     known, there = np.column_stack([regulator, pulled]), np.isfinite(values)
+    there &= np.isfinite(known).all(axis=1)
     return known[there], values[there]

@@ -66,7 +66,7 @@ def error_rows(result: "Measured") -> Rows:
     every = tuple(f"{result.folds[key]:.2f}" for key, _ in COLUMNS)
     rows.append(("all effects, every pressure left out once", *every))
     smooth = tuple(f"{result.smooth[key]:.2f}" for key, _ in COLUMNS)
-    rows.append(("any smooth function of the commands", *smooth))
+    rows.append(("a smooth function of the commands", *smooth))
     rows.append(("scatter of the repeats", *(f"{result.floors[key]:.2f}" for key, _ in COLUMNS)))
     return rows
 

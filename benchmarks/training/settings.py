@@ -50,6 +50,9 @@ FALLING = {"clip_range", "learning_rate"}
 NETWORK = {"activation_fn", "net_arch", "log_std_init", "n_critics", "n_quantiles"}
 """Settings of the network."""
 
+PARTS = {"pi", "vf", "qf"}
+"""Parts of a network that may have layers of their own: actor, critic on states, on actions too."""
+
 
 def setting(algorithm: str, key: str, value: object) -> float | int | str:
     """A setting's value, checked; whole numbers as such.
@@ -108,11 +111,17 @@ def network(given: object) -> dict[str, Any]:
             f"activation_fn must be one of {', '.join(ACTIVATIONS)}, got {activation!r}"
         )
     arch = given.get("net_arch", [])
+    if isinstance(arch, Mapping) and not set(arch) <= PARTS:
+        raise ValueError(f"net_arch must name {', '.join(sorted(PARTS))} alone, got {arch!r}")
     for layers in arch.values() if isinstance(arch, Mapping) else [arch]:
         if not isinstance(layers, list):
             raise ValueError(f"net_arch must be a list such as [64, 64], got {arch!r}")
         for size in layers:
             whole("a layer of net_arch", size)
+    if "log_std_init" in given:
+        real("log_std_init", given["log_std_init"])
+    for key in sorted({"n_critics", "n_quantiles"} & set(given)):
+        whole(key, given[key])
     return dict(given)
 
 

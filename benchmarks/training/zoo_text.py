@@ -25,8 +25,10 @@ def network_text(text: str) -> dict[str, object]:
     """
     try:
         found = _value(ast.parse(text.strip(), mode="eval").body)
-    except (SyntaxError, RecursionError) as error:
-        raise ValueError(f"policy_kwargs is no Python text ({error}), got {text!r}") from error
+    except SyntaxError as error:
+        raise ValueError(f"policy_kwargs is no Python text ({error.msg}), got {text!r}") from error
+    except RecursionError as error:
+        raise ValueError("policy_kwargs is nested too deeply to be read") from error
     if not isinstance(found, dict):
         raise ValueError(f"policy_kwargs must be a dict(...), got {text!r}")
     return found
@@ -36,12 +38,24 @@ def _value(node: ast.expr) -> object:
     """Value of a part of the text."""
     match node:
         case ast.Call(func=ast.Name(id="dict"), args=[], keywords=keywords):
+            names = [_key(one) for one in keywords]
+            if twice := {name for name in names if names.count(name) > 1}:
+                raise ValueError(f"policy_kwargs names {', '.join(sorted(twice))} twice")
             return {_key(one): _value(one.value) for one in keywords}
+        case ast.Dict():
+            raise ValueError(
+                "policy_kwargs must be dict(name=value, ...) or a YAML mapping without quotes, "
+                f"got {ast.unparse(node)!r}"
+            )
         case ast.List(elts=parts):
             return [_value(part) for part in parts]
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool):
             return number
-        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int() | float() as number)):
+        case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as part) if not isinstance(
+            part.value, bool
+        ):
+            number = _value(part)
+            assert isinstance(number, int | float)
             return -number
         case ast.Attribute() if ast.unparse(node) in ACTIVATIONS:
             return ast.unparse(node)

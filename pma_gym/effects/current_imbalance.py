@@ -12,7 +12,7 @@ _I3 = "Serres 2008, table I3, measured loads against the motor's voltage"
 class CurrentImbalance(NamedTuple):
     """Parameters of `imbalance_load`."""
 
-    amplitude: Annotated[float, Quantity("%", 0, 20, f"{_I3}: 2.7", 0.0, usual=2.5)]
+    amplitude: Annotated[float, Quantity("%", 0, 10, f"{_I3}: 2.7", 0.0, usual=2.5)]
     periods: Annotated[
         float,
         Quantity("1", 2, 12, f"{_I3}: 5.9, so 6, twice a turn of three pole pairs", usual=6),

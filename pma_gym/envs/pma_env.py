@@ -133,7 +133,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     |---|---|
     | `none` (default) | |
     | `regulator` | the regulator's pressure jumps by 25 kPa, away from its line and back in turn |
-    | `operator` | somebody at the slide pulls or pushes with 50 N for 0.5 s |
+    | `operator` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
     | `regulator_and_operator` | both |
 
     A jump is volts that the regulator hears beside its command, by the nominal line and as far as

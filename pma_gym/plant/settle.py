@@ -289,6 +289,12 @@ def _settle_by_angle(search: _Search) -> None:
         done = done | near
         if np.all(done):
             break
+    if not np.all(done):
+        search.unbalanced = search.unbalanced or (
+            "a ripple of the motor changes the load faster with its angle than the muscle can "
+            "hold, so that no rest is found; make the ripple's amplitude or periods a turn smaller"
+        )
+        contraction = np.where(done, contraction, np.nan)
     search["angle"], search["contraction"] = angle, contraction
 
 

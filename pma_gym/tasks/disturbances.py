@@ -77,7 +77,8 @@ class Events(NamedTuple):
         step_sizes: by how much (Pa): away from its line and back in turn.
         pulse_times: when pulses begin (s), shape (n, pulses).
         pulse_forces: force on the slide during them (N); positive shortens the muscle.
-        pulse_lengths: how long they last (s).
+        pulse_lengths: how long they last (s), shape (n, pulses); an environment rounds up to whole
+            control steps.
     """
 
     step_times: NDArray[np.float64]

@@ -182,6 +182,18 @@ WRONG = {
         ("policy_kwargs",),
         "dict(net_arch=[64], activation_fn=__import__('os').system('ls'))",
     ),
+    r"policy_kwargs names net_arch twice": (
+        ("policy_kwargs",),
+        "dict(net_arch=[64], net_arch=[32])",
+    ),
+    r"net_arch must name pi, qf, vf alone, got \{'foo': \[3\]\}": (
+        ("policy_kwargs",),
+        "dict(net_arch=dict(foo=[3]))",
+    ),
+    r"log_std_init must be a finite number, got inf": (
+        ("policy_kwargs",),
+        "dict(log_std_init=1e999)",
+    ),
     r"policy_kwargs is no Python text \(.*got 'dict\('": (("policy_kwargs",), "dict("),
     r"policy_kwargs must be a dict\(...\), got '\[64\]'": (("policy_kwargs",), "[64]"),
     r"activation_fn must be one of nn.ReLU, nn.Tanh, got 'relu'": (

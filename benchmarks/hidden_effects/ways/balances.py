@@ -197,7 +197,7 @@ def _drive(ready: Prepared, m: Motion) -> tuple[Array, Sequence[Array], Terms]:
     for periods in PERIODS:
         terms[f"torque_ripple:sin {periods}"] = m.load * np.sin(periods * m.angle)
         terms[f"torque_ripple:cos {periods}"] = m.load * np.cos(periods * m.angle)
-    for periods in (2, 4, 6, 8):
+    for periods in filter(lambda each: each <= 12, PERIODS):
         # A taut cable ties the shaft to the slide.
         shaft = -m.x / rotor.radius
         terms[f"current_imbalance:sin {periods}"] = m.load * np.sin(periods * shaft)
