@@ -24,7 +24,7 @@ from pma_gym.discovery.screening import Look
 from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover, tones
 from pma_gym.discovery.verdict import shapeless_laws, suspicious, telling, verdict_of
-from pma_gym.discovery.verdict_words import sentence, steps, unidentified
+from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.where import localise
 from pma_gym.plant.model import Model, Note
 
@@ -120,10 +120,22 @@ def _effects(found: Findings) -> tuple[NamedEffect, ...]:
 
 def _estimate(found: Findings, fit: Fitted, path: str) -> Estimate:
     """A parameter's value and 95 % interval, within its bounds."""
-    value, error = fit.estimate(path)
+    value, error = _known(found, fit, path)
     if not np.isfinite(error):
         return Estimate(value, None, None, unit(path))
     return Estimate(value, value - 1.96 * error, value + 1.96 * error, unit(path))
+
+
+def _known(found: Findings, fit: Fitted, path: str) -> tuple[float, float]:
+    """A parameter's value and its standard error.
+
+    Of the fewest that explain the trials, the error is no smaller than with all parameters free:
+    that the others are exactly as they were given is likely, not known.
+    """
+    value, error = fit.estimate(path)
+    if found.fewest is not None:
+        error = float(np.maximum(error, found.selection.fit.estimate(path)[1]))
+    return value, error
 
 
 def _moved(found: Findings, fit: Fitted) -> Mapping[str, Moved]:
@@ -228,7 +240,7 @@ def _held_out_gains(found: Findings) -> Mapping[str, float]:
 
 def _amended(found: Findings, verdict: Verdict) -> Model:
     """The model with what was found, its intervals in its notes."""
-    if verdict == "agrees":
+    if verdict == "agrees" or (found.fewest is not None and not found.fewest.fit.paths):
         return found.given
     keep = verdict in ("effect", "unknown")
     fit = found.selection.fit if keep else found.refitted
@@ -236,7 +248,7 @@ def _amended(found: Findings, verdict: Verdict) -> Model:
         fit = found.fewest.fit
     notes = dict(fit.model.notes)
     for path in fit.paths:
-        value, error = fit.estimate(path)
+        value, error = _known(found, fit, path)
         known = bool(np.isfinite(error))
         notes[path] = Note(
             f"fitted to {len(found.named)} trials by pma_gym.discovery",
@@ -277,9 +289,23 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
     return None
 
 
+def _doubts(found: Findings) -> list[str]:
+    """Of named parameters, those that another could stand for, or that the trials hardly hold."""
+    if found.fewest is None:
+        return []
+    named, free = found.fewest.fit.paths, found.selection.fit
+    unsure = _not_identifiable(found, free)
+    surely = [path for path, moved in _moved(found, free).items() if moved.significant]
+    return [
+        doubt(path, free, found.bench.own)
+        for path in named
+        if path in unsure or (path not in surely and twin(path, free) not in (None, *named))
+    ]
+
+
 def _warnings(found: Findings) -> tuple[str, ...]:
-    words = []
-    if not found.selection.fit.converged:
+    words = _doubts(found)
+    if not found.proposed[1].converged:
         words.append("the last fit stopped before it had converged; its intervals are rough")
     if found.unseen is None:
         words.append(

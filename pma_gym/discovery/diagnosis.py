@@ -46,7 +46,9 @@ class Moved:
     Attributes:
         start: its value in the model that was given.
         now: its estimate, together with whatever effects were added.
-        significant: whether its interval leaves the value that it had.
+        significant: whether it is said to be off: its estimate is more than three standard errors
+            away, or, where nothing but parameters is off, by odds of 20 to 1. Where the verdict is
+            `agrees`, refitting changes the signals by less than a tenth of their noise.
     """
 
     start: float
@@ -259,7 +261,8 @@ class Diagnosis:
         sentence: the verdict as a person would say it.
         where: where they disagree, the largest share first.
         effects: what is missing; empty unless the verdict is `effect`.
-        parameters: the model's own parameters that moved, by path.
+        parameters: the model's own parameters that moved, by path; where nothing but parameters is
+            off, only those that are named.
         gap: by signal at the door, over all trials.
         candidates: the whole catalogue, the likeliest first.
         next_experiment: what to measure next, where that would tell more.

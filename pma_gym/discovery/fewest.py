@@ -50,8 +50,9 @@ def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
         bench: the trials, with the noise that the fit leaves.
         fit: of all parameters, nothing added.
     Returns:
-        They, or None where what is left explains clearly less than the sums promised: a rig that is
-        far from the model is not to be judged by them.
+        They, or None where the sums are no numbers, or where chi-square grows by more than each
+        parameter that was put back may cost, all together: a rig that is so far from the model is
+        not to be judged by them.
     """
     evidence = bench.evidence(fit.model)
     pieces = evidence.pieces(fit.values, fit.steps, central=True)
@@ -68,14 +69,19 @@ def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
             break
         room += 2.0 * (np.log(ODDS) + occam[least])
         kept = np.delete(kept, least)
+    most = fit.chi_square + room
+    if not np.isfinite(most):
+        return None
     paths = tuple(fit.paths[i] for i in kept)
     narrow = replace(bench, own=Own(paths, evidence.prior[kept]))
     if not paths:
         none = np.empty(0)
-        return Fewest(narrow, Fitted(bench.given, (), (), none, np.empty((0, 0)), 0.0, none, True))
+        left = narrow.evidence(bench.given).sums(none, none).chi_square
+        given = Fitted(bench.given, (), (), none, np.empty((0, 0)), left, none, True)
+        return Fewest(narrow, given) if left <= most else None
     begun = np.clip(evidence.centre[kept] + moves, evidence.lower[kept], evidence.upper[kept])
     found = narrow.fit(bench.given.replace(dict(zip(paths, map(float, begun), strict=True))))
-    if found is None or found.chi_square > fit.chi_square + room:
+    if found is None or not found.chi_square <= most:
         return None
     return Fewest(narrow, replace(found, covariance=covariance(narrow, found, ())))
 

@@ -56,8 +56,10 @@ class Findings:
 
     @property
     def proposed(self) -> tuple[Bench, Fitted]:
-        """The fit that is proposed, and on which bench: of few parameters, else the selection's."""
-        few = self.fewest
-        if few is None or not few.fit.paths:
+        """The fit that is proposed, and on which bench: the fewest's, else the selection's.
+
+        Where no parameter is off, it is the given model with nothing free.
+        """
+        if self.fewest is None:
             return self.selection.bench, self.selection.fit
-        return few.bench, few.fit
+        return self.fewest.bench, self.fewest.fit

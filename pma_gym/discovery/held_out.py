@@ -62,7 +62,8 @@ def unseen(
 ) -> Unseen | None:
     """Leave each fold out once, fit the others from where the fit of all is, and look at it.
 
-    None with a single trial that is not long, or where a fit fails.
+    Where nothing is free, nothing is fitted. None with a single trial that is not long, or where a
+    fit fails.
     """
     if len(bench.trials) < 2:
         return _unseen_stretches(bench, fit, chosen, progress)
@@ -74,7 +75,7 @@ def unseen(
         if progress is not None:
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
-        found = bench.fit(fit.model, chosen, trials=seen)
+        found = bench.fit(fit.model, chosen, trials=seen) if fit.paths else fit
         held = None if found is None else _look(bench, found, chosen, left_out)
         if held is None:
             return None
@@ -101,7 +102,7 @@ def _unseen_stretches(
         seen, rest = _masked(trial, left_out), _masked(trial, ~left_out)
         if not all(_measures(part) for part in (seen, rest)):
             return None
-        found = replace(bench, trials=[seen]).fit(fit.model, chosen)
+        found = replace(bench, trials=[seen]).fit(fit.model, chosen) if fit.paths else fit
         held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
         if held is None:
             return None

@@ -54,7 +54,7 @@ def _parameter_blocks(diagnosis: Diagnosis) -> list[Block]:
         return []
     blocks: list[Block] = [Heading("Parameters and noise", 3)]
     if diagnosis.parameters and diagnosis.verdict != "parameters":
-        blocks.append(moved_table(diagnosis.parameters, "The model's own parameters, refitted"))
+        blocks.append(moved_table(diagnosis.parameters, "The model's own parameters that moved"))
     if diagnosis.not_identifiable:
         blocks.append(unknown_table(diagnosis))
     return blocks

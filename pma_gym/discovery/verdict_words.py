@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.diagnosis import Diagnosis, Verdict
 from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
-from pma_gym.discovery.verdict import BLIND_SHARE
+from pma_gym.discovery.verdict import BLIND_SHARE, MOVED_CHANGE
 from pma_gym.discovery.words import (
     effect_name,
     effect_names,
@@ -162,17 +162,31 @@ def unidentified(path: str, fit: Fitted, own: Own) -> str:
     spread = np.sqrt(np.diag(fit.covariance))
     if not np.isfinite(spread[at]):
         return "it changes nothing in these trials"
-    with np.errstate(invalid="ignore", divide="ignore"):
-        alike = np.abs(fit.covariance[at] / (spread * spread[at]))
-    alike[at] = 0.0
-    alike = np.where(np.isfinite(alike), alike, 0.0)
-    if alike.max(initial=0.0) > ALIKE:
-        return f"{fit.paths[int(np.argmax(alike))]} does the same to the signals"
+    other = twin(path, fit)
+    if other is not None:
+        return f"{other} does the same to the signals"
     prior = own.prior[own.free.index(path)]
     return (
         f"these trials hold it to {spread[at]:.2g} {unit(path)}, hardly less than the "
         f"{prior:.2g} that was assumed beforehand"
     )
+
+
+def doubt(path: str, fit: Fitted, own: Own) -> str:
+    """What speaks against a parameter that is named although another could stand for it."""
+    others = "if that one is off" if twin(path, fit) else "if others are off instead"
+    return f"{path}: {unidentified(path, fit, own)}; {others}, {path} may be as it was given"
+
+
+def twin(path: str, fit: Fitted) -> str | None:
+    """The parameter that does the same to the signals as another; None where none does."""
+    at = fit.paths.index(path)
+    spread = np.sqrt(np.diag(fit.covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = np.abs(fit.covariance[at] / (spread * spread[at]))
+    alike[at] = 0.0
+    alike = np.where(np.isfinite(alike), alike, 0.0)
+    return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
 
 
 def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]:
@@ -202,17 +216,33 @@ def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]
             f"{effect_names([suspect.name for suspect in selection.chosen])}."
         )
     if found.fewest is not None:
-        said.append(
-            f"Parameters that are off: {len(found.fewest.fit.paths)} of {len(bench.own.free)} are "
-            f"needed to explain these trials, each with odds of {ODDS:g} to 1 or more; the others "
-            "are as they were given, and the intervals hold if they are."
-        )
+        said.append(_named(len(found.fewest.fit.paths), len(bench.own.free), diagnosis.verdict))
     if found.unseen is not None:
         said.append(
             "Trials were left out in up to six parts; curves and gaps after the amendment are of "
             "fits that had not seen them."
         )
     return tuple(said)
+
+
+def _named(count: int, free: int, verdict: Verdict) -> str:
+    """How many parameters are said to be off, and what that takes for granted."""
+    if not count:
+        return f"Parameters that are off: none of {free} is needed to explain these trials."
+    said = (
+        f"Parameters that are off: {count} of {free} {'is' if count == 1 else 'are'} needed to "
+        f"explain these trials, by odds of {ODDS:g} to 1 or more if the others are as they were "
+        "given. "
+    )
+    if verdict == "agrees":
+        return said + (
+            f"But with all refitted the signals change by less than {MOVED_CHANGE:g} of the noise: "
+            "the model stays as it was given."
+        )
+    return said + (
+        "Intervals are no narrower than with all parameters free, as the others may be a little "
+        "off too."
+    )
 
 
 def _floor(diagnosis: Diagnosis, signal: str) -> str:

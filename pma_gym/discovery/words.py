@@ -268,7 +268,7 @@ def _measure(diagnosis: Diagnosis) -> list[str]:
         return ["Measure trials that move the station further: more speeds, loads and pressures."]
     return [
         _run_next(diagnosis),
-        "Keep the model as it is until then: `model.toml` has its parameters refitted, no more.",
+        "Keep the model as it is until then: `model.toml` has parameters refitted at most.",
     ]
 
 

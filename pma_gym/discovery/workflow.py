@@ -23,6 +23,7 @@ from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.discovery.rivals import rivals
 from pma_gym.discovery.selection import Selection, relearnt, select
 from pma_gym.discovery.suspects import suspects
+from pma_gym.discovery.verdict import suspicious
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
 
@@ -137,8 +138,8 @@ class _Work:
             suspects=tuple(every),
             searched=search,
             seed=self.seed,
-            fewest=self._timed("fewest", lambda: _fewest(selection)),
         )
+        found = replace(found, fewest=self._timed("fewest", lambda: _fewest(found)))
         found = self._timed("confirmation", lambda: self._confirmed(found))
         diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
         warnings = (*words, *diagnosis.warnings)
@@ -216,12 +217,15 @@ def _nothing(bench: Bench, refitted: Fitted) -> Selection:
     return Selection((), (), refitted, replace(bench, noise=noise), refitted)
 
 
-def _fewest(selection: Selection) -> Fewest | None:
+def _fewest(found: Findings) -> Fewest | None:
     """The parameters that are off, where effects were looked for and nothing speaks for one."""
+    selection = found.selection
     if not selection.stages or selection.chosen:
         return None
     first = selection.stages[0]
-    return None if first.gate or first.missing else fewest(selection.bench, selection.fit)
+    if first.gate or first.missing or suspicious(found):
+        return None
+    return fewest(selection.bench, selection.fit)
 
 
 def _check_size(logged: Sequence[Logged], free: Sequence[str]) -> None:
