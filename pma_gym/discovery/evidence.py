@@ -143,8 +143,10 @@ class Evidence(Residuals):
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             found = self._differences(logged, states, zeros, vectors, central)
-            white = self.whitened(logged, found[:, :, : len(logged.time)])
-            return products(logged, white / widths[:, None, None])
+            # A rig that cannot be simulated has no finite products; who asks for them looks.
+            with np.errstate(invalid="ignore", over="ignore"):
+                white = self.whitened(logged, found[:, :, : len(logged.time)])
+                return products(logged, white / widths[:, None, None])
 
         return self._each(tried, work)
 
