@@ -73,9 +73,9 @@ class Contender:
     @property
     def files(self) -> list[Path]:
         """Files that its figures depend on, besides the project's code: its own, or a policy's."""
-        if self.algorithm or (not self.path and is_shipped(self.name)):
+        algorithm = self.algorithm or ("" if self.path else shipped_algorithm(self.name))
+        if algorithm:
             folder = Path(self.path) if self.algorithm else POLICIES
-            algorithm = self.algorithm or self.name
             names = [p for p in shipped_policies(folder) if p.stem.endswith(f"-{algorithm}")]
             return [file for path in names for file in policy_pair(path)]
         if not self.path:
@@ -150,10 +150,9 @@ def _loaded(path: str) -> Policy:
         raise ControllerError(str(error)) from error
 
 
-def is_shipped(name: str) -> bool:
-    """Whether a controller of the registry is a shipped policy."""
-    made = CONTROLLERS.get(name)
-    return isinstance(made, type) and issubclass(made, ShippedPolicy)
+def shipped_algorithm(name: str) -> str:
+    """Algorithm of the shipped policies that a controller of the registry runs; else empty."""
+    return getattr(CONTROLLERS.get(name), "algorithm", "")
 
 
 def _policy(item: str) -> Contender | None:

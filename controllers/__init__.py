@@ -13,6 +13,7 @@ from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
+from controllers.practised_policy import PractisedPolicy
 from controllers.scheduled_pressure import ConstantPressure, ScheduledPressure
 from controllers.sliding_mode import SlidingMode
 from controllers.speed_pid import SpeedPID
@@ -29,6 +30,7 @@ CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "mpc": PreviewMPC,
     "ilc": ILC,
     "ppo": PPOPolicy,
+    "ppo_ilc": PractisedPolicy,
     "oracle": Oracle,
     "constant_pressure": ConstantPressure,
     "scheduled_pressure": ScheduledPressure,
@@ -52,6 +54,7 @@ __all__ = [
     "Oracle",
     "PPOPolicy",
     "Policy",
+    "PractisedPolicy",
     "PreviewMPC",
     "Reference",
     "ScheduledPressure",

@@ -1,9 +1,11 @@
 """Iterative learning: the voltage of the next trial from the error that the last one left."""
 
 import math
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from controllers.controller import Reference
@@ -124,10 +126,11 @@ class ILC:
         else:
             self._station, self._motion, self._trials = station, motion, 0
             self.settings = self._given or designed(self.name, station, DEFAULTS)
-            self.learned, self._gain = np.zeros(len(motion.volts)), LearningGain(self.settings)
+            self.learned = np.zeros(len(motion.volts))
+            self._gain = LearningGain(self.settings.mismatch)
         self._trials += 1
         self._position, self._late = station.position, station.observation_delay
-        self._loose = LOOSE_N if station.task.protocol.quantity == "rotation" else -math.inf
+        self._loose = loose_load(station)
         self._errors, self._added, self._taut = list[float](), list[float](), list[bool]()
         gains, share = scheduled_gains(FeedforwardPID.name, station), self.settings.feedback
         soft = [share * gain for gain in (gains.proportional, gains.integral, gains.derivative)]
@@ -158,10 +161,7 @@ class ILC:
         plant = LiftedPlant(motion, late, count)
         errors = np.array(self._errors[late:])
         without = errors + plant.response(np.array(self._added[:count]))
-        # A cable that is tight for a moment only, or by the load cell's noise, is still slack, and
-        # the first reading after it has come tight still that of the flight.
-        taut = np.array(binary_opening(self._taut[late:], np.ones(TIGHT_STEPS)), bool)
-        taut[1:] &= taut[:-1].copy()
+        taut = tight(self._taut[late:])
         change = plant.change(without, taut, self.settings.cutoff)
         smooth = 2.0 * self.settings.cutoff * station.period
         power = float(np.mean(plant.response(change) ** 2)) / (smooth * motion.noise**2)
@@ -175,15 +175,34 @@ class ILC:
         self.learned = reachable - volts
 
 
+def loose_load(station: Station) -> float:
+    """Load (N) below which the cable may be slack, so that the position says nothing."""
+    return LOOSE_N if station.task.protocol.quantity == "rotation" else -math.inf
+
+
+def tight(taut: Sequence[bool]) -> NDArray[np.bool_]:
+    """In which steps a cable pulls, shape (steps,).
+
+    One that is tight for a moment only, or by the load cell's noise, is still slack, and the first
+    reading after it has come tight still that of the flight.
+
+    Args:
+        taut: by step, whether the load cell says so.
+    """
+    found = np.array(binary_opening(taut, np.ones(TIGHT_STEPS)), bool)
+    found[1:] &= found[:-1].copy()
+    return found
+
+
 class LearningGain:
     """k_j by trial, see `ILC`; powers in units of that of the sensor's noise.
 
     Args:
-        settings: the relative error that is reckoned with.
+        mismatch: the relative error of the model that is reckoned with.
     """
 
-    def __init__(self, settings: Settings) -> None:
-        self._doubt = settings.mismatch**2
+    def __init__(self, mismatch: float) -> None:
+        self._doubt = mismatch**2
         self._left, self._noise, self._varying = -1.0, 0.0, list[float]()
 
     def next(self, power: float) -> float:

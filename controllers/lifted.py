@@ -49,14 +49,11 @@ class LiftedPlant:
         back = range(1, len(models[0].b) + 1)
         below = [-k for k in back]
         a, b = np.array([-one.a[:, 0] for one in models]), np.array([one.b for one in models])
-        self._a = self._banded([np.ones(count), *(a[k:, k - 1] for k in back)], [0, *below])
-        self._b = self._banded([b[k:, k - 1] for k in back], below)
+        square = count, count
+        self._a = banded([np.ones(count), *(a[k:, k - 1] for k in back)], [0, *below], square)
+        self._b = banded([b[k:, k - 1] for k in back], below, square)
         middle = models[count // 2]
         self._static, self._lag = middle.gain, middle.time_constant
-
-    def _banded(self, diagonals: list[Any], offsets: Any, rows: int | None = None) -> Any:  # noqa: ANN401
-        shape = (self._count if rows is None else rows, self._count)
-        return sparse.diags_array(diagonals, offsets=offsets, shape=shape).tocsc()
 
     def response(self, voltage: np.ndarray) -> np.ndarray:
         """G v (m or rad), shape (count,)."""
@@ -73,10 +70,20 @@ class LiftedPlant:
         corner = 2.0 * math.pi * cutoff
         rough = 1.0 / ((corner * self._period) ** 4 * (1.0 + (corner * self._lag) ** 2))
         seen = sparse.diags_array(taut.astype(float) / self._static)
-        second = self._banded([1.0, -2.0, 1.0], [0, 1, 2], self._count - 2)
+        second = second_difference(self._count)
         near = sparse.diags_array((taut[:-2] & taut[1:-1] & taut[2:]).astype(float))
         price = near @ second @ self._a * math.sqrt(rough)
         held = sparse.diags_array(np.sqrt(np.where(taut, HOLD, LOOSE))) @ self._a
         effect = seen @ self._b
         normal = effect.T @ effect + price.T @ price + held.T @ held
         return self._a @ spsolve(normal.tocsc(), effect.T @ (seen @ error))
+
+
+def second_difference(count: int) -> Any:  # noqa: ANN401
+    """D2 of so many steps, sparse, shape (count - 2, count)."""
+    return banded([1.0, -2.0, 1.0], [0, 1, 2], (count - 2, count))
+
+
+def banded(diagonals: list[Any], offsets: Any, shape: tuple[int, int]) -> Any:  # noqa: ANN401
+    """A sparse matrix of diagonals, each with its offset from the main one."""
+    return sparse.diags_array(diagonals, offsets=offsets, shape=shape).tocsc()

@@ -123,8 +123,10 @@ class PPOPolicy(ShippedPolicy):
         Optimization Algorithms", arXiv:1707.06347.
     """
 
+    algorithm = "ppo"
+
     def __init__(self) -> None:
-        super().__init__("ppo")
+        super().__init__(self.algorithm)
 
 
 def shipped_policies(folder: Path = POLICIES) -> list[Path]:

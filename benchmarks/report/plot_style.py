@@ -23,6 +23,7 @@ _FIXED: dict[str, tuple[str, str, Dashes]] = {
     "ilc": ("#D55E00", "d", "--"),
     "oracle": ("#000000", "*", ":"),
     "ppo": ("#56B4E9", "P", "-"),
+    "ppo_ilc": ("#56B4E9", "d", "--"),
     # Those of exercises never meet those of other tasks above, but for the policy.
     "constant_pressure": ("#CC79A7", "D", "-."),
     "scheduled_pressure": ("#E69F00", "^", "-."),

@@ -106,6 +106,13 @@ def test_who_cannot_do_a_task_is_left_out_by_rule():
     assert {case.episode.task for case in cases(suite, (entry,))} == {"rotation"}
 
 
+@pytest.mark.parametrize("name", ["ppo", "ppo_ilc"])
+def test_figures_of_a_shipped_policy_depend_on_its_files(name):
+    files = {path.name for path in Contender(name).files}
+    assert {"displacement-100hz-ppo.json", "displacement-100hz-ppo.safetensors"} <= files
+    assert not any("tqc" in file for file in files) and not Contender("pid").files
+
+
 def test_hard_has_the_stations_of_robust():
     robust, hard = frozen_suite("robust"), frozen_suite("hard")
     assert hard.station(3).model is robust.station(3).model

@@ -71,14 +71,14 @@ def test_next_to_nothing_is_changed_where_the_cable_is_slack(plant):
 
 
 def test_with_a_perfect_model_gains_are_those_of_the_mean():
-    gain = LearningGain(Settings(3.0, 0.3, 0.0))
+    gain = LearningGain(0.0)
     powers = [1e9, *[1.0 + 1.0 / (j + 1) for j in range(9)]]
     got = [gain.next(power) for power in powers]
     assert got == pytest.approx([1.0 / (j + 1) for j in range(10)], rel=1e-6)
 
 
 def test_a_doubtful_model_goes_on_learning_first():
-    sure, doubtful = (LearningGain(Settings(3.0, 0.3, m)) for m in (0.1, 0.5))
+    sure, doubtful = (LearningGain(m) for m in (0.1, 0.5))
     gains = np.array([[g.next(1e4), g.next(1e3), g.next(1e2)] for g in (sure, doubtful)])
     assert gains[0, 0] > gains[1, 0] > 0.75
     assert gains[1, 2] > gains[0, 2]
@@ -86,7 +86,7 @@ def test_a_doubtful_model_goes_on_learning_first():
 
 def test_what_comes_and_goes_is_averaged():
     """Trials that each leave as much as the first are noise: soon little is learned of one."""
-    gain = LearningGain(Settings(3.0, 0.3, 0.3))
+    gain = LearningGain(0.3)
     got = [gain.next(1e4) for _ in range(9)]
     assert got[0] > 0.9
     assert got[-1] < 0.2
