@@ -89,8 +89,7 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
     exact = square <= allowed
     share, missed = _switched(eq, made, length, frozen, here, moved)
-    # What lies behind a switch is not needed: a step that passed it is not made anew beyond it, even
-    # where its error would let it.
+    # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
     factor = where(missed & (exact | (share < factor)), share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
     proposed = length * factor
