@@ -19,7 +19,7 @@ from pma_gym.plant.compose import COMMANDS, ZERO
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
-from pma_gym.plant.rosenbrock import GRK4T, Method, step
+from pma_gym.plant.rosenbrock import VELDHUIZEN, Method, step
 
 SMOOTH = {
     "coulomb_friction.static_n": 0.0,
@@ -42,7 +42,7 @@ class FixedStep:
         text: the function as Python.
     """
 
-    def __init__(self, plant: Plant, method: Method = GRK4T) -> None:
+    def __init__(self, plant: Plant, method: Method = VELDHUIZEN) -> None:
         self.plant = plant
         eq = plant.program.ramped.equations
         frozen, here = beginning(eq)

@@ -25,7 +25,7 @@ from rich.table import Table
 
 from benchmarks.accuracy import POSITION_LIMIT, POSITIONS, STATE_LIMIT
 from benchmarks.files import write_text
-from benchmarks.methods import DORMAND_PRINCE, EXPRB43, RK4, RODAS4, ROS4L, Stepper
+from benchmarks.methods import DORMAND_PRINCE, EXPRB43, GRK4T, RK4, RODAS4, ROS4L, Stepper
 from benchmarks.prototype import Prototype, operations, slow_share
 from benchmarks.reference import TRIALS, Commands, reference, shares
 from pma_gym.kernels.lanes import rebind
@@ -36,13 +36,14 @@ from pma_gym.plant.march import Layout
 from pma_gym.plant.model import PLANTS, Model, load_model
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import Program, System, structure, table
-from pma_gym.plant.rosenbrock import GRK4T, Method, step
+from pma_gym.plant.rosenbrock import VELDHUIZEN, Method, step
 from pma_gym.plant.simulation import Run, simulate_all
 
 MODEL, PRESSURE, CONTROL_STEPS = "station", 350e3, 60
 TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 SIZES_S = (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
 ROSENBROCK: dict[str, tuple[Method, int]] = {
+    "van Veldhuizen": (VELDHUIZEN, 4),
     "GRK4T": (GRK4T, 4),
     "ROS4 (L-stable)": (ROS4L, 4),
     "Rodas4": (RODAS4, 7),

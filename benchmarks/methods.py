@@ -52,6 +52,24 @@ RODAS4 = Method(
 )
 """Order 4(3), six evaluations, L-stable and stiffly accurate (Hairer and Wanner, section VI.4)."""
 
+GRK4T = Method(
+    gamma=0.231,
+    stages=((), (2.0,), (4.52470820736, 4.16352878860), None),
+    couplings=(
+        (),
+        (-5.07167533877,),
+        (6.02015272865, 0.159750684673),
+        (-1.856343618677, -8.50538085819, -2.08407513602),
+    ),
+    weights=(3.95750374663, 4.62489238836, 0.617477263873, 1.282612945268),
+    errors=(2.30215540292, 3.07363448539, -0.873280801802, -1.282612945268),
+)
+"""Order 4(3), three evaluations of the rates, A(89.3 deg)-stable.
+
+Source: P. Kaps and P. Rentrop 1979; coefficients as in E. Hairer and G. Wanner, "Solving Ordinary
+Differential Equations II", table IV.7.2, transformed as in their Eq. IV.7.25.
+"""
+
 ROS4L = Method(
     gamma=0.57282,
     stages=((), (2.0,), (1.867943637803922, 0.2344449711399156), None),

@@ -89,7 +89,8 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
     exact = square <= allowed
     share, missed = _switched(eq, made, length, frozen, here, moved)
-    factor = where(exact & missed, share, factor)
+    # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
+    factor = where(missed & (exact | (share < factor)), share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
     proposed = length * factor
     # A step cut short by the end of the span says little against the size before.

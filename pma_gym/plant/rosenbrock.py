@@ -37,22 +37,25 @@ class Method:
     errors: tuple[float, ...]
 
 
-GRK4T = Method(
-    gamma=0.231,
-    stages=((), (2.0,), (4.52470820736, 4.16352878860), None),
+VELDHUIZEN = Method(
+    gamma=0.2257081148225682,
+    stages=((), (2.0,), (4.812234362695436, 4.578146956747842), None),
     couplings=(
         (),
-        (-5.07167533877,),
-        (6.02015272865, 0.159750684673),
-        (-1.856343618677, -8.50538085819, -2.08407513602),
+        (-5.333333333333331,),
+        (6.100529678848254, 1.804736797378427),
+        (-2.540515456634749, -9.443746328915205, -1.988471753215993),
     ),
-    weights=(3.95750374663, 4.62489238836, 0.617477263873, 1.282612945268),
-    errors=(2.30215540292, 3.07363448539, -0.873280801802, -1.282612945268),
+    weights=(4.289339254654537, 5.036098482851414, 0.6085736420673917, 1.355958941201148),
+    errors=(2.175672787531755, 2.950911222575741, -0.7859744544887430, -1.355958941201148),
 )
-"""Order 4(3), three evaluations of the rates, A(89.3 deg)-stable.
+"""Order 4(3), three evaluations of the rates, A(89.4 deg)-stable.
 
-Source: P. Kaps and P. Rentrop 1979; coefficients as in E. Hairer and G. Wanner, "Solving Ordinary
-Differential Equations II", table IV.7.2, transformed as in their Eq. IV.7.25.
+Beside GRK4T (Kaps and Rentrop 1979) errors of trials are 10 to 20 % smaller at as many attempts.
+
+Source: M. van Veldhuizen 1984, "D-stability and Kaps-Rentrop methods", Computing 32; coefficients
+as in E. Hairer and G. Wanner, "Solving Ordinary Differential Equations II", table IV.7.2,
+transformed as in their Eq. IV.7.25. A test holds the conditions of order.
 """
 
 
@@ -76,7 +79,7 @@ def step(
     size: Value,
     frozen: Mapping[int, Value],
     here: Mapping[int, Value],
-    method: Method = GRK4T,
+    method: Method = VELDHUIZEN,
 ) -> Step:
     """A step of a system.
 

@@ -10,6 +10,7 @@ from benchmarks.limits import FRICTIONLESS, energies, energy_drift, mass_effect,
 from benchmarks.reference import integrated, random_commands, reference, shares, simulated
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
+from pma_gym.plant.simulation import Run, simulate_all
 
 
 def test_the_regulator_is_exact_to_the_tolerance():
@@ -52,6 +53,18 @@ def test_a_random_policy_against_scipy(model):
     assert max(found.values()) < 4e-4
     for name in ("contraction", "angle", "extension", "servo"):
         assert found.get(name, 0.0) < 1e-5
+
+
+def test_a_random_policy_takes_few_attempts():
+    # 26 in 10 ms where a refused step is made anew beyond the turning that it has passed.
+    attempts, steps = 0, 100
+    for pressure in (200e3, 350e3, 550e3):
+        plant = Plant("station")
+        start, told = plant.settle(0.0, pressure), random_commands(plant, pressure, steps=steps)
+        columns = (told.time, told.motor, told.regulator)
+        run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+        attempts += simulate_all(plant.program, [run])
+    assert attempts / (3 * steps) < 25.0
 
 
 @pytest.mark.parametrize("model", ["serres2008", "station"])
