@@ -108,7 +108,7 @@ class Effect:
         return MappingProxyType(doors)
 
     @cached_property
-    def defaults(self) -> Mapping[str, Value]:
+    def defaults(self) -> Mapping[str, float]:
         """Values at the door of the parameters that need not be named, by their names there.
 
         >>> from pma_gym.effects import CATALOGUE

@@ -47,7 +47,7 @@ def _parameters(effect: Effect, _module: ModuleType) -> str:
     if without:
         return f"gives no usual value to {', '.join(without)}; write Quantity(..., usual=...)"
     for name, default in effect.parameters._field_defaults.items():
-        if default != quantities[name].to_si(quantities[name].usual):
+        if default != getattr(effect.usual, name):
             return (
                 f"gives {name} a default of {default!r} (SI) and another usual value, "
                 f"{quantities[name].usual:g} {quantities[name].unit}; write the same"
