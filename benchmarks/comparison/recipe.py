@@ -84,10 +84,10 @@ def _occasional(given: Mapping[str, Any]) -> Occasional:
         raise RecipeError(f"no effect {name!r} that a station may have or not; see the catalogue")
     ranges = {door: tuple(ends) for door, ends in given["ranges"].items()}
     tied = {door: (tie["to"], tie["factor"]) for door, tie in given.get("tied", {}).items()}
-    wanted = CATALOGUE[name].names_at_the_door()
-    if sorted([*ranges, *tied]) != sorted(wanted) or any(
-        to not in ranges for to, _ in tied.values()
-    ):
+    wanted, given_here = CATALOGUE[name].names_at_the_door(), [*ranges, *tied]
+    # What has a default in model files has it here: it is not drawn.
+    needed = [d for d in wanted if d in given_here or d not in CATALOGUE[name].defaults]
+    if sorted(given_here) != sorted(needed) or any(to not in ranges for to, _ in tied.values()):
         raise RecipeError(f"{name} needs a range or a tie for each of {', '.join(wanted)}")
     if not 0.0 <= share <= 1.0:
         raise RecipeError(f"the share of {name} must lie in 0 to 1, got {share!r}")

@@ -22,7 +22,7 @@ SAME: dict[str, tuple[str, ...]] = {
     "bearing_friction": ("force_n",),
     "filling": ("exponent",),
     "cable_slack": ("slack_mm",),
-    "drive_dead_zone": ("width_n",),
+    "drive_dead_zone": ("width_n", "slope"),
     "drive_lag": ("time_constant_ms",),
     "drive_delay": ("delay_ms",),
     "torque_ripple": ("amplitude_percent",),

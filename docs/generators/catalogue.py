@@ -67,6 +67,11 @@ def _effect(effect: Effect, common: str) -> str:
     if effect.held:
         names = ", ".join(code(effect.quantities[stem].name(stem)) for stem in effect.held)
         parts.append(f"A diagnosis that fits this effect leaves {names} at the usual value.")
+    if effect.defaults:
+        meant = ", ".join(
+            f"{code(name)} {number(value)}" for name, value in effect.defaults.items()
+        )
+        parts.append(f"A model file that does not name them means {meant}.")
     return "\n\n".join(parts)
 
 

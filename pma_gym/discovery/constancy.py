@@ -52,12 +52,27 @@ def spreads(
         return {}
     curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
     own = inverse(curvature)
-    slopes = pieces.products[:, 1:, 0] @ direction
     across = pieces.products[:, 1:, 1:] @ direction
+    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(evidence, fit, pieces, own)
     return {
         name: _scatter(slopes, across, direction, own, group)
         for name, group in _groups(evidence, fit, pieces).items()
     }
+
+
+def _last_step(evidence: Evidence, fit: Fitted, pieces: Pieces, own: Array) -> Array:
+    """What was left of the fit's way to the least chi-square, shape (p,); none beyond a bound.
+
+    It is some hundredths of an error. But where a group sees an effect a thousand times as sharply
+    as the others (by the instant at which a cable tightens), that is a slope as large as theirs.
+    """
+    gradient = pieces.products[:, 1:, 0].sum(axis=0)
+    gradient += (fit.values - evidence.centre) / evidence.prior**2
+    gradient[(fit.values <= evidence.lower) | (fit.values >= evidence.upper)] = 0.0
+    known = np.isfinite(np.diag(own))
+    step = np.zeros_like(gradient)
+    step[known] = -own[np.ix_(known, known)] @ gradient[known]
+    return step
 
 
 def _direction(fit: Fitted, suspect: Suspect) -> Array:

@@ -26,7 +26,9 @@ class Effect:
     Attributes:
         name: name of the effect, and of its table in a model file.
         port: where it acts; `pma_gym.plant` says which signals a port has and what it adds up.
-        parameters: NamedTuple class whose fields are Annotated with a `Quantity` each.
+        parameters: NamedTuple class whose fields are Annotated with a `Quantity` each. A field's
+            default (SI) is what a file means that does not name it: a law that gets a parameter
+            more keeps its old files.
         law: what the effect contributes at its port; None for a part that the plant reads.
         rate: rate law of the memory, returning (source, decay) for memory' = source - decay *
             memory; None without memory. It may be fast: the integrator is implicit.
@@ -105,21 +107,35 @@ class Effect:
         doors = {quantity.name(stem): stem for stem, quantity in self.quantities.items()}
         return MappingProxyType(doors)
 
+    @cached_property
+    def defaults(self) -> Mapping[str, float]:
+        """Values at the door of the parameters that need not be named, by their names there.
+
+        >>> from pma_gym.effects import CATALOGUE
+        >>> dict(CATALOGUE["drive_dead_zone"].defaults)
+        {'slope': 2.0}
+        """
+        known = self.parameters._field_defaults
+        found = {door: stem for door, stem in self._doors.items() if stem in known}
+        return MappingProxyType(
+            {door: self.quantities[stem].from_si(known[stem]) for door, stem in found.items()}
+        )
+
     def parse(self, values: Mapping[str, Value]) -> Parameters:
-        """Parameters in SI from values by their names at the door.
+        """Parameters in SI from values by their names at the door; defaults for what has one.
 
         Raises:
             ValueError: an unknown, missing or out-of-bounds parameter, naming all of it.
         """
         names = self.names_at_the_door()
-        missing = [name for name in names if name not in values]
+        missing = [name for name in names if name not in values and name not in self.defaults]
         unknown = [name for name in values if name not in names]
         if unknown or missing:
             raise ValueError(
                 f"[{self.name}] takes {', '.join(names)}; unknown: {', '.join(unknown) or 'none'}, "
                 f"missing: {', '.join(missing) or 'none'}"
             )
-        given = {stem: self._si(door, stem, values[door]) for door, stem in names.items()}
+        given = {names[door]: self._si(door, names[door], values[door]) for door in values}
         return self.checked(self.parameters(**given))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:

@@ -46,6 +46,12 @@ def _parameters(effect: Effect, _module: ModuleType) -> str:
     without = [name for name, quantity in quantities.items() if quantity.usual is None]
     if without:
         return f"gives no usual value to {', '.join(without)}; write Quantity(..., usual=...)"
+    for name, default in effect.parameters._field_defaults.items():
+        if default != getattr(effect.usual, name):
+            return (
+                f"gives {name} a default of {default!r} (SI) and another usual value, "
+                f"{quantities[name].usual:g} {quantities[name].unit}; write the same"
+            )
     if effect.neutral is None:
         return "is never absent: give a parameter a neutral value, Quantity(..., neutral=0.0)"
     unknown = set(effect.held) - set(fields)

@@ -150,7 +150,11 @@ class Model:
         """Parameters of an effect to be added, some of them given."""
         known = _known(effect)
         before = self.parameters.get(effect, known.neutral)
-        missing = [door for door in known.names_at_the_door() if door not in values]
+        missing = [
+            door
+            for door in known.names_at_the_door()
+            if door not in values and door not in known.defaults
+        ]
         if before is None and missing:
             raise ModelError(
                 f"[{effect}] is never absent: it has no neutral values; give {', '.join(missing)}"

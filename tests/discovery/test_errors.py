@@ -1,6 +1,7 @@
 """Errors of parameters: as the curvature says for noise, wider where a model is wrong; scatter."""
 
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.signal import lfilter
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.constancy import spreads
 from pma_gym.discovery.errors import covariance
+from pma_gym.discovery.evidence import Pieces
 from pma_gym.discovery.suspects import suspects
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, STATION, bench, commanded, measured
@@ -74,3 +76,47 @@ def test_an_effect_of_one_size_does_not_scatter():
 def test_an_effect_of_two_sizes_scatters_by_trial_as_it_was_made():
     # A third of the mean of 6 N.
     assert scatter(4.0, 8.0, 4.0, 8.0)["trial"] == pytest.approx(1.0 / 3.0, abs=0.12)
+
+
+def linear(sizes, sharpness, away):
+    """Spread by trial of an effect in linear trials, beside one parameter of the model's own.
+
+    Args:
+        sizes: of the effect in each trial.
+        sharpness: how many times as sharply each trial sees it.
+        away: how many standard errors the fit is from the least chi-square.
+    """
+    generator, rows = np.random.default_rng(4), 200
+    columns = [k * generator.normal(size=(rows, 2)) for k in sharpness]
+    noise = [generator.normal(size=rows) for _ in sizes]
+    measured = [c @ [size, 1.0] + n for c, size, n in zip(columns, sizes, noise, strict=True)]
+    best = np.linalg.lstsq(np.concatenate(columns), np.concatenate(measured), rcond=None)[0]
+    curvature = sum(c.T @ c for c in columns)
+    values = best + away / np.sqrt(np.diag(curvature))
+    stacked = [np.column_stack([c @ values - m, c]) for c, m in zip(columns, measured, strict=True)]
+    trial = np.arange(len(sizes))
+    evidence = SimpleNamespace(
+        pieces=lambda *_: Pieces(np.array([s.T @ s for s in stacked]), trial, 0 * trial + rows),
+        readings=lambda *_: None,
+        prior=np.full(2, np.inf),
+        centre=np.zeros(2),
+        lower=np.full(2, -np.inf),
+        upper=np.full(2, np.inf),
+    )
+    none, one = np.zeros(1), np.ones(1, bool)
+    law = SimpleNamespace(paths=("law.size",), absent=none, amplitudes=one, fitted=one)
+    fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
+    return spreads(SimpleNamespace(evidence=lambda *_: evidence), fit, (law,), 0)["trial"]
+
+
+def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():
+    # A tenth of an error is nothing, but times 1000 it is more than all that the others show.
+    found = [linear((1.0,) * 4, (1.0, 1.0, 1.0, 1e3), away) for away in np.linspace(-0.3, 0.3, 61)]
+    assert max(found) < 0.1
+
+
+def test_what_scatters_does_so_wherever_the_fit_stopped():
+    sizes, sharpness = (0.4, 1.6, 0.4, 1.6), (1.0, 1.0, 1.0, 3.0)
+    found = [linear(sizes, sharpness, away) for away in (0.0, -0.3, 0.3)]
+    assert found[0] > 0.2
+    assert found[1:] == pytest.approx([found[0]] * 2, rel=0.02)

@@ -300,3 +300,13 @@ def test_usual_values_are_a_parameter_set_that_is_there(effect):
     assert all(quantity.usual is not None for quantity in effect.quantities.values())
     assert effect.parse(effect.at_the_door(effect.usual)) == pytest.approx(effect.usual, rel=1e-12)
     assert effect.usual != effect.neutral
+
+
+def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
+    found = [effect for effect in CATALOGUE.values() if effect.defaults]
+    assert [(effect.name, dict(effect.defaults)) for effect in found] == [
+        ("drive_dead_zone", {"slope": 2.0})
+    ]
+    for effect in found:
+        for door, value in effect.defaults.items():
+            assert effect.quantities[effect.names_at_the_door()[door]].usual == value

@@ -33,10 +33,40 @@ def test_a_dead_zone_misses_the_start_and_catches_up(station_with):
     np.testing.assert_allclose(found[-3:], plain[-3:], rtol=1e-9)
 
 
-def test_a_dead_zone_neither_pushes_nor_falls():
-    p = CATALOGUE["drive_dead_zone"].parse({"width_n": 15.0})
-    loads = np.array([load_beyond_dead_zone(load, p) for load in np.linspace(0.0, 100.0, 401)])
+@pytest.mark.parametrize("slope", [1.2, 2.0, 4.0])
+def test_a_dead_zone_neither_pushes_nor_falls_and_ends(slope):
+    p = CATALOGUE["drive_dead_zone"].parse({"width_n": 15.0, "slope": slope})
+    asked = np.linspace(0.0, 100.0, 401)
+    loads = np.array([load_beyond_dead_zone(load, p) for load in asked])
     assert np.all(loads >= 0.0) and np.all(np.diff(loads) >= 0.0)
+    ended = asked > 15.0 * slope / (slope - 1.0)
+    np.testing.assert_array_equal(loads[ended], asked[ended])
+    within = (asked > 0.0) & (asked < 15.0 * slope / (slope - 1.0) - 1e-9)
+    assert np.all(loads[within] < asked[within])
+
+
+@pytest.mark.parametrize("slope", [1.2, 2.0, 4.0])
+def test_without_a_width_the_slope_does_nothing(slope):
+    p = CATALOGUE["drive_dead_zone"].parse({"width_n": 0.0, "slope": slope})
+    loads = [0.0, 1e-300, 1e-9, 0.1, 1.0 / 3.0, 976.0]
+    assert [load_beyond_dead_zone(load, p) for load in loads] == loads
+
+
+def test_a_file_from_before_the_slope_means_2():
+    effect = CATALOGUE["drive_dead_zone"]
+    old = effect.parse({"width_n": 15.0})
+    assert old == effect.parse({"width_n": 15.0, "slope": 2.0}) and old.slope == 2.0
+    loads = np.linspace(0.0, 100.0, 401)
+    np.testing.assert_array_equal(
+        [load_beyond_dead_zone(load, old) for load in loads],
+        np.minimum(loads, 2.0 * np.maximum(loads - 15.0, 0.0)),
+    )
+    with pytest.raises(ValueError, match=r"takes width_n, slope; unknown: slop, missing: none"):
+        effect.parse({"width_n": 15.0, "slop": 2.0})
+    with pytest.raises(ValueError, match=r"unknown: none, missing: width_n"):
+        effect.parse({"slope": 2.0})
+    with pytest.raises(ValueError, match=r"drive_dead_zone.slope must lie in 1.2 to 4"):
+        effect.parse({"width_n": 15.0, "slope": 1.0})
 
 
 def test_a_saturated_drive_clips_its_tops(station_with):

@@ -173,6 +173,10 @@ BROKEN = {
     "plain": (broken("factor: Annotated", "factor: float\n    other: Annotated"), r"no NamedTuple"),
     "branch": (broken("return -", "return 0.0 if velocity > 0.0 else -"), r"cannot be compiled"),
     "math": (broken("abs(velocity)", "__import__('math').sin(velocity)"), r"use \+ - \* / abs"),
+    "default": (
+        broken("usual=0.02)\n    ]", "usual=0.02)\n    ] = 3.0"),
+        r"gives factor a default of 3.0 \(SI\) and another usual value, 0.02 N s\^2/mm\^2",
+    ),
     "there": (broken("return -", "return 5.0 - "), r"gives 5 at velocity 0.1 \(SI\), and 0 would"),
     "lawless": (broken("Drag, drag, sig", "Drag, sig"), r"has no law; give law="),
     "twice": (DRAG + "\nMORE = Effect('drag', 'slide_force', Drag, drag)\n", r"is there twice"),
