@@ -17,8 +17,8 @@ PAIR_COUNTS = (64, 1024, 16384)
 SYNC_COUNTS = (64, 1024)
 """The same for copies in a Python loop, which are no cheaper by the dozen."""
 
-TOLERANCES = (1000, 500, 150, 50, 15)
-"""Tolerances of an internal step, in millionths of the states' scales; 150 is the default."""
+TOLERANCES = (1000, 500, 230, 50, 15)
+"""Tolerances of an internal step, in millionths of the states' scales; 230 is the default."""
 
 ENVPOOL_MOST = 16384
 """EnvPool's largest batch here: it holds every environment as an object of its own."""
