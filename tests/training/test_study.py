@@ -94,6 +94,17 @@ def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):
     assert "--task displacement --preset" in words and "--seed 1" in words
     assert "| robust: displacement | 2 mm | 3 [2.5, 3.5] |" in words
     assert card(shipped, 3) == words
+    # What operators said of these weights stays with them, and goes with them.
+    rows = [{"controller": "pid", "stations": "nominal", "rmse": [1.0], "ended": 0}]
+    said = {"count": 8, "unit": "deg", "phases": ["I"], "rows": rows}
+    scores = shipped.training["scores"]
+    noted = dict(shipped.training) | {"scores": dict(scores) | {"operators": said}}
+    noted["scores"]["validation"] = dict(scores["validation"]) | {"broken": 0}
+    save_policy_file(replace(shipped, training=noted), path)
+    (path,) = ship([tmp_path / "group"], {"group": figures}, tmp_path / "shipped")
+    assert load_policy_file(path).training["scores"]["operators"] == said
+    words = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert "8 random operators" in words and "| robust: displacement | 2 mm |" in words
 
 
 def test_a_policy_that_loses_a_station_now_and_then_does_not_ship(station, tmp_path):

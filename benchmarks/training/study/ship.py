@@ -56,7 +56,8 @@ def ship(
     found = []
     for best in best_policies(there):
         policy, own = load_policy_file(best), figures[best.parent.parent.name]
-        scores = dict(policy.training["scores"]) | {"suites": _scores(policy, own)}
+        kept = _by_operators(best, folder / best.name)
+        scores = dict(policy.training["scores"]) | kept | {"suites": _scores(policy, own)}
         stem, _, own_algorithm = best.stem.rpartition("-")
         training = dict(policy.training) | {"scores": scores}
         shipped = replace(policy, name=best.stem, training=training)
@@ -67,6 +68,15 @@ def ship(
         path.with_suffix(".md").write_text(card(shipped, own["seeds"]), encoding="utf-8")
         found.append(path)
     return found
+
+
+def _by_operators(best: Path, shipped: Path) -> dict[str, Any]:
+    """What operators said of the very weights that ship by now: scores of minutes, kept."""
+    weights = [path.with_suffix(".safetensors") for path in (best, shipped)]
+    if not shipped.exists() or weights[0].read_bytes() != weights[1].read_bytes():
+        return {}
+    scores = load_policy_file(shipped).training["scores"]
+    return {"operators": scores["operators"]} if "operators" in scores else {}
 
 
 def _best(policies: Mapping[Path, PolicyFile]) -> Path:
@@ -123,8 +133,8 @@ def card(policy: PolicyFile, seeds: int) -> str:
             f"- **Code**: {training['code']}",
             f"- **Made again by**: `{command}`",
             "",
-            *(_operators(training["scores"]) or _suites(training["scores"])),
-            "",
+            *_operators(training["scores"]),
+            *_suites(training["scores"]),
             "Learning curve:",
             "",
             "| Control steps | Wall time (s) | Validation error |",
@@ -153,6 +163,8 @@ def _suites(scores: Mapping[str, Any]) -> list[str]:
         f"[{one['all_seeds'][1]:.4g}, {one['all_seeds'][2]:.4g}] |"
         for name, one in scores.get("suites", {}).items()
     ]
+    if not rows:
+        return []
     return [
         "Interquartile means of the RMSE; in brackets 95 % intervals over all seeds and the "
         "suite's stations:",
@@ -160,6 +172,7 @@ def _suites(scores: Mapping[str, Any]) -> list[str]:
         "| Suite | This policy | All seeds |",
         "| :-- | --: | --: |",
         *rows,
+        "",
     ]
 
 
@@ -176,6 +189,7 @@ def _operators(scores: Mapping[str, Any]) -> list[str]:
         *table_of(figures),
         "",
         f"Of {2 * VALIDATION} validation episodes {broken} ended so.",
+        "",
     ]
 
 
