@@ -282,10 +282,8 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
     silent = verdict in ("parameters", "agrees") and len(blind) > SILENT * len(found.suspects)
     if (verdict == "undecidable" or silent) and found.looks:
-        dim = [look.suspect for look in found.looks if look.suspect.name in blind]
-        if suspicious(found):
-            dim = [look.suspect for look in found.looks[:3]]
-        return for_blind(found.bench, found.refitted, dim, found.looks)
+        worth = [look.suspect for look in (found.looks[:3] if suspicious(found) else found.looks)]
+        return for_blind(found.bench, found.refitted, worth, found.looks)
     return None
 
 

@@ -43,6 +43,9 @@ DRAWS = 8
 PLAUSIBLE = (0.1, 2.0)
 """Shares of an estimate that draws keep to: what the trials do not bound could be drawn absurd."""
 
+SMALLEST = 0.1
+"""Least size of an effect that is reckoned with, as a share of its usual one."""
+
 LOOSE = 1e4
 """Standard deviation of a parameter that the trials do not determine, in steps of its
 derivative."""
@@ -235,34 +238,57 @@ def _drawn(fit: Fitted, own: set[str], generator: np.random.Generator) -> Array:
 def for_blind(
     bench: Bench, fit: Fitted, suspects: Sequence[Suspect], looks: Sequence[Look], seed: int = 0
 ) -> NextExperiment | None:
-    """The protocol in which most effects would show that these trials cannot show.
+    """The protocol in which most would show of what these trials cannot show.
+
+    How large an effect is if it is there nobody knows: any size from a tenth of the usual one to
+    that counts as equally likely, in proportion. The best protocol makes the most effects show that
+    would not have shown by now, on average; among equals the shortest.
 
     Args:
         bench: the trials so far.
         fit: the refitted model, without any suspect that is looked for.
         suspects: those that would be worth seeing.
-        looks: at them in the trials so far; those count that would not have been seen at their
-            usual size.
+        looks: at them in the trials so far, which say from what size on they would have been seen.
         seed: of what is random in protocols.
     Returns:
-        What to measure next; None where no effect is hidden, or no protocol would show any.
+        What to measure next; None where every effect would have been seen at its usual size, or no
+        protocol would show one that would not.
     """
-    dim = {each.suspect.name for each in looks if not _was_visible(each)}
-    hidden = [suspect for suspect in suspects if suspect.name in dim]
-    usual = [_usual(suspect) for suspect in hidden]
-    best: tuple[tuple[int, float], Protocol, Array] | None = None
-    for protocol in library([fit.model, bench.given], seed) if hidden else ():
-        gains = _shown(bench, fit, protocol, list(zip(hidden, usual, strict=True)))
-        # Beyond twice what is needed a larger effect is no better.
-        total = float(np.sum(np.minimum(gains, 4.0 * SHOWN_GAIN))) / protocol.minutes
-        rank = int(np.sum(gains >= SHOWN_GAIN)), total
-        if best is None or rank > best[0]:
-            best = rank, protocol, gains
-    if best is None or best[0][0] == 0:
+    known = {each.suspect.name: each for each in looks}
+    wanted = [suspect for suspect in suspects if suspect.name in known]
+    hidden = np.array([not _was_visible(known[suspect.name]) for suspect in wanted], bool)
+    if not hidden.any():
         return None
-    seen = best[2] >= SHOWN_GAIN
-    names = [suspect.name for suspect, shows in zip(hidden, seen, strict=True) if shows]
+    before = np.array([_strength(known[suspect.name]) for suspect in wanted])
+    pairs = [(suspect, _usual(suspect)) for suspect in wanted]
+    best: tuple[tuple[float, float], Protocol, Array] | None = None
+    for protocol in library([fit.model, bench.given], seed):
+        gains = _shown(bench, fit, protocol, pairs)
+        new = float(np.sum(chance_to_show(before + gains) - chance_to_show(before)))
+        rank = round(new, 6), -protocol.minutes
+        if (hidden & (gains >= SHOWN_GAIN)).any() and (best is None or rank > best[0]):
+            best = rank, protocol, gains
+    if best is None:
+        return None
+    seen = hidden & (best[2] >= SHOWN_GAIN)
+    names = [suspect.name for suspect, shows in zip(wanted, seen, strict=True) if shows]
     return _proposal(best[1], names, 0.5 * float(np.min(best[2][seen])))
+
+
+def chance_to_show(gains: Array) -> Array:
+    """Chance that effects show which are as large as usual, or down to a tenth of that.
+
+    Args:
+        gains: chi-square that each gains at its usual size, shape (k,); it goes with the square of
+            the size.
+    """
+    share = np.sqrt(SHOWN_GAIN / np.maximum(gains, 1e-12))
+    return np.clip(np.log(share) / np.log(SMALLEST), 0.0, 1.0)
+
+
+def _strength(each: Look) -> float:
+    """Chi-square that an effect of usual size would have gained in the trials so far."""
+    return SHOWN_GAIN / each.resolvable**2 if each.resolvable else 0.0
 
 
 def _was_visible(each: Look) -> bool:

@@ -1,7 +1,7 @@
 """Experiments that a rig survives: what a lab can run next, as commands.
 
-A protocol is a shape, of the load at constant pressure or of the pressure at constant load. Its
-size is the largest at which tension, contraction, stretch and pressure stay within the model's
+A protocol is a shape: of the load at constant pressure, of the pressure at constant load, or of
+both, in turn or at once. Its size is the largest at which tension, contraction, stretch and pressure stay within the model's
 limits with margin, in every model that may be true.
 """
 
@@ -164,6 +164,8 @@ def _recipes(model: Model, seed: int) -> Iterator[Recipe]:
     for words, knots, centres in _pressure_shapes():
         for load, centre in centres:
             yield partial(_of_pressure, model, words, knots, centre, load)
+    for words, load_share, pressure_share in _both_shapes(seed):
+        yield partial(_of_both, model, words, load_share, pressure_share)
 
 
 def _of_load(
@@ -186,6 +188,19 @@ def _of_pressure(
     low, high = np.min(pressures) / 1e3, np.max(pressures) / 1e3
     name = f"{words}, {low:.0f} to {high:.0f} kPa at {held:.0f} N"
     return name, _trial(model, np.full(len(pressures), held), pressures)
+
+
+def _of_both(
+    model: Model, words: str, load: Array, pressure: Array, size: float
+) -> tuple[str, Trial]:
+    """Load and pressure change, between shares 0 and 1 of their ranges."""
+    span = Range.of(model)
+    loads, pressures = span.load(load, size), span.pressure(pressure)
+    name = (
+        f"{words}, {np.min(loads):.0f} to {np.max(loads):.0f} N and "
+        f"{np.min(pressures) / 1e3:.0f} to {np.max(pressures) / 1e3:.0f} kPa"
+    )
+    return name, _trial(model, loads, pressures)
 
 
 def _trial(model: Model, loads: Array, pressures: Array) -> Trial:
@@ -223,6 +238,39 @@ def _pressure_shapes() -> Iterator[tuple[str, Knots, list[tuple[float, float]]]]
     yield "pressure steps, held for 2.5 s", steps, levels
     triangle = [(0.0, 0.0), (1.0, 0.0), (9.0, 1.0), (17.0, 0.0), (18.0, 0.0)]
     yield "pressure triangle, once in 16 s", triangle, [(load, 0.0) for load in LOADS]
+
+
+def _both_shapes(seed: int) -> Iterator[tuple[str, Array, Array]]:
+    """Shapes of both: words, shares of the range of loads, shares of that of pressures.
+
+    Who does not know what is missing wants one experiment that hides little: each change of load
+    and of pressure that the other protocols have, in one trial.
+    """
+    slow = _joined([(0, 0.05), (1, 0.05), (5, 0.95), (9, 0.05)])
+    fast = _joined([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(9)]])
+    swaps = _steps([(1, 0.15), *[(0.8, 0.8 if k % 2 == 0 else 0.15) for k in range(5)]])
+    hold = _steps([(4, 0.8), (2, 0.2)])
+    # Large ones and small ones, for limits of speed and for dead bands.
+    steps = _steps([(1, 0.5), (2, 0.95), (2, 0.05), (2, 0.5), (1, 0.55), (1, 0.5)])
+    still = np.full(len(swaps) + len(hold), 0.5)
+    # From where the triangle ends to where the pressure stands.
+    rise = _joined([(0, 0.05), (1, 0.5), (2, 0.5)])
+    yield (
+        "load triangles on one of pressure, load swaps, a hold, then steps of pressure",
+        np.concatenate([fast, np.full(len(rise), LOW), swaps, hold, np.full(len(steps), LOADS[1])]),
+        np.concatenate([slow, rise, still, steps]),
+    )
+    wave = _multisine(seed)
+    steps = _steps([(2, 0.5), (2, 0.9), (2, 0.1), (2, 0.5), (2, 0.55), (2, 0.5)])
+    yield "multisine of load during steps of pressure", 0.1 + 0.75 * wave, _held(steps, len(wave))
+    slow = _joined([(0, 0.05), (1, 0.05), (9, 0.95), (17, 0.05), (18, 0.05)])
+    fast = _joined([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(17)], (18, LOW)])
+    yield "load triangles, 8 in 16 s, during one of pressure", fast, slow
+
+
+def _held(values: Array, count: int) -> Array:
+    """So many rows of a shape, its last value held."""
+    return values[np.minimum(np.arange(count), len(values) - 1)]
 
 
 def _staircase() -> Knots:

@@ -5,12 +5,19 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.experiment import Contest, for_blind, left_over, next_experiment
+from pma_gym.discovery import diagnose
+from pma_gym.discovery.experiment import (
+    Contest,
+    chance_to_show,
+    for_blind,
+    left_over,
+    next_experiment,
+)
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import Own, prior
 from pma_gym.discovery.protocols import is_safe, library
-from pma_gym.discovery.screening import Baseline, look
+from pma_gym.discovery.screening import SHOWN_GAIN, Baseline, look
 from pma_gym.discovery.suspects import Suspect, suspects
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
@@ -137,7 +144,7 @@ def test_one_rival_needs_no_experiment():
 def test_every_protocol_is_safe_and_as_long_as_a_test_may_be():
     model = station()
     found = list(library([model]))
-    assert len(found) == 27 and len({each.name for each in found}) == 27
+    assert len(found) == 30 and len({each.name for each in found}) == 30
     for each in found:
         again = Plant(model).simulate(each.trial, noise=False)
         assert is_safe(model, again), each.name
@@ -189,3 +196,20 @@ def test_effects_that_were_hidden_are_made_to_show():
     assert set(found.separates) <= set(hidden)
     assert found.expected_odds >= np.exp(12.5)
     assert for_blind(on, fit, wanted, []) is None
+
+
+def test_the_chance_to_show_counts_sizes_in_proportion():
+    """A tenth of the usual size shows with a hundredth of the gain; a third lies half way."""
+    gains = SHOWN_GAIN * np.array([0.0, 1.0, 10.0, 100.0, 1e6])
+    assert chance_to_show(gains) == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
+
+
+def test_who_knows_nothing_is_proposed_what_moves_load_and_pressure():
+    """Of a trial at rest nearly everything is hidden: no protocol of one of both shows as much."""
+    time = np.arange(0.0, 4.0, 1.0 / 64.0)
+    still = Trial(time, {"motor_voltage": 0 * time + 3.0, "regulator_voltage": 0 * time + 6.0})
+    measured = Plant(station()).simulate(still, seed=3)
+    found = diagnose([measured], station())
+    assert found.next_experiment is not None
+    volts = found.next_experiment.trial.commands
+    assert min(np.ptp(volts["motor_voltage"]), np.ptp(volts["regulator_voltage"])) > 1.0
