@@ -1,8 +1,8 @@
 """Experiments that a rig survives: what a lab can run next, as commands.
 
 A protocol is a shape: of the load at constant pressure, of the pressure at constant load, or of
-both, in turn or at once. Its size is the largest at which tension, contraction, stretch and pressure stay within the model's
-limits with margin, in every model that may be true.
+both, in turn or at once. Its size is the largest at which tension, contraction, stretch and
+pressure stay within the model's limits with margin, in every model that may be true.
 """
 
 from collections.abc import Callable, Iterator, Sequence
