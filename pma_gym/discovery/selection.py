@@ -1,10 +1,11 @@
 """Selection: which suspects are added to the model, one after the other.
 
 The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
-two hundred data sets. What passes is fitted together with the model's parameters; the likeliest is
-taken; then the same again beside it. Each effect is then left out once: one that is not missed
-goes. Noise is learnt anew only when all effects are found: before, an autoregression would take
-the next effect for noise.
+two hundred data sets. It opens too where the residual itself is no noise: where it remembers itself
+(`excess`), or bursts (`bursts`) and an effect explains the bursts. What passes is fitted together
+with the model's parameters; the likeliest is taken; then the same again beside it. Each effect is
+then left out once: one that is not missed goes. Noise is learnt anew only when all effects are
+found: before, an autoregression would take the next effect for noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,13 +14,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.bursts import NONE, Bursts, bursts
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.excess import memory
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
-from pma_gym.discovery.noise import Whitening, autoregression
+from pma_gym.discovery.noise import Whitening, autoregression, step_between
 from pma_gym.discovery.parameters import values
-from pma_gym.discovery.screening import Baseline, Look, beginnings, look
+from pma_gym.discovery.screening import Baseline, Look, beginnings, closer, look
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import OUTPUTS
@@ -50,6 +52,10 @@ MOST_EFFECTS = 3
 TRIED, NEAR = 8, 0.05
 """How many suspects are fitted at most, and the share of the best look's gain that one needs."""
 
+CARRIED = 0.5
+"""Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
+noise that is larger in places bursts too, and no effect explains half of that."""
+
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
 
@@ -68,6 +74,7 @@ class Stage:
         fits: of those that were fitted, by name, each together with what was there before.
         gate: the looks that passed.
         missing: whether the residual says of itself that something is missing.
+        burst: pieces of it that opened the gate by themselves.
     """
 
     bench: Bench
@@ -77,6 +84,7 @@ class Stage:
     fits: dict[str, Fitted]
     gate: tuple[Look, ...]
     missing: bool
+    burst: Bursts = NONE
 
 
 @dataclass(frozen=True)
@@ -203,6 +211,14 @@ def _stage(
     # Where the residual itself rules chance out, a look need not.
     missing = remembers(bench, before, chosen)
     gate = tuple(each for each in looks if passes(bench, each, missing and not chosen))
+    burst = NONE if gate or chosen else burst_of(bench, before)
+    least, plainly = 0.0, looks
+    if burst.excess:
+        rows = sum(len(trial.time) for trial in bench.trials)
+        # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
+        least = max(CARRIED * burst.excess, LEAST_CHANGE**2 * rows)
+        looks = _closer(bench, baseline, plain, looks, burst.chance, least)
+        gate = tuple(each for each in looks if each.starts)
     fits: dict[str, Fitted] = {}
     if gate:
         worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
@@ -211,7 +227,35 @@ def _stage(
             found = _fit(bench, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.suspect.name] = found
-    return Stage(bench, before, baseline, tuple(looks), fits, gate, missing)
+    if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
+        gate, fits, looks, burst = (), {}, plainly, NONE
+    return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)
+
+
+def _closer(
+    bench: Bench,
+    baseline: Baseline,
+    plain: Model,
+    looks: Sequence[Look],
+    chance: float,
+    least: float,
+) -> list[Look]:
+    """Closer looks, the best first; of one that explains bursts, chance is that of the bursts.
+
+    Args:
+        bench: the trials.
+        baseline: the refitted model.
+        plain: the same, as suspects are put into it.
+        looks: the looks so far.
+        chance: that noise bursts so.
+        least: chi-square that explains bursts.
+    """
+    found = [closer(baseline, bench.probed(plain, each.suspect), each) for each in looks]
+    found = [
+        replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
+        for each in found
+    ]
+    return sorted(found, key=lambda each: -each.gain)
 
 
 def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
@@ -221,16 +265,36 @@ def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
 
 
 def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
-    """Whether what a fit leaves is surely no noise, whatever effects there are.
+    """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden.
 
     Not beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts are
     taken from readings, so that what is left remembers their noise.
     """
-    if bench.coarse or bench.given.plant == "slide":
+    if not _tells(bench):
         return False
     left = residuals(bench.evidence(fit.model, chosen), fit)
     rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))
     return any(memory([part[c] for part in left], rate).sure for c in range(len(OUTPUTS)))
+
+
+def burst_of(bench: Bench, fit: Fitted) -> Bursts:
+    """The bursts in what a fit leaves of all signals; none where `remembers` cannot say either."""
+    if not _tells(bench):
+        return NONE
+    evidence = bench.evidence(fit.model)
+    left, logged = residuals(evidence, fit), evidence.logged
+    edges = [evidence.edges(each) for each in logged]
+    found = [
+        bursts([part[c] for part in left], edges, bench.noise[c].level, step_between(logged, c))
+        for c in range(len(OUTPUTS))
+    ]
+    chance = min(1.0, len(found) * min(each.chance for each in found))
+    return Bursts(chance, sum(each.excess for each in found))
+
+
+def _tells(bench: Bench) -> bool:
+    """Whether a residual tells of itself what is noise."""
+    return not bench.coarse and bench.given.plant != "slide"
 
 
 def cost(fit: Fitted) -> float:

@@ -9,6 +9,7 @@ from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
 from pma_gym.discovery.verdict import BLIND_SHARE, MOVED_CHANGE
 from pma_gym.discovery.words import (
+    chance,
     effect_name,
     effect_names,
     figure,
@@ -208,6 +209,12 @@ def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]
                 f"{len(stage.fits)} were fitted."
                 if stage.fits
                 else "None explains more than chance, or arithmetic, would."
+            )
+            + (
+                " Quarters of a second of the residual are beyond what noise can do "
+                f"({chance(stage.burst.chance)}): that opened the gate, and the best explains them."
+                if stage.burst.excess
+                else ""
             )
         )
     if selection.chosen:

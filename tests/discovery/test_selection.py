@@ -5,10 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
+from pma_gym.data.trial import Trial
+from pma_gym.discovery import selection
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.selection import ALARM, cost, kept_form, passes, restored, select
 from pma_gym.discovery.suspects import suspects
-from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, bench, laboratory
+from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, bench, commanded, laboratory
 
 SUSPECTS = suspects(STATION)
 
@@ -128,3 +131,66 @@ def test_the_truth_is_hardly_better_than_what_was_found():
 def _value(model, path):
     effect, _, door = path.partition(".")
     return model.at_the_door(effect)[door]
+
+
+def taut(effects, rate=128.0):
+    """Trials of which one begins with a slack cable that comes taut once, slowly drawn."""
+    found = []
+    for number, asked in enumerate(commanded(3, rate)):
+        time = asked.time
+        motor, regulator = (
+            np.array(asked.commands[f"{name}_voltage"]) for name in ("motor", "regulator")
+        )
+        if number == 0:
+            motor = np.interp(time, [0.5, 2.0, 4.5], [0.0, 2.0, 0.5])
+            regulator += 1.0 * (time < 0.5)
+        commands = {"motor_voltage": motor, "regulator_voltage": regulator}
+        plant = Plant(STATION.with_effects(effects).replace(OFF))
+        found.append(plant.simulate(Trial(time, commands), seed=7 + number, noise=True))
+    return found
+
+
+def by_bursts_alone(trials, monkeypatch):
+    """A selection for which no look passes as such."""
+    monkeypatch.setattr(selection, "ALARM", -1.0)
+    shared = bench(trials)
+    refitted = shared.careful_fit(STATION)
+    assert not selection.remembers(shared, refitted)
+    found = select(
+        shared, refitted, SUSPECTS, 0, Journal(None, trials, STATION, ""), lambda *_: None
+    )
+    return selection.burst_of(shared, refitted), found
+
+
+def readings(trials):
+    return bench(trials).evidence(STATION).count
+
+
+def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
+    trials = taut({"drive_dead_zone": {"width_n": 5.0, "slope": 2.0}})
+    burst, found = by_bursts_alone(trials, monkeypatch)
+    assert burst.chance < 1e-6 and burst.excess > 300.0
+    assert [suspect.name for suspect in found.chosen] == ["drive_dead_zone"]
+    assert found.stages[0].looks[0].p_value <= burst.chance
+    assert found.stages[0].burst == burst and found.stages[1].burst.excess == 0.0
+    assert found.fit.estimate("drive_dead_zone.width_n")[0] == pytest.approx(5.0, rel=0.15)
+    assert found.fit.chi_square < 1.05 * readings(trials)
+
+
+def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
+    burst, found = by_bursts_alone(taut({}), monkeypatch)
+    assert burst.chance == 1.0 and burst.excess == 0.0
+    assert found.chosen == () and found.stages[0].gate == ()
+
+
+def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
+    trials, generator = [], np.random.default_rng(0)
+    for trial in taut({}):
+        row = {name: np.array(values) for name, values in trial.measurements.items()}
+        rows = slice(200, 264)
+        row["load"][rows] += 3.0 * generator.standard_normal(64)
+        trials.append(Trial(trial.time, trial.commands, row))
+    burst, found = by_bursts_alone(trials, monkeypatch)
+    assert burst.excess > 300.0
+    assert found.chosen == () and found.stages[0].gate == () and found.stages[0].fits == {}
+    assert all(each.p_value > 1e-3 for each in found.stages[0].looks)
