@@ -9,10 +9,12 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from controllers.controller import Reference
+from controllers.designs import task_kind
 from controllers.ilc import LEAST_STEPS, LearningGain, loose_load, tight
 from controllers.lifted import second_difference
 from controllers.motion import NominalMotion, nominal_motion
 from controllers.policy import ShippedPolicy
+from controllers.policy_document import PolicyError
 from pma_gym.envs import Reading, Station
 
 CUTOFF_HZ = 8.0
@@ -20,7 +22,7 @@ CUTOFF_HZ = 8.0
 
 LEAD_STEPS = 3
 """By how many control steps a change of the reference is given early: so late does the position
-follow it."""
+follow it, at 100 Hz without delays. At other rates and delays it was not tried."""
 
 MISMATCH = 0.3
 """Relative error that is reckoned with where a change of the reference is taken for one of the
@@ -51,10 +53,11 @@ class PractisedPolicy:
 
     What is left then is mostly the sensors' noise, which the policy answers as it would answer an
     error. So once there are trials to compare with it is told m + c (x - m): x a reading, m the
-    mean of that reading over the earlier trials, moved as s has been since. c is the share of the
-    power of x - m, from trial to trial, that is not the sensor's noise, but `LEAST_SHARE` at least.
-    Where trials repeat each other that is a feedback three times as soft; where disturbances come
-    that do not repeat, c is nearly 1.
+    mean of that reading over the earlier trials. That of the sensor that the task goes by is moved
+    as s has been since, the other position's is not. c is the share of the power of x - m, from
+    trial to trial, that is not the sensor's noise, but `LEAST_SHARE` at least; it is computed for
+    the task's sensor and holds for all. Where trials repeat each other that is a feedback three
+    times as soft; where disturbances come that do not repeat, c is nearly 1.
 
     `CUTOFF_HZ`, `LEAD_STEPS`, `ALONE` and `LEAST_SHARE` were chosen on 24 validation stations of
     suite `robust` (displacement; 16 in rotation), of which no suite has one.
@@ -62,6 +65,9 @@ class PractisedPolicy:
     As with `controllers.ILC` `reset` is to be called with the reference and station of the trial
     before; with others, and after `repetitions` trials, practice begins anew.
 
+    Attributes:
+        algorithm: of the shipped policies that it runs; its figures depend on their files.
+        moved: by how much the reference is moved (m or rad), by control step.
     Source:
         D. A. Bristow, M. Tharayil and A. G. Alleyne 2006, "A survey of iterative learning control",
         IEEE Control Systems Magazine 26(3), the serial arrangement.
@@ -81,28 +87,43 @@ class PractisedPolicy:
         """Learn from the trial before, or begin anew.
 
         Raises:
-            PolicyError: no policy is shipped for this kind of task and loop.
+            PolicyError: a kind of task that it does not practise, or no policy is shipped for this
+                kind of task and loop.
         """
+        kind = task_kind(station)
+        if kind not in self.kinds:
+            raise PolicyError(
+                f"{self.name} practises {' and '.join(sorted(self.kinds))}, the task's kind is "
+                f"{kind}; take a policy that needs no practice, such as {self.algorithm}"
+            )
+        # Refuses a station that it was not trained for before anything has changed.
+        self._policy.reset(reference, station)
         motion = nominal_motion(reference, station)
         known = station == self._station and np.array_equal(motion.volts, self._motion.volts)
         if known and self._trials < self.repetitions:
             self._learn()
         else:
             self._station, self._motion, self._trials = station, motion, 0
-            self._moved = np.zeros(len(motion.volts) + 1)
+            self.moved = np.zeros(len(motion.volts) + 1)
             self._gain = LearningGain(MISMATCH)
-            self._memory = Memory(len(motion.volts))
+            self._earlier = EarlierTrials(len(motion.volts))
         self._trials += 1
         self._softened = (
-            self._memory.softened(self._moved, motion) if self._trials > ALONE else None
+            self._earlier.softened(self.moved, motion) if self._trials > ALONE else None
         )
-        self._policy.reset(_Moved(reference, self._moved, station.period).at, station)
+        self._policy.reset(_Moved(reference, self.moved, station.period).at, station)
         self._loose = loose_load(station)
         self._readings = list[Reading]()
         self._errors, self._taut = list[float](), list[bool]()
 
     def act(self, observation: Reading, time: float) -> float:
-        """Voltage (V, 0-10) to hold for the next control period."""
+        """Voltage (V, 0-10) to hold for the next control period.
+
+        Raises:
+            RuntimeError: it was not reset.
+        """
+        if self._station is None:
+            raise RuntimeError(f"{self.name} has no trial: call reset() before act()")
         station, step = self._motion.station, len(self._readings)
         expected = self._motion.expected(time - station.observation_delay)
         self._errors.append(expected - station.position(observation))
@@ -114,7 +135,7 @@ class PractisedPolicy:
 
     def _learn(self) -> None:
         """Move the reference by what the last trial says, and remember its readings."""
-        self._memory.add(self._readings, self._moved)
+        self._earlier.add(self._readings, self.moved)
         count = len(self._errors)
         if count < LEAST_STEPS:
             return
@@ -122,11 +143,16 @@ class PractisedPolicy:
         corner = 2.0 * math.pi * CUTOFF_HZ * period
         change = smooth(np.array(self._errors), tight(self._taut), corner)
         power = float(np.mean(change**2)) / (2.0 * CUTOFF_HZ * period * self._motion.noise**2)
-        early = np.minimum(np.arange(len(self._moved)) + LEAD_STEPS, count - 1)
-        self._moved = self._moved + self._gain.next(power) * change[early]
+        # Of a trial that broke off nothing is known of what would have followed.
+        early = np.append(change[LEAD_STEPS:], np.full(LEAD_STEPS, change[-1]))
+        moved = self.moved.copy()
+        moved[:count] += self._gain.next(power) * early[: len(moved)]
+        if count >= len(moved) - 1:
+            moved[count:] = moved[count - 1]
+        self.moved = moved
 
 
-class Memory:
+class EarlierTrials:
     """What the sensors said in earlier trials, and by how much the reference was moved then.
 
     The first trial is left out: its errors are still to be learned.
@@ -137,13 +163,13 @@ class Memory:
 
     def __init__(self, steps: int) -> None:
         self._steps, self._first = steps, True
-        self._readings, self._moved = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
+        self._readings, self._moves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
 
     def add(self, readings: Sequence[Reading], moved: NDArray[np.float64]) -> None:
         """Remember a trial, if it was whole."""
         if not self._first and len(readings) >= self._steps:
             self._readings.append(np.array([reading[1:] for reading in readings[: self._steps]]))
-            self._moved.append(moved)
+            self._moves.append(moved)
         self._first = False
 
     def softened(self, moved: NDArray[np.float64], motion: NominalMotion) -> "Softened | None":
@@ -162,11 +188,11 @@ class Memory:
         def shown(moves: NDArray[np.float64]) -> NDArray[np.float64]:
             return np.interp(heard, instants, moves)
 
-        mean, places = np.mean(self._readings, axis=0), shown(np.mean(self._moved, axis=0))
+        mean, places = np.mean(self._readings, axis=0), shown(np.mean(self._moves, axis=0))
         column = Reading._fields.index(station.task.protocol.quantity) - 1
         apart = [
             readings[:, column] - mean[:, column] - shown(moves) + places
-            for readings, moves in zip(self._readings, self._moved, strict=True)
+            for readings, moves in zip(self._readings, self._moves, strict=True)
         ]
         power = float(np.sum(np.square(apart))) / (self._steps * (len(apart) - 1))
         mean[:, column] += shown(moved) - places

@@ -169,13 +169,23 @@ class FrozenSuite:
         return load_model(self.model)
 
     def entry(self, contender: Contender) -> Entry:
-        """The suite's entry of a controller; one of its own for a controller it does not have."""
+        """The suite's entry of a controller; one of its own for a controller it does not have.
+
+        Raises:
+            SuiteError: none of the suite's tasks is of a kind that the controller can do.
+        """
         for entry in self.entries:
             if entry.contender.source == contender.source:
                 return entry
         kinds = contender.kinds
-        able = (task for task in self.tasks if kind_of(task) in kinds)
-        return Entry(contender, tuple(able) if kinds else ())
+        able = tuple(task for task in self.tasks if kind_of(task) in kinds)
+        if kinds and not able:
+            there = sorted({kind_of(task) for task in self.tasks})
+            raise SuiteError(
+                f"{contender.name} does {', '.join(sorted(kinds))} alone, and suite {self.name} "
+                f"has {', '.join(there)}; name another controller, or another suite"
+            )
+        return Entry(contender, able)
 
 
 def kind_of(task: str) -> str:

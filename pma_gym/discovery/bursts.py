@@ -32,7 +32,7 @@ signals, one data set in ten thousand."""
 WILD = 3.5
 """Standard deviations beyond which a reading is wild."""
 
-TOGETHER = 0.01
+BY_CHANCE = 0.01
 """Chance, over all pieces of a signal, that as many wild readings fall into one of them as there
 are, where they come one by one: a sensor may throw readings, at any rate, without structure."""
 
@@ -54,7 +54,7 @@ class Bursts:
     excess: float
 
 
-NONE = Bursts(1.0, 0.0)
+NO_BURSTS = Bursts(1.0, 0.0)
 
 
 def bursts(
@@ -70,7 +70,7 @@ def bursts(
             do what rounding can.
     """
     if sparse(parts) or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH:
-        return NONE
+        return NO_BURSTS
     pieces = [
         piece[np.isfinite(piece)]
         for part, at in zip(parts, edges, strict=True)
@@ -78,7 +78,7 @@ def bursts(
     ]
     pieces = [piece for piece in pieces if len(piece) >= LEAST_REST]
     if len(pieces) < 2:
-        return NONE
+        return NO_BURSTS
     noise = noise_of(parts, level)
     beyond = [np.maximum(np.abs(piece) - 0.5 * step, 0.0) / noise.level for piece in pieces]
     colour = autocorrelation(noise, max(map(len, pieces)))
@@ -118,7 +118,7 @@ def _together(beyond: Sequence[Array]) -> NDArray[np.bool_]:
     wild = np.array([np.count_nonzero(piece > WILD) for piece in beyond])
     sizes = np.array([len(piece) for piece in beyond])
     rate = (wild.sum() - wild + 1.0) / (sizes.sum() - sizes + 1.0)
-    return binom.sf(wild - 1, sizes, rate) * len(beyond) <= TOGETHER
+    return binom.sf(wild - 1, sizes, rate) * len(beyond) <= BY_CHANCE
 
 
 def autocorrelation(noise: Whitening, count: int) -> Array:

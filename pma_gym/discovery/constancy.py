@@ -53,25 +53,41 @@ def spreads(
     curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
     own = inverse(curvature)
     across = pieces.products[:, 1:, 1:] @ direction
-    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(evidence, fit, pieces, own)
+    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(evidence, fit, pieces)
     return {
         name: _scatter(slopes, across, direction, own, group)
         for name, group in _groups(evidence, fit, pieces).items()
     }
 
 
-def _last_step(evidence: Evidence, fit: Fitted, pieces: Pieces, own: Array) -> Array:
-    """What was left of the fit's way to the least chi-square, shape (p,); none beyond a bound.
+def _last_step(evidence: Evidence, fit: Fitted, pieces: Pieces) -> Array:
+    """What was left of a fit's way to the least chi-square, shape (p,).
 
     It is some hundredths of an error. But where a group sees an effect a thousand times as sharply
     as the others (by the instant at which a cable tightens), that is a slope as large as theirs.
     """
     gradient = pieces.products[:, 1:, 0].sum(axis=0)
     gradient += (fit.values - evidence.centre) / evidence.prior**2
-    gradient[(fit.values <= evidence.lower) | (fit.values >= evidence.upper)] = 0.0
+    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
+    out = (fit.values <= evidence.lower) & (gradient > 0.0)
+    out |= (fit.values >= evidence.upper) & (gradient < 0.0)
+    return newton_step(gradient, curvature, ~out)
+
+
+def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> Array:
+    """The step to the least of a quadratic, shape (p,).
+
+    Args:
+        gradient: shape (p,).
+        curvature: shape (p, p).
+        free: which parameters may move, shape (p,); those that nothing determines stay too.
+    """
+    step, moving = np.zeros_like(gradient), np.flatnonzero(free)
+    if not len(moving):
+        return step
+    own = inverse(curvature[np.ix_(moving, moving)])
     known = np.isfinite(np.diag(own))
-    step = np.zeros_like(gradient)
-    step[known] = -own[np.ix_(known, known)] @ gradient[known]
+    step[moving[known]] = -own[np.ix_(known, known)] @ gradient[moving[known]]
     return step
 
 

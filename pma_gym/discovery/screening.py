@@ -34,7 +34,7 @@ SIZES = (0.1, 0.17, 0.3, 0.5, 0.85, 1.4)
 """Factors on a probe at which a closer look simulates it: a dead zone of a size between two of them
 still explains most of a burst."""
 
-CLOSER, TOGETHER = 24, 64
+CLOSER, AT_ONCE = 24, 64
 """How many probes of a suspect a closer look simulates at most, taken evenly, and how many lie in
 memory together."""
 
@@ -284,8 +284,8 @@ def closer(baseline: Baseline, evidence: Evidence, found: Look) -> Look:
     tried = np.array([suspect.grown(probe, factor) for probe, factor in starts])
     gains = np.concatenate(
         [
-            _simulated_gains(baseline, evidence, replace(suspect, probes=tried[k : k + TOGETHER]))
-            for k in range(0, len(tried), TOGETHER)
+            _simulated_gains(baseline, evidence, replace(suspect, probes=tried[k : k + AT_ONCE]))
+            for k in range(0, len(tried), AT_ONCE)
         ]
     )
     order = [k for k in np.argsort(-gains, kind="stable")[:PROBES] if gains[k] > 0.0]

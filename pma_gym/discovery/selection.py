@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.bursts import NONE, Bursts, bursts
+from pma_gym.discovery.bursts import NO_BURSTS, Bursts, bursts
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.excess import memory
 from pma_gym.discovery.fits import Bench, Fitted
@@ -84,7 +84,7 @@ class Stage:
     fits: dict[str, Fitted]
     gate: tuple[Look, ...]
     missing: bool
-    burst: Bursts = NONE
+    burst: Bursts = NO_BURSTS
 
 
 @dataclass(frozen=True)
@@ -211,7 +211,7 @@ def _stage(
     # Where the residual itself rules chance out, a look need not.
     missing = remembers(bench, before, chosen)
     gate = tuple(each for each in looks if passes(bench, each, missing and not chosen))
-    burst = NONE if gate or chosen else burst_of(bench, before)
+    burst = NO_BURSTS if gate or chosen else burst_of(bench, before)
     least, plainly = 0.0, looks
     if burst.excess:
         rows = sum(len(trial.time) for trial in bench.trials)
@@ -228,7 +228,7 @@ def _stage(
             if found is not None:
                 fits[each.suspect.name] = found
     if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
-        gate, fits, looks, burst = (), {}, plainly, NONE
+        gate, fits, looks, burst = (), {}, plainly, NO_BURSTS
     return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)
 
 
@@ -280,7 +280,7 @@ def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool
 def burst_of(bench: Bench, fit: Fitted) -> Bursts:
     """The bursts in what a fit leaves of all signals; none where `remembers` cannot say either."""
     if not _tells(bench):
-        return NONE
+        return NO_BURSTS
     evidence = bench.evidence(fit.model)
     left, logged = residuals(evidence, fit), evidence.logged
     edges = [evidence.edges(each) for each in logged]

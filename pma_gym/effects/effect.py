@@ -134,6 +134,9 @@ class Effect:
             raise ValueError(
                 f"[{self.name}] takes {', '.join(names)}; unknown: {', '.join(unknown) or 'none'}, "
                 f"missing: {', '.join(missing) or 'none'}"
+                + "".join(
+                    f"; {door} may be left out ({usual:g})" for door, usual in self.defaults.items()
+                )
             )
         given = {names[door]: self._si(door, names[door], values[door]) for door in values}
         return self.checked(self.parameters(**given))

@@ -51,7 +51,8 @@ VELDHUIZEN = Method(
 )
 """Order 4(3), three evaluations of the rates, A(89.4 deg)-stable.
 
-Beside GRK4T (Kaps and Rentrop 1979) errors of trials are 10 to 20 % smaller at as many attempts.
+Beside GRK4T (Kaps and Rentrop 1979) errors of most trials are 10 to 20 % smaller at as many
+attempts; the default tolerance makes fewer attempts at the same errors of it.
 
 Source: M. van Veldhuizen 1984, "D-stability and Kaps-Rentrop methods", Computing 32; coefficients
 as in E. Hairer and G. Wanner, "Solving Ordinary Differential Equations II", table IV.7.2,

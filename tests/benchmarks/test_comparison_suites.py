@@ -116,6 +116,11 @@ def test_figures_of_a_shipped_policy_depend_on_its_files(name):
     assert not any("tqc" in file for file in files) and not Contender("pid").files
 
 
+def test_a_controller_that_can_do_none_of_a_suites_tasks_is_refused():
+    with pytest.raises(SuiteError, match="ppo_ilc does displacement, rotation alone, and suite ex"):
+        frozen_suite("exercise").entry(Contender("ppo_ilc"))
+
+
 def test_hard_has_the_stations_of_robust():
     robust, hard = frozen_suite("robust"), frozen_suite("hard")
     assert hard.station(3).model is robust.station(3).model

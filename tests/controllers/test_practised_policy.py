@@ -1,5 +1,6 @@
 """A policy that practises: what it learns, what it is told less of, and when it begins anew."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from controllers import PractisedPolicy
 from controllers.motion import nominal_motion
 from controllers.policy import PolicyError
-from controllers.practised_policy import LEAST_SHARE, Memory, Softened, smooth
+from controllers.practised_policy import LEAST_SHARE, EarlierTrials, Softened, smooth
 from pma_gym.envs import PMAEnv, Reading
 from pma_gym.plant.model import load_model
 
@@ -63,12 +64,12 @@ def test_practice_makes_better_on_a_station_that_the_model_does_not_know(pressur
 
 def scattered(motion, scatter, generator, moved=0.0):
     """A memory of 200 trials whose position readings differ by a standard deviation (m)."""
-    memory, moves = Memory(STEPS), np.full(STEPS + 1, moved)
+    earlier, moves = EarlierTrials(STEPS), np.full(STEPS + 1, moved)
     for _ in range(201):
         said = np.tile(READING, (STEPS, 1))
         said[:, 0] += scatter * generator.standard_normal(STEPS)
-        memory.add([_reading(row) for row in said], moves)
-    return memory.softened(np.zeros(STEPS + 1), motion)
+        earlier.add([_reading(row) for row in said], moves)
+    return earlier.softened(np.zeros(STEPS + 1), motion)
 
 
 def _reading(row):
@@ -88,7 +89,7 @@ def test_what_is_not_noise_is_told(motion):
     assert scattered(motion, 30.0 * motion.noise, generator).share > 0.998
 
 
-def test_a_reading_is_moved_to_what_is_expected_by_a_share(motion):
+def test_a_reading_is_moved_to_what_is_expected_by_a_share():
     softened = Softened([[1.0, 2.0, 3.0, 4.0]], 0.5)
     assert softened.told(_reading((3.0, 2.0, 1.0, 8.0)), 0)[1:] == (2.0, 2.0, 2.0, 6.0)
     assert softened.told(_reading((3.0, 2.0, 1.0, 8.0)), 1)[1:] == (3.0, 2.0, 1.0, 8.0)
@@ -102,10 +103,10 @@ def test_expected_positions_follow_the_reference_as_it_has_been_moved_since(moti
 
 
 def test_trials_that_broke_off_are_no_measure():
-    memory = Memory(STEPS)
+    earlier = EarlierTrials(STEPS)
     for count in (STEPS, STEPS - 1, STEPS - 1, STEPS):
-        memory.add([_reading(READING)] * count, np.zeros(STEPS + 1))
-    assert memory.softened(np.zeros(STEPS + 1), None) is None
+        earlier.add([_reading(READING)] * count, np.zeros(STEPS + 1))
+    assert earlier.softened(np.zeros(STEPS + 1), None) is None
 
 
 def test_practice_begins_anew_elsewhere_and_after_its_repetitions():
@@ -120,8 +121,39 @@ def test_practice_begins_anew_elsewhere_and_after_its_repetitions():
     assert trials(controller, [5], env) == first
 
 
-def test_it_is_for_tasks_that_a_policy_is_shipped_for():
-    env = PMAEnv("displacement", pressure_kpa=300.0, control_rate_hz=62.5)
-    env.reset(seed=1)
-    with pytest.raises(PolicyError, match="no policy displacement-62.5hz-ppo is shipped"):
-        PractisedPolicy().reset(env.reference, env.station)
+@pytest.mark.parametrize(
+    "task, options, message",
+    [
+        ("displacement", {"control_rate_hz": 62.5}, "no policy displacement-62.5hz-ppo is shipped"),
+        (
+            "isokinetic_exercise",
+            {},
+            "ppo_ilc practises displacement and rotation, the task's kind is isokinetic; take a "
+            "policy that needs no practice, such as ppo",
+        ),
+    ],
+)
+def test_what_it_cannot_do_is_refused_and_changes_nothing(task, options, message):
+    controller, fresh = PractisedPolicy(), PractisedPolicy()
+    refused = PMAEnv(task, pressure_kpa=400.0, **options)
+    refused.reset(seed=1)
+    env = PMAEnv("displacement", pressure_kpa=300.0, model=weaker())
+    trials(controller, [5], env)
+    for _ in range(2):
+        with pytest.raises(PolicyError, match=re.escape(message)):
+            controller.reset(refused.reference, refused.station)
+    assert trials(controller, [6], env) == trials(fresh, [5, 6], env)[1:]
+
+
+def test_without_a_trial_there_is_nothing_to_act_on(reading):
+    with pytest.raises(RuntimeError, match="ppo_ilc has no trial: call reset"):
+        PractisedPolicy().act(reading(), 0.0)
+
+
+def test_of_a_trial_that_broke_off_the_rest_is_left_as_it_was(station, reading):
+    controller = PractisedPolicy()
+    for steps in (100, 0):
+        controller.reset(lambda time: 5e-3 * time, station())
+        for k in range(steps):
+            controller.act(reading(extension=5e-3 * k * PERIOD - 1e-3), k * PERIOD)
+    assert controller.moved[:100].all() and not controller.moved[100:].any()

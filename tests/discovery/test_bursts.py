@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from pma_gym.discovery.bursts import CHANCE, NONE, autocorrelation, bursts, noise_of, tail
+from pma_gym.discovery.bursts import CHANCE, NO_BURSTS, autocorrelation, bursts, noise_of, tail
 from pma_gym.discovery.noise import Whitening
 
 ROWS, PARTS = 1024, 6
@@ -99,9 +99,9 @@ def test_missing_readings_count_for_nothing_and_few_say_nothing():
     parts[2, 330:334] += BEAT
     parts[2, 331:333] = np.nan
     assert np.isfinite(found(parts).chance)
-    assert found(np.full((PARTS, ROWS), np.nan)) == NONE
-    assert bursts([np.ones(60)], [[0, 30, 60]], 1.0, 0.0) == NONE
-    assert bursts([100.0 * np.ones(200)], [[0, 200]], 1.0, 0.0) == NONE
+    assert found(np.full((PARTS, ROWS), np.nan)) == NO_BURSTS
+    assert bursts([np.ones(60)], [[0, 30, 60]], 1.0, 0.0) == NO_BURSTS
+    assert bursts([100.0 * np.ones(200)], [[0, 200]], 1.0, 0.0) == NO_BURSTS
 
 
 def test_autocorrelation_is_that_of_the_noise():

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.constancy import spreads
+from pma_gym.discovery.constancy import newton_step, spreads
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.evidence import Pieces
 from pma_gym.discovery.suspects import suspects
@@ -120,3 +120,13 @@ def test_what_scatters_does_so_wherever_the_fit_stopped():
     found = [linear(sizes, sharpness, away) for away in (0.0, -0.3, 0.3)]
     assert found[0] > 0.2
     assert found[1:] == pytest.approx([found[0]] * 2, rel=0.02)
+
+
+def test_the_last_step_ends_where_a_bound_holds_a_parameter():
+    """The first held, the second goes to its own least; none held, both to the joint one."""
+    curvature, gradient = np.array([[2.0, 1.8], [1.8, 2.0]]), np.array([3.0, 1.0])
+    held = newton_step(gradient, curvature, np.array([False, True]))
+    assert held == pytest.approx([0.0, -0.5])
+    joint = newton_step(gradient, curvature, np.array([True, True]))
+    assert curvature @ joint + gradient == pytest.approx([0.0, 0.0])
+    assert not newton_step(gradient, curvature, np.array([False, False])).any()

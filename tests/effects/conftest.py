@@ -6,7 +6,7 @@ import pytest
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import Plant
+from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
 
 BRAID = {"resting_length_mm": 250.0, "resting_diameter_mm": 20.0, "turns": 2.085}
 FORCE = {"force_slope_n_per_kpa": 2.91, "force_intercept_n": 44.6}
@@ -49,7 +49,7 @@ def station():
 def station_with():
     """The identified station with an effect at typical or given values, or neutral."""
 
-    def make(name, tolerance=2e-4, neutral=False, **values):
+    def make(name, tolerance=DEFAULT_TOLERANCE, neutral=False, **values):
         return _plant(name, None if neutral else tuple(sorted(values.items())), tolerance)
 
     return make

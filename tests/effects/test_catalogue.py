@@ -310,3 +310,8 @@ def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
     for effect in found:
         for door, value in effect.defaults.items():
             assert effect.quantities[effect.names_at_the_door()[door]].usual == value
+    given = {"width_n": 15.0}
+    added = load_model("station").with_effects({"drive_dead_zone": given})
+    assert added.parameters["drive_dead_zone"] == CATALOGUE["drive_dead_zone"].parse(given)
+    with pytest.raises(ValueError, match=r"missing: width_n; slope may be left out \(2\)"):
+        CATALOGUE["drive_dead_zone"].parse({})

@@ -8,7 +8,7 @@ from rich.console import Console
 from benchmarks.comparison.errors import Measure, Record, measures
 from benchmarks.comparison.job import run_comparison
 from benchmarks.comparison.journal import JOURNAL, read_rows
-from benchmarks.comparison.suite import FrozenSuite, frozen_suite
+from benchmarks.comparison.suite import FrozenSuite, frozen_suite, kind_of
 from benchmarks.contender import parse_contenders
 from benchmarks.training.study.cells import OFF_POLICY, residual_group
 from benchmarks.training.study.pooled import Pool
@@ -50,7 +50,10 @@ def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) 
     """
     frozen = frozen_suite(suite)
     names = ",".join(f"{folder}:{algorithm}" for folder in seed_folders(group))
-    entries = [frozen.entry(one) for one in parse_contenders(names)]
+    contenders = parse_contenders(names)
+    if not contenders[0].kinds & {kind_of(task) for task in frozen.tasks}:
+        return None
+    entries = [frozen.entry(one) for one in contenders]
     able = _able(frozen, entries[0].only, group, algorithm)
     if not able:
         return None
