@@ -114,21 +114,18 @@ class ILC:
 
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
-        self._station: Station | None = None
-        self._trials = 0
+        self._practice = Practice(self.repetitions)
 
     def reset(self, reference: Reference, station: Station) -> None:
         """Learn from the trial before, or begin anew."""
         motion = nominal_motion(reference, station)
-        known = station == self._station and np.array_equal(motion.volts, self._motion.volts)
-        if known and self._trials < self.repetitions:
+        if self._practice.goes_on(motion):
             self._learn()
         else:
-            self._station, self._motion, self._trials = station, motion, 0
+            self._motion = motion
             self.settings = self._given or designed(self.name, station, DEFAULTS)
             self.learned = np.zeros(len(motion.volts))
             self._gain = LearningGain(self.settings.mismatch)
-        self._trials += 1
         self._position, self._late = station.position, station.observation_delay
         self._loose = loose_load(station)
         self._errors, self._added, self._taut = list[float](), list[float](), list[bool]()
@@ -173,6 +170,33 @@ class ILC:
         volts = motion.volts
         reachable = np.clip(volts + learned, np.minimum(volts, 0.0), np.maximum(volts, 10.0))
         self.learned = reachable - volts
+
+
+class Practice:
+    """Counts the trials on one station and reference.
+
+    Args:
+        repetitions: after how many practice begins anew.
+
+    Attributes:
+        trials: how many there were, with the one that has begun last.
+    """
+
+    def __init__(self, repetitions: int) -> None:
+        self._repetitions, self.trials = repetitions, 0
+        self._motion: NominalMotion | None = None
+
+    def goes_on(self, motion: NominalMotion) -> bool:
+        """Count a trial that begins; whether it repeats the one before."""
+        before = self._motion
+        goes_on = (
+            before is not None
+            and before.station == motion.station
+            and np.array_equal(before.volts, motion.volts)
+            and self.trials < self._repetitions
+        )
+        self._motion, self.trials = motion, self.trials + 1 if goes_on else 1
+        return goes_on
 
 
 def loose_load(station: Station) -> float:

@@ -10,7 +10,7 @@ from scipy.sparse.linalg import spsolve
 
 from controllers.controller import Reference
 from controllers.designs import task_kind
-from controllers.ilc import LEAST_STEPS, LearningGain, loose_load, tight
+from controllers.ilc import LEAST_STEPS, LearningGain, Practice, loose_load, tight
 from controllers.lifted import second_difference
 from controllers.motion import NominalMotion, nominal_motion
 from controllers.policy import ShippedPolicy
@@ -80,8 +80,7 @@ class PractisedPolicy:
 
     def __init__(self) -> None:
         self._policy = ShippedPolicy(self.algorithm)
-        self._station: Station | None = None
-        self._trials = 0
+        self._practice = Practice(self.repetitions)
 
     def reset(self, reference: Reference, station: Station) -> None:
         """Learn from the trial before, or begin anew.
@@ -99,18 +98,15 @@ class PractisedPolicy:
         # Refuses a station that it was not trained for before anything has changed.
         self._policy.reset(reference, station)
         motion = nominal_motion(reference, station)
-        known = station == self._station and np.array_equal(motion.volts, self._motion.volts)
-        if known and self._trials < self.repetitions:
+        if self._practice.goes_on(motion):
             self._learn()
         else:
-            self._station, self._motion, self._trials = station, motion, 0
+            self._motion = motion
             self.moved = np.zeros(len(motion.volts) + 1)
             self._gain = LearningGain(MISMATCH)
             self._earlier = EarlierTrials(len(motion.volts))
-        self._trials += 1
-        self._softened = (
-            self._earlier.softened(self.moved, motion) if self._trials > ALONE else None
-        )
+        alone = self._practice.trials <= ALONE
+        self._softened = None if alone else self._earlier.softened(self.moved, motion)
         self._policy.reset(_Moved(reference, self.moved, station.period).at, station)
         self._loose = loose_load(station)
         self._readings = list[Reading]()
@@ -122,7 +118,7 @@ class PractisedPolicy:
         Raises:
             RuntimeError: it was not reset.
         """
-        if self._station is None:
+        if not self._practice.trials:
             raise RuntimeError(f"{self.name} has no trial: call reset() before act()")
         station, step = self._motion.station, len(self._readings)
         expected = self._motion.expected(time - station.observation_delay)
