@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,9 @@ ROUNDS = 25
 
 LARGER = (30.0, 5.0)
 """How many times as large the noise is taken for on the way to a first fit."""
+
+FAR = 3.0
+"""Residual, in standard deviations of the noise, from which on a fit is taken for caught."""
 
 RUGGED, STIFFER, SUSPECT = "cable.stiffness_n_per_mm", (0.75, 0.9, 1.1, 1.3), 1.3
 """What chi-square is rugged in, at which shares of the given value fits begin from it, and the
@@ -120,6 +124,19 @@ class Bench:
             threads=self.threads,
         )
 
+    @cached_property
+    def count(self) -> int:
+        """How many readings there are."""
+        return sum(logged.count for logged in self.evidence(self.given).logged)
+
+    def left(self, fit: Fitted) -> float:
+        """Rms of what a fit leaves, in standard deviations of the noise."""
+        return float(np.sqrt(fit.chi_square / self.count))
+
+    def far(self, fit: Fitted) -> bool:
+        """Whether a fit is as far from the trials as only one that was caught is."""
+        return self.left(fit) > FAR
+
     def careful_fit(self, model: Model, extra: Sequence[Suspect] = ()) -> Fitted | None:
         """Fit a model with suspects in it, whose parameters may be far off.
 
@@ -131,15 +148,27 @@ class Bench:
         begun = self._eased(model, extra, LARGER)
         fits = [self.fit(begun, extra), self.fit(model, extra)]
         best = min(filter(None, fits), key=_chi_square, default=None)
-        if best is None or RUGGED not in self.own.free:
-            return best
-        count = sum(logged.count for logged in self.evidence(model, extra).logged)
-        if best.chi_square > SUSPECT * count:
+        if best is None:
+            return None
+        if RUGGED in self.own.free and self.left(best) ** 2 > SUSPECT:
             given = values(self.given, [RUGGED])[0]
             for factor in STIFFER:
                 away = best.model.replace({RUGGED: float(factor * given)})
                 fits.append(self.fit(self._eased(away, extra, LARGER[-1:]), extra))
         return min(filter(None, fits), key=_chi_square)
+
+    def led_out(self, fit: Fitted, extra: Sequence[Suspect] = ()) -> Fitted:
+        """A fit, or a better one where it was caught far from the trials.
+
+        With the noise taken for as large as what is left, and then for ever less, slopes are those
+        of long moves, which lead out of a hollow.
+        """
+        if not self.far(fit):
+            return fit
+        left = self.left(fit)
+        ever_less = [left / 10.0**k for k in range(int(np.log10(left)) + 1)]
+        found = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, found)), key=_chi_square)
 
     def _eased(self, model: Model, extra: Sequence[Suspect], larger: Sequence[float]) -> Model:
         """A model fitted to larger noise, ever less of it."""

@@ -27,8 +27,8 @@ SHOWN_GAIN = 25.0
 FACTORS = (0.1, 8.0)
 """By what a probe may be multiplied to start a fit from."""
 
-PROBES, BEGUN = 3, 2
-"""How many probes of a suspect are looked at again, and how many fits are begun."""
+PROBES = 3
+"""How many probes of a suspect are looked at again."""
 
 SIZES = (0.1, 0.17, 0.3, 0.5, 0.85, 1.4)
 """Factors on a probe at which a closer look simulates it: a dead zone of a size between two of them
@@ -312,4 +312,4 @@ def beginnings(baseline: Baseline, evidence: Evidence, found: Look) -> list[Arra
             if not any(np.array_equal(values, other) for other in tried):
                 tried.append(values)
     gains = _simulated_gains(baseline, evidence, replace(suspect, probes=np.array(tried)))
-    return [tried[k] for k in np.argsort(-gains, kind="stable")[:BEGUN]]
+    return [tried[k] for k in np.argsort(-gains, kind="stable")]

@@ -52,6 +52,9 @@ MOST_EFFECTS = 3
 TRIED, NEAR = 8, 0.05
 """How many suspects are fitted at most, and the share of the best look's gain that one needs."""
 
+BEGUN, ALL_BEGUN = 2, 8
+"""How many fits of a suspect are begun; and at most, while none of them comes near the trials."""
+
 CARRIED = 0.5
 """Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
 noise that is larger in places bursts too, and no effect explains half of that."""
@@ -350,13 +353,15 @@ def _fit(
         return restored(kept, bench, before, extra)
     best: Fitted | None = None
     evidence = bench.probed(_plain(bench, before), each.suspect)
-    for begun in beginnings(baseline, evidence, each):
+    for number, begun in enumerate(beginnings(baseline, evidence, each)[:ALL_BEGUN]):
+        # As much as the look promised, or enough beginnings: unless all were caught far away.
+        promised = best is not None and before.chi_square - best.chi_square >= each.gain
+        if (promised or number >= BEGUN) and (best is None or not bench.far(best)):
+            break
         found = bench.fit(before.model, extra, {each.suspect.name: begun})
+        found = None if found is None else bench.led_out(found, extra)
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
-        if best is not None and before.chi_square - best.chi_square >= each.gain:
-            # As much as the look promised: no other beginning is needed.
-            break
     if best is None or best.chi_square > before.chi_square:
         # Caught in a hollow: where the effect is absent it explains more.
         return None
@@ -373,6 +378,7 @@ def _better(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Jou
     given = dict(zip(bench.own.free, values(bench.given, bench.own.free).tolist(), strict=True))
     found = bench.careful_fit(fit.model.replace(given), chosen)
     best = fit if found is None or found.chi_square >= fit.chi_square else found
+    best = bench.led_out(best, chosen)
     journal.keep(key, kept_form(best))
     return best
 
