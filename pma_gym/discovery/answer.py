@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.diagnosis import (
     Candidate,
     Diagnosis,
@@ -13,7 +14,7 @@ from pma_gym.discovery.diagnosis import (
     NamedEffect,
     Verdict,
 )
-from pma_gym.discovery.experiment import for_blind, next_experiment
+from pma_gym.discovery.experiment import next_experiment
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import unit, values

@@ -6,14 +6,10 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.experiment import (
-    Contest,
-    chance_to_show,
-    for_blind,
-    left_over,
-    next_experiment,
-)
+from pma_gym.discovery.blind_spots import chance_to_show, for_blind
+from pma_gym.discovery.experiment import Contest, next_experiment
 from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.foretelling import left_over
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import Own, prior
 from pma_gym.discovery.protocols import is_safe, library
