@@ -53,7 +53,7 @@ TRIED, NEAR = 8, 0.05
 """How many suspects are fitted at most, and the share of the best look's gain that one needs."""
 
 BEGUN, ALL_BEGUN = 2, 8
-"""How many fits of a suspect are begun; and at most, while none of them comes near the trials."""
+"""How many fits of a suspect are begun, and how many where no suspect's came near the trials."""
 
 CARRIED = 0.5
 """Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
@@ -230,6 +230,7 @@ def _stage(
             found = _fit(bench, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.suspect.name] = found
+        fits |= _uncaught(bench, baseline, before, chosen, worth, fits, journal)
     if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, looks, burst = (), {}, plainly, NO_BURSTS
     return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)
@@ -344,29 +345,53 @@ def _fit(
     chosen: tuple[Suspect, ...],
     each: Look,
     journal: Journal,
+    caught: bool = False,
 ) -> Fitted | None:
-    """The best of fits from the probes that explain most."""
-    key = f"{bench.noise} {before.names} {each.suspect.name} {each.starts}"
+    """The best of fits from the probes that explain most; of more where others were caught."""
+    key = f"{bench.noise} {before.names} {each.suspect.name} {each.starts}{' caught' * caught}"
     kept = journal.found(key)
     extra = (*chosen, each.suspect)
     if kept is not None:
         return restored(kept, bench, before, extra)
     best: Fitted | None = None
     evidence = bench.probed(_plain(bench, before), each.suspect)
-    for number, begun in enumerate(beginnings(baseline, evidence, each)[:ALL_BEGUN]):
-        # As much as the look promised, or enough beginnings: unless all were caught far away.
-        promised = best is not None and before.chi_square - best.chi_square >= each.gain
-        if (promised or number >= BEGUN) and (best is None or not bench.far(best)):
-            break
+    for begun in beginnings(baseline, evidence, each)[: ALL_BEGUN if caught else BEGUN]:
         found = bench.fit(before.model, extra, {each.suspect.name: begun})
-        found = None if found is None else bench.led_out(found, extra)
+        if found is not None and caught:
+            found = bench.led_out(found, extra)
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
+        if best is not None and before.chi_square - best.chi_square >= each.gain and not caught:
+            # As much as the look promised: no other beginning is needed.
+            break
     if best is None or best.chi_square > before.chi_square:
         # Caught in a hollow: where the effect is absent it explains more.
         return None
     journal.keep(key, kept_form(best))
     return best
+
+
+def _uncaught(
+    bench: Bench,
+    baseline: Baseline,
+    before: Fitted,
+    chosen: tuple[Suspect, ...],
+    looks: Sequence[Look],
+    fits: dict[str, Fitted],
+    journal: Journal,
+) -> dict[str, Fitted]:
+    """Better fits, the likeliest first, until one comes near the trials; none where one has."""
+    known = {each.suspect.name: each for each in looks}
+    better: dict[str, Fitted] = {}
+    if not all(map(bench.far, fits.values())):
+        return better
+    for name in sorted(fits, key=lambda each: cost(fits[each])):
+        found = _fit(bench, baseline, before, chosen, known[name], journal, caught=True)
+        if found is not None and found.chi_square < fits[name].chi_square:
+            better[name] = found
+        if name in better and not bench.far(better[name]):
+            break
+    return better
 
 
 def _better(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
