@@ -8,6 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.hidden_effects.effects import ALL, KINDS, OUTSIDE, Values
+from benchmarks.hidden_effects.odds import odds_of_parameters
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
@@ -110,12 +111,16 @@ def draw_case(
     found, clean = _hide(experiment, rig, typical, targets)
     readings = [_measured(g, clean[i], levels, colours, found["parameters"]) for i in range(trials)]
     time = np.arange(commands.motor.shape[1]) / RATE
+    told = {}
+    if block == "parameters":
+        told = odds_of_parameters(experiment, rig, factors, SCALED_TOGETHER)
     truth = {
         "block": block,
         "effects": found["effects"],
         "weak": [e["name"] for e in found["effects"] if e["r"] < WEAK],
         "base_factors": factors,
         "base": rig,
+        "log_odds": told,
         "noise_factors": dict(zip(SENSORS, levels.tolist(), strict=True)),
         "noise_memory": dict(zip(SENSORS, colours.tolist(), strict=True)),
         "protocols": names,

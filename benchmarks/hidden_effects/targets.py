@@ -76,6 +76,10 @@ _NOTHING = (
 _PARAMETERS = (
     Rate("right parameter named", lambda o: o.parameters, Target(least=0.95)),
     Rate("a new effect claimed", lambda o: o.detected, Target(most=0.02)),
+    Rate(
+        "right parameter named, where data can tell",
+        lambda o: o.parameters if o.parameters_tellable else None,
+    ),
     Rate("named, or said not to be told", lambda o: o.parameters_told),
     Rate("a parameter moved that was right", lambda o: o.parameters_spurious),
 )

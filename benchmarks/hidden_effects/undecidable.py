@@ -7,7 +7,7 @@ one of these is behind the truth by a log-likelihood of at most `UNTOLD`; it is 
 protocol of the package's library gives the hidden effect a ratio r of at least `SHOWN`.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,13 +19,12 @@ from benchmarks.hidden_effects.cases import Case, draw_rig, measure
 from benchmarks.hidden_effects.effects import ALL, KINDS, Values
 from benchmarks.hidden_effects.groups import group
 from benchmarks.hidden_effects.library import named
+from benchmarks.hidden_effects.odds import SEEN, UNTOLD, Behind
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
 from benchmarks.hidden_effects.poor import POOR, draw_poor
 from benchmarks.hidden_effects.size import (
-    ABSOLUTE,
-    SHARE,
     Experiment,
     Ruler,
     describe,
@@ -33,20 +32,8 @@ from benchmarks.hidden_effects.size import (
     simulate_variants,
 )
 
-UNTOLD = 1.0
-"""Log-likelihood ratio to expect, up to which data do not tell two truths apart: odds of e."""
-
-SEEN = 12.5
-"""The same, from which on an effect shows beyond doubt: five standard deviations."""
-
 SHOWN = 0.5
 """Ratio r that the witness, an experiment of the library, gives the hidden effect at least."""
-
-KNOWN = 0.1
-"""Standard deviation of what is known of base parameters before any trial, as a share."""
-
-KNOWN_ABSOLUTE = {"drive_offset": 10.0, "regulator_offset": 5e3}
-"""The same (SI) of those near 0."""
 
 SIZES = np.geomspace(1 / 16, 4.0, 12)
 """Sizes that are tried in the witness, beside the largest that an effect may have."""
@@ -239,58 +226,6 @@ def _rivals(
     variants = [(numbers, {name: values}) for name, values in rivals.items()]
     readings = simulate_variants(experiment.commands, variants)
     return dict(zip(rivals, readings, strict=True))
-
-
-class Behind:
-    """How far a refitted model without the truth falls behind it in some data."""
-
-    def __init__(
-        self, experiment: Experiment, numbers: Values, base: Array, changed: Sequence[Array]
-    ) -> None:
-        """Take readings of the base, shape (trials, rows, 4), and of its `neighbours`."""
-        self.experiment, self.base = experiment, base
-        columns = [self._flat(readings) for readings in changed]
-        for trial in range(len(base)):
-            for signal in (0, 1):
-                constant = base.copy()
-                constant[trial, :, signal] += self.experiment.noise[signal]
-                columns.append(self._flat(constant))
-        self.columns = np.stack(columns, axis=1)
-        weights = [_steps_known(name, float(numbers[name])) for name in numbers]
-        weights += [0.0] * (len(columns) - len(weights))
-        self.prior = np.diag(weights)
-
-    def log_odds(self, truth: Array, rival: Array | None = None) -> float:
-        """Half the chi-square that the base, and a rival of free size, cannot absorb of a truth.
-
-        Args:
-            truth: readings with what is hidden, shape (trials, rows, 4).
-            rival: readings with the rival at some size; none but the base if not given.
-        Returns:
-            Infinite where a rig runs away: nothing else does that.
-        """
-        if not np.isfinite(truth).all() or (rival is not None and not np.isfinite(rival).all()):
-            return float("inf")
-        change, columns, prior = self._flat(truth), self.columns, self.prior
-        if rival is not None:
-            columns = np.column_stack([columns, self._flat(rival)])
-            prior = np.pad(prior, (0, 1))
-        matrix = np.vstack([columns, prior])
-        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-12)
-        target = np.concatenate([change, np.zeros(len(prior))])
-        moves = np.linalg.lstsq(matrix / scale, target, rcond=1e-9)[0]
-        return 0.5 * float(np.sum((target - matrix / scale @ moves) ** 2))
-
-    def _flat(self, readings: Array) -> Array:
-        """Change of the measured readings, over the noise."""
-        change = (readings - self.base) / self.experiment.noise
-        return change[self.experiment.measured].ravel()
-
-
-def _steps_known(name: str, value: float) -> float:
-    """One over what is known of a parameter beforehand, in steps of `neighbours`."""
-    step = ABSOLUTE.get(name, SHARE * abs(value))
-    return step / KNOWN_ABSOLUTE.get(name, KNOWN * abs(value))
 
 
 BLOCKS: dict[str, Block] = USUAL | {

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from benchmarks.hidden_effects.groups import group
+from benchmarks.hidden_effects.odds import UNTOLD
 from benchmarks.hidden_effects.sizes import expected
 
 STRUCTURAL = ("effect", "unknown")
@@ -52,6 +53,7 @@ class Outcome:
         spurious: whether it names more effects than there are.
         parameters: whether each base parameter that was off is named, None without such.
         parameters_told: the same, where it also counts to say that the data do not tell it.
+        parameters_tellable: whether the data tell each at all, by the generator's own ruler.
         parameters_spurious: whether one is named that was right, None outside such a block.
         closed: shares of the gap closed on held-out trials.
         size_errors: by `effect.parameter`, relative error of a fitted size.
@@ -79,6 +81,7 @@ class Outcome:
     spurious: bool
     parameters: bool | None = None
     parameters_told: bool | None = None
+    parameters_tellable: bool | None = None
     parameters_spurious: bool | None = None
     closed: list[float] = field(default_factory=list)
     size_errors: dict[str, float] = field(default_factory=dict)
@@ -200,6 +203,8 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     told = [*moved, *answer.get("not_identifiable", {})]
     outcome.parameters = all(any(p.startswith(PATHS[name]) for p in moved) for name in off)
     outcome.parameters_told = all(any(p.startswith(PATHS[name]) for p in told) for name in off)
+    if "log_odds" in truth:
+        outcome.parameters_tellable = min(truth["log_odds"].values()) > UNTOLD
     known = tuple(start for name in off for start in PATHS[name])
     outcome.parameters_spurious = any(not path.startswith(known) for path in moved)
 

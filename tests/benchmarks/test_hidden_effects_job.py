@@ -15,17 +15,15 @@ from benchmarks.hidden_effects.blocks import Block
 from benchmarks.hidden_effects.effects import KINDS
 from benchmarks.hidden_effects.job import JobError, Order, run_block
 from benchmarks.hidden_effects.library import random_experiment
+from benchmarks.hidden_effects.odds import UNTOLD
 from benchmarks.hidden_effects.physics.rig import noise_levels
 from benchmarks.hidden_effects.physics.simulation import Commands
 from benchmarks.hidden_effects.rounds import follow, with_trial
-from benchmarks.hidden_effects.size import Experiment, simulate_variants
+from benchmarks.hidden_effects.size import simulate_variants
 from benchmarks.hidden_effects.targets import RATES
 from benchmarks.hidden_effects.undecidable import (
     BLOCKS,
-    KNOWN,
     SHOWN,
-    UNTOLD,
-    Behind,
     draw_undecidable,
 )
 from benchmarks.hidden_effects.verdicts import compare, unanswered
@@ -214,26 +212,6 @@ def test_an_undecidable_case_keeps_what_the_ruler_promised(poor):
     # Without any refit, so that nothing rests on what a refit may absorb.
     assert np.sum(((late - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
     assert hidden["witness"]["protocol"].startswith("pressure steps")
-
-
-def test_what_parameters_and_rivals_absorb_is_not_told():
-    numbers = {"radius": 1.0, "mass": 2.0}
-    g = np.random.default_rng(1)
-    base, *shapes = 100.0 * g.standard_normal((5, 2, 40, 4))
-    few = Commands(np.zeros((2, 40)), np.zeros((2, 40)), np.arange(2.0))
-    behind = Behind(
-        Experiment(few, np.ones((2, 40), bool), np.ones(4)),
-        numbers,
-        base,
-        [base + 0.005 * shapes[0], base + 0.01 * shapes[1]],
-    )
-    small, large = (behind.log_odds(base + size * KNOWN * shapes[0]) for size in (1.0, 5.0))
-    # Half the square of how many standard deviations the radius must be off.
-    assert small == pytest.approx(0.5, rel=0.02) and large == pytest.approx(12.5, rel=0.02)
-    alone = behind.log_odds(base + shapes[2])
-    assert alone > 100.0
-    assert behind.log_odds(base + shapes[2], base + 3.0 * shapes[2]) < 1e-9
-    assert behind.log_odds(base + shapes[2], base + shapes[3]) > 0.5 * alone
 
 
 def asking(folder):
