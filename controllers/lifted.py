@@ -18,9 +18,11 @@ Source:
 """
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
@@ -79,11 +81,15 @@ class LiftedPlant:
         return self._a @ spsolve(normal.tocsc(), effect.T @ (seen @ error))
 
 
-def second_difference(count: int) -> Any:  # noqa: ANN401
+def second_difference(count: int) -> sparse.csc_array:
     """D2 of so many steps, sparse, shape (count - 2, count)."""
     return banded([1.0, -2.0, 1.0], [0, 1, 2], (count - 2, count))
 
 
-def banded(diagonals: list[Any], offsets: Any, shape: tuple[int, int]) -> Any:  # noqa: ANN401
+def banded(
+    diagonals: Sequence[ArrayLike], offsets: Sequence[int], shape: tuple[int, int]
+) -> sparse.csc_array:
     """A sparse matrix of diagonals, each with its offset from the main one."""
-    return sparse.diags_array(diagonals, offsets=offsets, shape=shape).tocsc()
+    # SciPy takes many offsets; its default, 0, makes pyright believe that it takes one.
+    given: dict[str, Any] = {"offsets": offsets, "shape": shape}
+    return sparse.diags_array(diagonals, **given).tocsc()

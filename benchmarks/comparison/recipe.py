@@ -88,13 +88,10 @@ def _occasional(given: Mapping[str, Any]) -> Occasional:
     # What has a default in model files has it here: it is not drawn.
     needed = [d for d in wanted if d in given_here or d not in CATALOGUE[name].defaults]
     if sorted(given_here) != sorted(needed) or any(to not in ranges for to, _ in tied.values()):
-        left_out = (
-            f"; {', '.join(spare)} may be left out"
-            if (spare := [*CATALOGUE[name].defaults])
-            else ""
-        )
+        spare = ", ".join(CATALOGUE[name].defaults)
         needs = ", ".join(d for d in wanted if d not in CATALOGUE[name].defaults)
-        raise RecipeError(f"{name} needs a range or a tie for each of {needs}{left_out}")
+        needs += f"; {spare} may be left out" if spare else ""
+        raise RecipeError(f"{name} needs a range or a tie for each of {needs}")
     if not 0.0 <= share <= 1.0:
         raise RecipeError(f"the share of {name} must lie in 0 to 1, got {share!r}")
     for door, ends in ranges.items():

@@ -54,9 +54,10 @@ VELDHUIZEN = Method(
 Beside GRK4T (Kaps and Rentrop 1979) errors of most trials are 10 to 20 % smaller at as many
 attempts; the default tolerance makes fewer attempts at the same errors of it.
 
-Source: M. van Veldhuizen 1984, "D-stability and Kaps-Rentrop methods", Computing 32; coefficients
-as in E. Hairer and G. Wanner, "Solving Ordinary Differential Equations II", table IV.7.2,
-transformed as in their Eq. IV.7.25. A test holds the conditions of order.
+Source: M. van Veldhuizen 1984, "D-stability and Kaps-Rentrop methods", Computing 32. The paper was
+not at hand: the digits are those of public solvers that have the method in the form which needs no
+product with the Jacobian (E. Hairer and G. Wanner's ROS4, OrdinaryDiffEq.jl's Veldd4), and a test
+holds the conditions of order.
 """
 
 
