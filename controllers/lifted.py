@@ -19,7 +19,6 @@ Source:
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -90,6 +89,4 @@ def banded(
     diagonals: Sequence[ArrayLike], offsets: Sequence[int], shape: tuple[int, int]
 ) -> sparse.csc_array:
     """A sparse matrix of diagonals, each with its offset from the main one."""
-    # SciPy takes many offsets; its default, 0, makes pyright believe that it takes one.
-    given: dict[str, Any] = {"offsets": offsets, "shape": shape}
-    return sparse.diags_array(diagonals, **given).tocsc()
+    return sparse.diags_array(diagonals, offsets=offsets, shape=shape).tocsc()  # type: ignore[arg-type]
