@@ -220,7 +220,7 @@ def measured(
     seed: Annotated[int, typer.Option(min=0, help="Seed of simulated chance.")] = 0,
     rounds: Annotated[
         int, typer.Option(min=1, help="Most diagnoses, each of what the one before amended.")
-    ] = 6,
+    ] = 2,
     write: Annotated[
         Path | None,
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),

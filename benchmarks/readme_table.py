@@ -1,7 +1,8 @@
 """Puts a run's figures into README and documentation: `python -m benchmarks.readme_table`.
 
-A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figures -->`; nobody
-types one in. `--check` changes nothing and fails if a file is not as the run would have it.
+A block of figures, of the run or of those that `docs/figures` keeps, stands between
+`<!-- figures: NAME -->` and `<!-- end of figures -->`; nobody types one in. `--kept` needs no run
+and leaves its blocks alone. `--check` changes nothing and fails if a file is not as it would be.
 """
 
 import json
@@ -15,6 +16,7 @@ from typing import Annotated, Any
 import typer
 
 from benchmarks.files import write_text
+from benchmarks.hidden_effects.readme import hidden_effects
 from benchmarks.score import PHASES, UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -107,18 +109,29 @@ FIGURES: dict[str, Callable[[Run], str]] = {
 }
 """Blocks by name."""
 
+KEPT: dict[str, Callable[[], str]] = {hidden_effects.__name__: hidden_effects}
+"""Blocks that are not of the run: their figures were kept in `docs/figures`."""
 
-def refreshed(text: str, run: Run) -> str:
-    """A text with the run's figures in its blocks.
+
+def refreshed(text: str, run: Run | None) -> str:
+    """A text with the run's figures in its blocks, and those that were kept; these alone of no run.
 
     Raises:
         RunError: a block that nobody renders, or figures that are missing.
     """
 
     def block(found: re.Match[str]) -> str:
-        if found["name"] not in FIGURES:
-            raise RunError(f"no figures {found['name']!r}; there are {', '.join(FIGURES)}")
-        return f"{found['start']}\n{FIGURES[found['name']](run)}\n\n{found['end']}"
+        name = found["name"]
+        if name not in FIGURES and name not in KEPT:
+            known = ", ".join([*FIGURES, *KEPT])
+            raise RunError(f"no figures {name!r}; there are {known}")
+        if name in KEPT:
+            figures = KEPT[name]()
+        elif run is None:
+            return found[0]
+        else:
+            figures = FIGURES[name](run)
+        return f"{found['start']}\n{figures}\n\n{found['end']}"
 
     return _BLOCK.sub(block, text)
 
@@ -146,10 +159,13 @@ def main(
     check: Annotated[
         bool, typer.Option("--check", help="Change nothing; fail on a difference.")
     ] = False,
+    kept: Annotated[
+        bool, typer.Option("--kept", help="Only figures that docs/figures keeps; needs no run.")
+    ] = False,
 ) -> None:
     """Put a run's figures into README.md and docs/benchmark.md."""
     try:
-        run = load_run(scores)
+        run = None if kept else load_run(scores)
         texts = {path: path.read_text(encoding="utf-8") for path in FILES}
         found = {path: refreshed(text, run) for path, text in texts.items()}
     except RunError as error:

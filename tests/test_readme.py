@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 import benchmarks.__main__
 import pma_gym.cli
+from benchmarks.hidden_effects.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
 from benchmarks.score import PHASES, measured_score
 from benchmarks.suite import load_suite
@@ -158,6 +159,23 @@ def test_every_kind_of_figures_can_be_written():
     for name in FIGURES:
         marks = f"<!-- figures: {name} -->\n<!-- end of figures -->"
         assert len(refreshed(marks, small_run())) > len(marks) + 20
+
+
+def test_figures_that_were_kept_stand_in_the_readme_as_they_are():
+    assert "| two effects: both named |" in README
+    assert refreshed(README, None) == README
+
+
+def test_a_kept_figure_is_written_without_a_run_which_is_left_alone():
+    run_only = "<!-- figures: displacement -->\nold\n<!-- end of figures -->\n"
+    found = refreshed(run_only + "<!-- figures: hidden_effects -->\n<!-- end of figures -->", None)
+    assert found.startswith(run_only)
+    rates = json.loads(KEPT.read_text("utf-8"))["blocks"]["nothing"]["rates"]
+    row = next(line for line in found.splitlines() if line.startswith("| nothing hidden"))
+    assert float(row.split("|")[2].split("%")[0]) == pytest.approx(
+        100.0 * rates["false alarm"]["rate"], abs=0.05
+    )
+    assert row.endswith(f"| {rates['false alarm']['n']} | <= 1 % |")
 
 
 def test_unknown_figures_are_refused():

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.selection import Stage, cost
+from pma_gym.discovery.selection import Stage
+from pma_gym.discovery.suspect_fits import cost
 from pma_gym.discovery.suspects import Suspect
 
 NEAREST = 12.0

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.excess import memory, tone
 from pma_gym.discovery.findings import Findings
+from pma_gym.discovery.leftovers import residuals
 from pma_gym.discovery.noise import slow_part, sparse
 from pma_gym.discovery.quantisation import is_coarse
-from pma_gym.discovery.selection import residuals
 from pma_gym.plant.plant import OUTPUTS
 
 LEAST_SLOW = 0.02

@@ -20,7 +20,7 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Fitted
-from pma_gym.discovery.selection import left_over
+from pma_gym.discovery.leftovers import left_over
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.plant import OUTPUTS
 

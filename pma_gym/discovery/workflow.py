@@ -16,12 +16,13 @@ from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.held_out import unseen
 from pma_gym.discovery.journal import Journal
+from pma_gym.discovery.leftovers import relearnt
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
 from pma_gym.discovery.preparation import prepared
 from pma_gym.discovery.quantisation import coarse_sensors
 from pma_gym.discovery.rivals import rivals
-from pma_gym.discovery.selection import Selection, relearnt, select
+from pma_gym.discovery.selection import Selection, select
 from pma_gym.discovery.suspects import suspects
 from pma_gym.discovery.verdict import suspicious
 from pma_gym.plant.logged import Logged

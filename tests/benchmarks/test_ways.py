@@ -24,7 +24,7 @@ from benchmarks.hidden_effects.ways.prepared import prepare
 from benchmarks.hidden_effects.ways.registry import WAYS
 from benchmarks.hidden_effects.ways.signatures import signature
 from pma_gym.data.dataset import read_dataset
-from pma_gym.discovery import selection, workflow
+from pma_gym.discovery import leftovers, selection, workflow
 from pma_gym.discovery.fits import Bench
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
@@ -161,7 +161,7 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
     def spied(*_, **__):
         own = workflow.own_parameters(ready.bench.given)
-        noise = selection.autoregression([np.sin(np.arange(400.0))], 0.1)
+        noise = leftovers.autoregression([np.sin(np.arange(400.0))], 0.1)
         seen.update(prior=own.prior, noise=noise)
 
         class Nothing:

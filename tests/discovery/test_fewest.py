@@ -8,8 +8,8 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import verdict, workflow
 from pma_gym.discovery.fewest import fewest
+from pma_gym.discovery.leftovers import relearnt
 from pma_gym.discovery.parameters import own_parameters, values
-from pma_gym.discovery.selection import relearnt
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import (

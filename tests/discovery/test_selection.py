@@ -8,7 +8,9 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import selection
 from pma_gym.discovery.journal import Journal
-from pma_gym.discovery.selection import ALARM, cost, kept_form, passes, restored, select
+from pma_gym.discovery.leftovers import burst_of, remembers
+from pma_gym.discovery.selection import ALARM, passes, select
+from pma_gym.discovery.suspect_fits import cost, kept_form, restored
 from pma_gym.discovery.suspects import suspects
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, bench, commanded, laboratory
@@ -155,11 +157,11 @@ def by_bursts_alone(trials, monkeypatch):
     monkeypatch.setattr(selection, "ALARM", -1.0)
     shared = bench(trials)
     refitted = shared.careful_fit(STATION)
-    assert not selection.remembers(shared, refitted)
+    assert not remembers(shared, refitted)
     found = select(
         shared, refitted, SUSPECTS, 0, Journal(None, trials, STATION, ""), lambda *_: None
     )
-    return selection.burst_of(shared, refitted), found
+    return burst_of(shared, refitted), found
 
 
 def readings(trials):

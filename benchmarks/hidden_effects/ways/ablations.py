@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pma_gym.data.dataset import Dataset
-from pma_gym.discovery import diagnose, selection, workflow
+from pma_gym.discovery import diagnose, leftovers, selection, workflow
 from pma_gym.discovery.noise import Whitening, white_noise
 from pma_gym.discovery.parameters import Own
 from pma_gym.discovery.screening import Look
@@ -34,7 +34,7 @@ def ours(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_whitening(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the noise's memory: what a fit leaves counts as white noise of its variance."""
-    with _instead(selection, "autoregression", _no_memory):
+    with _instead(leftovers, "autoregression", _no_memory):
         return ours(dataset, seed, jobs)
 
 

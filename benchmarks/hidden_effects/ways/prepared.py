@@ -12,9 +12,9 @@ from pma_gym.discovery.answer import MOVED
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import Level, initial_floors
+from pma_gym.discovery.leftovers import left_over
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters, unit, values
-from pma_gym.discovery.selection import left_over
 from pma_gym.discovery.suspects import Suspect, suspects
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import load_model

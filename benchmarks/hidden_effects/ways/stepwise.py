@@ -21,9 +21,10 @@ from benchmarks.hidden_effects.ways.prepared import (
 )
 from pma_gym.data.dataset import Dataset
 from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.leftovers import left_over
 from pma_gym.discovery.parameters import values
 from pma_gym.discovery.screening import Baseline, beginnings, look
-from pma_gym.discovery.selection import MOST_EFFECTS, NEAR, TRIED, left_over
+from pma_gym.discovery.selection import MOST_EFFECTS, NEAR, TRIED
 from pma_gym.discovery.suspects import Suspect
 
 Array = NDArray[np.float64]

@@ -1,0 +1,83 @@
+"""What a fit leaves of the readings, and whether that is noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.bursts import NO_BURSTS, Bursts, bursts
+from pma_gym.discovery.excess import memory
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.noise import Whitening, autoregression, step_between
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.plant.plant import OUTPUTS
+
+Array = NDArray[np.float64]
+
+
+def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:
+    """Whitening of what a fit leaves, never of less than is seen at rest."""
+    evidence = bench.evidence(fit.model, chosen)
+    left = residuals(evidence, fit)
+    found = []
+    for channel, before in enumerate(bench.noise):
+        parts = [part[channel] for part in left]
+        known = [part for part in parts if np.isfinite(part).any()]
+        found.append(autoregression(known, before.level) if known else before)
+    return tuple(found)
+
+
+def residuals(evidence, fit: Fitted) -> list[Array]:  # noqa: ANN001
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    readings = evidence.readings(fit.values)
+    assert readings is not None
+    return left_over(evidence, readings)
+
+
+def left_over(evidence, readings: Sequence[Array]) -> list[Array]:  # noqa: ANN001
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    found = []
+    for logged, held in zip(evidence.logged, readings, strict=True):
+        left = held - logged.measured
+        for channel, name in enumerate(OUTPUTS):
+            if not logged.measures[channel]:
+                left[channel] = np.nan
+                continue
+            left[channel, logged.missing[channel]] = np.nan
+            if name in ("contraction", "rotation"):
+                left[channel] -= np.nanmean(left[channel])
+        found.append(left)
+    return found
+
+
+def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
+    """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden.
+
+    Not beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts are
+    taken from readings, so that what is left remembers their noise.
+    """
+    if not _tells(bench):
+        return False
+    left = residuals(bench.evidence(fit.model, chosen), fit)
+    rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))
+    return any(memory([part[c] for part in left], rate).sure for c in range(len(OUTPUTS)))
+
+
+def burst_of(bench: Bench, fit: Fitted) -> Bursts:
+    """The bursts in what a fit leaves of all signals; none where `remembers` cannot say either."""
+    if not _tells(bench):
+        return NO_BURSTS
+    evidence = bench.evidence(fit.model)
+    left, logged = residuals(evidence, fit), evidence.logged
+    edges = [evidence.edges(each) for each in logged]
+    found = [
+        bursts([part[c] for part in left], edges, bench.noise[c].level, step_between(logged, c))
+        for c in range(len(OUTPUTS))
+    ]
+    chance = min(1.0, len(found) * min(each.chance for each in found))
+    return Bursts(chance, sum(each.excess for each in found))
+
+
+def _tells(bench: Bench) -> bool:
+    """Whether a residual tells of itself what is noise."""
+    return not bench.coarse and bench.given.plant != "slide"
