@@ -281,6 +281,10 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
                 for rival in equal
             ]
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
+    if verdict == "undecidable" and selection.chosen:
+        # Named, but not borne out by trials left out: is it there, or nothing?
+        pair = [(selection.fit, selection.chosen), (found.refitted, ())]
+        return next_experiment(bench, pair, found.seed)
     silent = verdict in ("parameters", "agrees") and len(blind) > SILENT * len(found.suspects)
     if (verdict == "undecidable" or silent) and found.looks:
         worth = [look.suspect for look in (found.looks[:3] if suspicious(found) else found.looks)]

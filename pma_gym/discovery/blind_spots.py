@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.foretelling import derivatives, foretold, left_over, proposal
+from pma_gym.discovery.foretelling import foretold, proposal
+from pma_gym.discovery.predicting import derivatives, left_over
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN, Look
 from pma_gym.discovery.suspects import Suspect, bounds

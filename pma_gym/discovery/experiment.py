@@ -18,12 +18,10 @@ from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.foretelling import (
     as_measured,
-    derivatives,
     foretold,
-    left_over,
     proposal,
-    root,
 )
+from pma_gym.discovery.predicting import derivatives, left_over, root
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN
 from pma_gym.discovery.suspects import Suspect, bounds

@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.predicting import surprise
 from pma_gym.discovery.suspects import Suspect
 
 Array = NDArray[np.float64]
@@ -33,10 +35,13 @@ class Unseen:
     Attributes:
         readings: what its sensors hold (SI), shape (4, rows) for each trial.
         chi_square: of the whitened residuals of each trial, shape (trials,).
+        surprise: the same of each fold, given how well the others hold the parameters
+            (`predicting.surprise`), shape (folds,).
     """
 
     readings: list[Array]
     chi_square: Array
+    surprise: Array
 
 
 def folds(count: int) -> list[list[int]]:
@@ -69,19 +74,22 @@ def unseen(
         return _unseen_stretches(bench, fit, chosen, progress)
     count = len(bench.trials)
     readings: list[Array] = [np.empty(0)] * count
-    chi_square = np.zeros(count)
+    chi_square, surprised = np.zeros(count), list[float]()
     parts = folds(count)
+    whole = _whole(bench, fit, chosen)
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
-        found = bench.fit(fit.model, chosen, trials=seen) if fit.paths else fit
+        found = bench.fit(whole.model, chosen, trials=seen) if fit.paths else fit
         held = None if found is None else _look(bench, found, chosen, left_out)
-        if held is None:
+        if found is None or held is None:
             return None
+        others = bench.evidence(whole.model, chosen, seen)
+        surprised.append(_surprise(others, bench.evidence(whole.model, chosen), found, whole, held))
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
-    return Unseen(readings, chi_square)
+    return Unseen(readings, chi_square, np.array(surprised))
 
 
 def _unseen_stretches(
@@ -96,24 +104,50 @@ def _unseen_stretches(
         return None
     (trial,) = bench.trials
     readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
+    surprised, whole = list[float](), _whole(bench, fit, chosen)
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
         seen, rest = _masked(trial, left_out), _masked(trial, ~left_out)
         if not all(_measures(part) for part in (seen, rest)):
             return None
-        found = replace(bench, trials=[seen]).fit(fit.model, chosen) if fit.paths else fit
+        part = replace(bench, trials=[seen])
+        found = part.fit(whole.model, chosen) if fit.paths else fit
         held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
-        if held is None:
+        if found is None or held is None:
             return None
+        every, others = (each.evidence(whole.model, chosen) for each in (bench, part))
+        surprised.append(_surprise(others, every, found, whole, held))
         readings[:, left_out] = held.readings[0][:, left_out]
         chi_square += float(held.chi_square[0])
-    return Unseen([readings], np.array([chi_square]))
+    return Unseen([readings], np.array([chi_square]), np.array(surprised))
+
+
+def _whole(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Fitted:
+    """The fit of all trials, with the noise that the bench has now."""
+    return (bench.fit(fit.model, chosen) if fit.paths else None) or fit
+
+
+def _surprise(
+    seen: Evidence, every: Evidence, apart: Fitted, together: Fitted, held: "_Held"
+) -> float:
+    """As `predicting.surprise`; where nothing is free, chi-square."""
+    if not together.paths:
+        return float(held.chi_square.sum())
+    return surprise(seen, every, apart, together)
+
+
+@dataclass(frozen=True)
+class _Held:
+    """As `Unseen`, of one fold."""
+
+    readings: list[Array]
+    chi_square: Array
 
 
 def _look(
     bench: Bench, found: Fitted, chosen: Sequence[Suspect], left_out: Sequence[int]
-) -> Unseen | None:
+) -> _Held | None:
     """Trials beside a fit; None where it cannot be simulated on them."""
     evidence = bench.evidence(found.model, chosen, left_out)
     pieces = evidence.pieces(found.values, np.empty(0))
@@ -121,7 +155,7 @@ def _look(
     if pieces is None or held is None:
         return None
     count = range(len(left_out))
-    return Unseen(held, np.array([pieces.total([k])[0, 0] for k in count]))
+    return _Held(held, np.array([pieces.total([k])[0, 0] for k in count]))
 
 
 def _masked(trial: Trial, left_out: NDArray[np.bool_]) -> Trial:

@@ -38,7 +38,7 @@ MUCH_EXPLAINED = 0.1
 """Share of chi-square that an effect could explain, from which on its not passing the gate means
 that there are too few data, not that the structure is right."""
 
-BLIND_SHARE = 0.4
+BLIND_SHARE = 0.3
 """Share of the catalogue that would not have shown, from which on silence says nothing."""
 
 MOVED_CHANGE = 0.1
@@ -149,7 +149,7 @@ def _confirmed(found: Findings) -> bool:
     """Whether the effects help on trials that the fits had not seen."""
     if found.unseen is None or found.unseen_without is None:
         return True
-    with_it, without = found.unseen.chi_square, found.unseen_without.chi_square
+    with_it, without = found.unseen.surprise, found.unseen_without.surprise
     # By the number of trials too: one trial beyond what the others reach may weigh more than all.
     return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
 

@@ -59,6 +59,11 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
         ) + _tones(diagnosis)
     if diagnosis.candidates and diagnosis.candidates[0].why == "added to the model":
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
+        if not equal:
+            return (
+                f"Model {name} misses something, {effect_name(diagnosis.candidates[0].name)} most "
+                "likely, but what was fitted of it to some trials does not carry over to others"
+            ) + _propose(diagnosis)
         rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
         return (
             f"Model {name} misses something, but these {trials} cannot tell which of {rivals} it is"

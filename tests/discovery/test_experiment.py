@@ -9,7 +9,6 @@ from pma_gym.discovery import diagnose
 from pma_gym.discovery.blind_spots import chance_to_show, for_blind
 from pma_gym.discovery.experiment import Contest, next_experiment
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.foretelling import left_over
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import Own, prior
 from pma_gym.discovery.protocols import is_safe, library
@@ -155,27 +154,6 @@ def test_a_rig_of_narrow_limits_gets_smaller_loads():
     for each in few:
         assert np.max(each.simulated[0].truth["load"]) <= 0.9 * 700.0
         assert np.max(each.simulated[0].truth["contraction"]) <= 0.9 * 50e-3
-
-
-def test_parameters_absorb_what_a_least_squares_fit_with_their_prior_does():
-    generator = np.random.default_rng(1)
-    by, apart = generator.standard_normal((2, 40)), generator.standard_normal((3, 40))
-    covariance = np.array([[4.0, 1.0], [1.0, 0.5]])
-    fit = Fitted(station(), (), FREE[:2], np.ones(2), covariance, 0.0, np.ones(2), True)
-    weights = np.linalg.cholesky(np.linalg.inv(covariance)).T
-    stacked = np.concatenate([by.T, weights])
-    for row, found in zip(apart, left_over(apart, by, fit), strict=True):
-        right = np.concatenate([-row, np.zeros(2)])
-        rest = right - stacked @ np.linalg.lstsq(stacked, right, rcond=None)[0]
-        assert found == pytest.approx(rest @ rest)
-
-
-def test_what_no_trial_told_is_absorbed_whole():
-    by = np.ones((1, 30))
-    fit = Fitted(
-        *(station(), (), FREE[:1], np.ones(1), np.array([[np.inf]]), 0.0, np.ones(1), True)
-    )
-    assert left_over(7.0 * by, by, fit)[0] == pytest.approx(0.0, abs=1e-4)
 
 
 def test_effects_that_were_hidden_are_made_to_show():
