@@ -38,7 +38,7 @@ MUCH_EXPLAINED = 0.1
 """Share of chi-square that an effect could explain, from which on its not passing the gate means
 that there are too few data, not that the structure is right."""
 
-BLIND_SHARE = 0.3
+BLIND_SHARE = 0.35
 """Share of the catalogue that would not have shown, from which on silence says nothing."""
 
 MOVED_CHANGE = 0.1
