@@ -126,7 +126,12 @@ def refreshed(text: str, run: Run | None) -> str:
             known = ", ".join([*FIGURES, *KEPT])
             raise RunError(f"no figures {name!r}; there are {known}")
         if name in KEPT:
-            figures = KEPT[name]()
+            try:
+                figures = KEPT[name]()
+            except KeyError as error:
+                raise RunError(
+                    f"what docs/figures keeps for {name} has no {error}; put a newer run's there"
+                ) from None
         elif run is None:
             return found[0]
         else:

@@ -10,10 +10,12 @@ from pathlib import Path
 from statistics import fmean
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 import benchmarks.__main__
 import pma_gym.cli
+from benchmarks import readme_table
 from benchmarks.hidden_effects.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
 from benchmarks.score import PHASES, measured_score
@@ -161,6 +163,12 @@ def test_every_kind_of_figures_can_be_written():
         assert len(refreshed(marks, small_run())) > len(marks) + 20
 
 
+def command():
+    app = typer.Typer()
+    app.command()(readme_table.main)
+    return app
+
+
 def test_figures_that_were_kept_stand_in_the_readme_as_they_are():
     assert "| two effects: both named |" in README
     assert refreshed(README, None) == README
@@ -176,6 +184,11 @@ def test_a_kept_figure_is_written_without_a_run_which_is_left_alone():
         100.0 * rates["false alarm"]["rate"], abs=0.05
     )
     assert row.endswith(f"| {rates['false alarm']['n']} | <= 1 % |")
+
+
+def test_kept_figures_are_checked_without_a_run():
+    done = CliRunner().invoke(command(), ["--kept", "--check"])
+    assert done.exit_code == 0, done.output
 
 
 def test_unknown_figures_are_refused():

@@ -20,6 +20,9 @@ UNTOLD = 1.0
 SEEN = 12.5
 """The same, from which on an effect shows beyond doubt: five standard deviations."""
 
+MOST_ODDS = 1e9
+"""Largest log-likelihood ratio that is written down."""
+
 KNOWN = 0.1
 """Standard deviation of what is known of base parameters before any trial, as a share."""
 
@@ -106,5 +109,6 @@ def odds_of_parameters(
     for names, put_back in zip(off, readings[len(near) :], strict=True):
         others = {name: numbers[name] for name in numbers if name not in names}
         behind = Behind(experiment, others, base, [moved[name] for name in others])
-        found[names[0]] = round(behind.log_odds(put_back), 4)
+        # A rig that runs away is told for certain, and a file has no infinities.
+        found[names[0]] = round(min(behind.log_odds(put_back), MOST_ODDS), 4)
     return found

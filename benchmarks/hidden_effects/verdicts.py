@@ -171,11 +171,13 @@ def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
     """An outcome with what the truth alone tells."""
     block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
     least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
+    odds = list((truth.get("log_odds") or {}).values())
     return Outcome(
         block=block,
         truth=tuple(effect["name"] for effect in truth["effects"]),
         number=truth.get("number", 0),
         ratio=min(ratios, default=None),
+        parameters_tellable=min(odds) > UNTOLD if odds else None,
         off=tuple(_off(truth)) if block == "parameters" else (),
         kind=truth.get("kind", ""),
         strong=all(ratio >= least for ratio in ratios),
@@ -203,8 +205,6 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     told = [*moved, *answer.get("not_identifiable", {})]
     outcome.parameters = all(any(p.startswith(PATHS[name]) for p in moved) for name in off)
     outcome.parameters_told = all(any(p.startswith(PATHS[name]) for p in told) for name in off)
-    if "log_odds" in truth:
-        outcome.parameters_tellable = min(truth["log_odds"].values()) > UNTOLD
     known = tuple(start for name in off for start in PATHS[name])
     outcome.parameters_spurious = any(not path.startswith(known) for path in moved)
 

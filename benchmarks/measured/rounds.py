@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.files import write_text
 from pma_gym.data.dataset import Dataset
-from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.diagnosis import ADDED, Diagnosis
 from pma_gym.discovery.journal import digest
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.model import Model, dump_model, load_model
@@ -19,9 +19,6 @@ trials, and bring the extension within the target. Others after them take longer
 
 MOST_RIVALS = 8
 """How many candidates of a round are kept."""
-
-ADDED = "added to the model"
-"""What a diagnosis says of a candidate that is in its amended model."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -100,7 +97,7 @@ def _round(
 ) -> tuple[Round, Model]:
     """A round and its amended model, from the folder where it is there."""
     stage, amended = folder / f"round_{number}.json", folder / f"round_{number}.toml"
-    asked = digest([each.trial for each in data.trials], model, f"measured 1 seed {seed}")
+    asked = digest([each.trial for each in data.trials], model, f"measured 2 seed {seed}")
     if stage.is_file() and amended.is_file():
         kept = json.loads(stage.read_text(encoding="utf-8"))
         if kept.pop("asked", "") == asked:

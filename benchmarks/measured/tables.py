@@ -167,10 +167,11 @@ def experiment_words(result: "Measured") -> list[str]:
     for number, each in enumerate(result.rounds, 1):
         following = each.next_experiment
         if following is not None:
-            separates = " and ".join(readable(name) for name in following["separates"])
-            words.append(
-                f"Round {number} proposes, to tell {separates} apart: {following['protocol']}."
-            )
+            names = [readable(name) for name in following["separates"]]
+            why = f"tell {' and '.join(names)} apart"
+            if len(names) == 1:
+                why = f"see whether {names[0]} is there"
+            words.append(f"Round {number} proposes, to {why}: {following['protocol']}.")
     for number, each in enumerate(result.proposals, 1):
         shows = ", ".join(map(readable, each.shows))
         words.append(

@@ -7,6 +7,7 @@ import numpy as np
 
 from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.diagnosis import (
+    ADDED,
     Candidate,
     Diagnosis,
     Estimate,
@@ -211,7 +212,7 @@ def _candidates(found: Findings) -> tuple[Candidate, ...]:
 def _why(found: Findings, look: Look, chosen: bool) -> str:
     name = look.suspect.name
     if chosen:
-        return "added to the model"
+        return ADDED
     for suspect, rivals in zip(found.selection.chosen, found.rivals, strict=True):
         for rival in rivals:
             if rival.suspect.name == name:
@@ -282,9 +283,12 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
             ]
             return next_experiment(bench, [(selection.fit, selection.chosen), *others], found.seed)
     if verdict == "undecidable" and selection.chosen:
-        # Named, but not borne out by trials left out: is it there, or nothing?
-        pair = [(selection.fit, selection.chosen), (found.refitted, ())]
-        return next_experiment(bench, pair, found.seed)
+        # Not borne out by trials left out: is it there, or nothing? Both beside the same noise.
+        plain = bench.fit(found.refitted.model) or found.refitted
+        pair = [(selection.fit, selection.chosen), (plain, ())]
+        following = next_experiment(bench, pair, found.seed)
+        if following is not None:
+            return following
     silent = verdict in ("parameters", "agrees") and len(blind) > SILENT * len(found.suspects)
     if (verdict == "undecidable" or silent) and found.looks:
         worth = [look.suspect for look in (found.looks[:3] if suspicious(found) else found.looks)]

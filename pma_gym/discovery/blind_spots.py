@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.foretelling import foretold, proposal
-from pma_gym.discovery.predicting import derivatives, left_over
+from pma_gym.discovery.predicting import derivatives, unabsorbed
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN, Look
 from pma_gym.discovery.suspects import Suspect, bounds
@@ -97,7 +97,7 @@ def _shown(
         columns = evidence.columns(np.stack([suspect.absent, usual]))
         if columns is not None:
             row[:] = columns[0][1].ravel()
-    return left_over(changes, by, fit)
+    return unabsorbed(changes, by, fit)
 
 
 def _usual(suspect: Suspect) -> Array:

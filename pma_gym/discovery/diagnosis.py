@@ -21,6 +21,9 @@ Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
 nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
 `undecidable`: these data cannot tell."""
 
+ADDED = "added to the model"
+"""Why a candidate is where it is, if it is in the proposed model."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -124,8 +127,9 @@ class Candidate:
     Attributes:
         name: its name.
         delta_log_likelihood: gain in whitened log-likelihood over the refitted model.
-        held_out_gain: the same on trials that it was not fitted to, per reading of theirs; None
-            where it was not tried.
+        held_out_gain: the same on trials that it was not fitted to, per reading of theirs, from
+            chi-square alone (the verdict also counts what the other trials leave open); None where
+            it was not tried.
         p_value: family-wise, of so large a gain by chance.
         change: rms of what it changes in the signals beyond what parameters could, over noise.
         resolvable: smallest size that these data would have shown, as a share of its usual one;

@@ -21,7 +21,7 @@ from pma_gym.discovery.foretelling import (
     foretold,
     proposal,
 )
-from pma_gym.discovery.predicting import derivatives, left_over, root
+from pma_gym.discovery.predicting import covariance_root, derivatives, unabsorbed
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN
 from pma_gym.discovery.suspects import Suspect, bounds
@@ -127,7 +127,7 @@ class Contest:
                 if wrong not in absorbing:
                     absorbing[wrong] = derivatives(evidence, fit)
                 by = absorbing[wrong]
-                gains = np.zeros(1) if by is None else left_over(apart, by, fit)
+                gains = np.zeros(1) if by is None else unabsorbed(apart, by, fit)
             else:
                 gains = np.sum(apart**2, axis=1)
             found[k] = 0.5 * float(np.quantile(gains, 0.25))
@@ -156,8 +156,8 @@ def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExp
         rivals: models that explain them, each fitted, with the suspects in it.
         seed: of what is random in protocols, and of what the rivals may be.
     Returns:
-        What to measure next; None where there are not two rivals, see `blind_spots` then, or where
-        no protocol is safe.
+        What to measure next; None where there are not two rivals, see `blind_spots.for_blind` then,
+        or where no protocol is safe.
     """
     if len(rivals) < 2:
         return None
@@ -168,7 +168,10 @@ def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExp
     promised = min(best.log_odds, *_after_refit(contest, rivals, best))
     shared = set.intersection(*(set(fit.names) for fit in contest.fits))
     names = [" + ".join(n for n in fit.names if n not in shared) for fit in contest.fits]
-    return proposal(best.protocol, [name or "none of them" for name in names], promised)
+    told = [name for name in names if name]
+    if len(told) != 1:
+        told = [name or "none of them" for name in names]
+    return proposal(best.protocol, told, promised)
 
 
 def fastest(contest: Contest, protocols: Sequence[Protocol]) -> Hope | None:
@@ -222,7 +225,7 @@ def _once_more(suspect: Suspect) -> Suspect:
 def _drawn(fit: Fitted, own: set[str], generator: np.random.Generator) -> Array:
     """The estimate, then draws of a fit's effects, within bounds, shape (1 + DRAWS, p)."""
     free = np.array([path not in own for path in fit.paths])
-    moves = (root(fit) @ generator.standard_normal((len(fit.paths), DRAWS))).T
+    moves = (covariance_root(fit) @ generator.standard_normal((len(fit.paths), DRAWS))).T
     scale = np.where(fit.values == 0.0, 1.0, fit.values)
     drawn = fit.values * np.where(free, np.clip(1.0 + moves / scale, *PLAUSIBLE), 1.0)
     return np.concatenate([fit.values[None], np.clip(drawn, *bounds(fit.paths))])

@@ -24,8 +24,9 @@ ROUNDS = 25
 LARGER = (30.0, 5.0)
 """How many times as large the noise is taken for on the way to a first fit."""
 
-FAR = 3.0
-"""Residual, in standard deviations of the noise, from which on a fit is taken for caught."""
+CAUGHT, EASIER = 3.0, 10.0
+"""Residual, in standard deviations of the noise, from which on a fit may have been caught; how many
+times smaller the noise is taken for from one fit to the next on the way out."""
 
 RUGGED, STIFFER, SUSPECT = "cable.stiffness_n_per_mm", (0.75, 0.9, 1.1, 1.3), 1.3
 """What chi-square is rugged in, at which shares of the given value fits begin from it, and the
@@ -127,15 +128,15 @@ class Bench:
     @cached_property
     def count(self) -> int:
         """How many readings there are."""
-        return sum(logged.count for logged in self.evidence(self.given).logged)
+        return self.evidence(self.given).count
 
     def left(self, fit: Fitted) -> float:
-        """Rms of what a fit leaves, in standard deviations of the noise."""
+        """Rms of what a fit leaves, the prior counted, in standard deviations of the noise."""
         return float(np.sqrt(fit.chi_square / self.count))
 
     def far(self, fit: Fitted) -> bool:
-        """Whether a fit is as far from the trials as only one that was caught is."""
-        return self.left(fit) > FAR
+        """Whether a fit is so far from the trials that it may have been caught."""
+        return self.left(fit) > CAUGHT
 
     def careful_fit(self, model: Model, extra: Sequence[Suspect] = ()) -> Fitted | None:
         """Fit a model with suspects in it, whose parameters may be far off.
@@ -166,7 +167,7 @@ class Bench:
         if not self.far(fit):
             return fit
         left = self.left(fit)
-        ever_less = [left / 10.0**k for k in range(int(np.log10(left)) + 1)]
+        ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
         found = self.fit(self._eased(fit.model, extra, ever_less), extra)
         return min(filter(None, (fit, found)), key=_chi_square)
 

@@ -5,7 +5,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.diagnosis import NextExperiment
@@ -13,8 +12,6 @@ from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench
 from pma_gym.discovery.protocols import Protocol
 from pma_gym.plant.model import Model
-
-Array = NDArray[np.float64]
 
 MOST = 50.0
 """Largest log odds that are promised: no model is that exact."""
@@ -41,7 +38,13 @@ def _measured(trial: Trial) -> Iterator[str]:
 
 
 def proposal(protocol: Protocol, separates: Sequence[str], log_odds: float) -> NextExperiment:
-    """A protocol as an experiment to propose, with what it separates and by what odds."""
+    """A protocol as an experiment to propose.
+
+    Args:
+        protocol: the protocol.
+        separates: names of what it tells apart.
+        log_odds: natural logarithm of the odds to expect; no more than `MOST` is promised.
+    """
     odds = math.exp(min(log_odds, MOST))
     note = {"note": f"proposed: {protocol.name}"}
     trial = Trial(protocol.trial.time, protocol.trial.commands, provenance=note)

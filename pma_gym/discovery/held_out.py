@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.predicting import surprise
+from pma_gym.discovery.predicting import Whole
 from pma_gym.discovery.suspects import Suspect
 
 Array = NDArray[np.float64]
@@ -36,7 +35,7 @@ class Unseen:
         readings: what its sensors hold (SI), shape (4, rows) for each trial.
         chi_square: of the whitened residuals of each trial, shape (trials,).
         surprise: the same of each fold, given how well the others hold the parameters
-            (`predicting.surprise`), shape (folds,).
+            (`predicting.Whole.surprise`), shape (folds,); empty if that was not asked for.
     """
 
     readings: list[Array]
@@ -64,29 +63,37 @@ def unseen(
     fit: Fitted,
     chosen: Sequence[Suspect],
     progress: Callable[[int, int], None] | None = None,
+    judged: bool = False,
 ) -> Unseen | None:
     """Leave each fold out once, fit the others from where the fit of all is, and look at it.
 
     Where nothing is free, nothing is fitted. None with a single trial that is not long, or where a
     fit fails.
+
+    Args:
+        bench: the trials.
+        fit: of all of them.
+        chosen: the suspects in it.
+        progress: called with the number of folds that are done, and of all.
+        judged: whether to find out how surprising folds are.
     """
+    whole = Whole.of(bench, fit, chosen) if judged else None
     if len(bench.trials) < 2:
-        return _unseen_stretches(bench, fit, chosen, progress)
+        return _unseen_stretches(bench, fit, chosen, progress, whole)
     count = len(bench.trials)
     readings: list[Array] = [np.empty(0)] * count
     chi_square, surprised = np.zeros(count), list[float]()
-    parts = folds(count)
-    whole = _whole(bench, fit, chosen)
+    parts, begun = folds(count), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
-        found = bench.fit(whole.model, chosen, trials=seen) if fit.paths else fit
+        found = bench.fit(begun, chosen, trials=seen) if fit.paths else fit
         held = None if found is None else _look(bench, found, chosen, left_out)
         if found is None or held is None:
             return None
-        others = bench.evidence(whole.model, chosen, seen)
-        surprised.append(_surprise(others, bench.evidence(whole.model, chosen), found, whole, held))
+        if whole is not None:
+            surprised.append(whole.surprise(bench.evidence(begun, chosen, seen), found))
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
     return Unseen(readings, chi_square, np.array(surprised))
@@ -97,6 +104,7 @@ def _unseen_stretches(
     fit: Fitted,
     chosen: Sequence[Suspect],
     progress: Callable[[int, int], None] | None,
+    whole: Whole | None,
 ) -> Unseen | None:
     """The same for the stretches of a single trial; None where it has none."""
     parts = stretches(bench.trials)
@@ -104,7 +112,7 @@ def _unseen_stretches(
         return None
     (trial,) = bench.trials
     readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
-    surprised, whole = list[float](), _whole(bench, fit, chosen)
+    surprised, begun = list[float](), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
@@ -112,34 +120,20 @@ def _unseen_stretches(
         if not all(_measures(part) for part in (seen, rest)):
             return None
         part = replace(bench, trials=[seen])
-        found = part.fit(whole.model, chosen) if fit.paths else fit
+        found = part.fit(begun, chosen) if fit.paths else fit
         held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
         if found is None or held is None:
             return None
-        every, others = (each.evidence(whole.model, chosen) for each in (bench, part))
-        surprised.append(_surprise(others, every, found, whole, held))
+        if whole is not None:
+            surprised.append(whole.surprise(part.evidence(begun, chosen), found))
         readings[:, left_out] = held.readings[0][:, left_out]
         chi_square += float(held.chi_square[0])
     return Unseen([readings], np.array([chi_square]), np.array(surprised))
 
 
-def _whole(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Fitted:
-    """The fit of all trials, with the noise that the bench has now."""
-    return (bench.fit(fit.model, chosen) if fit.paths else None) or fit
-
-
-def _surprise(
-    seen: Evidence, every: Evidence, apart: Fitted, together: Fitted, held: "_Held"
-) -> float:
-    """As `predicting.surprise`; where nothing is free, chi-square."""
-    if not together.paths:
-        return float(held.chi_square.sum())
-    return surprise(seen, every, apart, together)
-
-
 @dataclass(frozen=True)
 class _Held:
-    """As `Unseen`, of one fold."""
+    """As `Unseen`, of one fold: readings (SI) and chi-square of each of its trials."""
 
     readings: list[Array]
     chi_square: Array

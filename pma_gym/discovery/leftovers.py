@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.bursts import NO_BURSTS, Bursts, bursts
+from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.excess import memory
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.noise import Whitening, autoregression, step_between
@@ -27,14 +28,14 @@ def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whit
     return tuple(found)
 
 
-def residuals(evidence, fit: Fitted) -> list[Array]:  # noqa: ANN001
+def residuals(evidence: Evidence, fit: Fitted) -> list[Array]:
     """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
     readings = evidence.readings(fit.values)
     assert readings is not None
     return left_over(evidence, readings)
 
 
-def left_over(evidence, readings: Sequence[Array]) -> list[Array]:  # noqa: ANN001
+def left_over(evidence: Evidence, readings: Sequence[Array]) -> list[Array]:
     """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
     found = []
     for logged, held in zip(evidence.logged, readings, strict=True):

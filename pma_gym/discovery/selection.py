@@ -11,9 +11,6 @@ found: before, an autoregression would take the next effect for noise.
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from pma_gym.discovery.bursts import NO_BURSTS, Bursts
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.fits import Bench, Fitted
@@ -31,8 +28,6 @@ from pma_gym.discovery.suspect_fits import (
 )
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.plant.model import Model
-
-Array = NDArray[np.float64]
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -195,7 +190,7 @@ def _stage(
             found = fitted(bench, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.suspect.name] = found
-        fits |= led_nearer(bench, baseline, before, chosen, worth, fits, journal)
+        fits |= led_nearer(bench, baseline, before, chosen, worth, fits, journal, progress)
     if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, looks, burst = (), {}, plainly, NO_BURSTS
     return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)

@@ -1,6 +1,6 @@
 """Fits of suspects beside what was found before: begun well, led out of hollows, and kept."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -39,7 +39,8 @@ def fitted(
     caught: bool = False,
 ) -> Fitted | None:
     """The best of fits from the probes that explain most; of more where others were caught."""
-    key = f"{bench.noise} {before.names} {each.suspect.name} {each.starts}{' caught' * caught}"
+    begun_at = f"{before.names} {before.values.tolist()}"
+    key = f"{bench.noise} {begun_at} {each.suspect.name} {each.starts}{' caught' * caught}"
     kept = journal.found(key)
     extra = (*chosen, each.suspect)
     if kept is not None:
@@ -52,8 +53,10 @@ def fitted(
             found = bench.led_out(found, extra)
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
-        if best is not None and before.chi_square - best.chi_square >= each.gain and not caught:
-            # As much as the look promised: no other beginning is needed.
+        # As much as the look promised, or near at last: no other beginning is needed.
+        if best is not None and (
+            not bench.far(best) if caught else before.chi_square - best.chi_square >= each.gain
+        ):
             break
     if best is None or best.chi_square > before.chi_square:
         # Caught in a hollow: where the effect is absent it explains more.
@@ -70,13 +73,15 @@ def led_nearer(
     looks: Sequence[Look],
     fits: dict[str, Fitted],
     journal: Journal,
+    progress: Callable[[str, int, int], None],
 ) -> dict[str, Fitted]:
     """Better fits, the likeliest first, until one comes near the trials; none where one has."""
     known = {each.suspect.name: each for each in looks}
     better: dict[str, Fitted] = {}
     if not all(map(bench.far, fits.values())):
         return better
-    for name in sorted(fits, key=lambda each: cost(fits[each])):
+    for number, name in enumerate(sorted(fits, key=lambda each: cost(fits[each]))):
+        progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(fits))
         found = fitted(bench, baseline, before, chosen, known[name], journal, caught=True)
         if found is not None and found.chi_square < fits[name].chi_square:
             better[name] = found

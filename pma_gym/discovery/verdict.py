@@ -150,7 +150,7 @@ def _confirmed(found: Findings) -> bool:
     if found.unseen is None or found.unseen_without is None:
         return True
     with_it, without = found.unseen.surprise, found.unseen_without.surprise
-    # By the number of trials too: one trial beyond what the others reach may weigh more than all.
+    # By the number of folds too: one beyond what the others reach may weigh more than all.
     return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
 
 

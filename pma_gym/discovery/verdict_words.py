@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from pma_gym.discovery.diagnosis import Diagnosis, Verdict
+from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
-from pma_gym.discovery.verdict import BLIND_SHARE, MOVED_CHANGE
+from pma_gym.discovery.verdict import BLIND_SHARE, MOST_RIVALS, MOVED_CHANGE
 from pma_gym.discovery.words import (
     chance,
     effect_name,
@@ -57,12 +57,14 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
             f"what is slow in the residual of these {trials}, the best leaves "
             f"{percent(min(left, 1.0))}."
         ) + _tones(diagnosis)
-    if diagnosis.candidates and diagnosis.candidates[0].why == "added to the model":
+    if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
-        if not equal:
+        if len(equal) <= MOST_RIVALS:
+            added = [each.name for each in diagnosis.candidates if each.why == ADDED]
+            instead = f" (or {effect_names(equal, 'or')})" if equal else ""
             return (
-                f"Model {name} misses something, {effect_name(diagnosis.candidates[0].name)} most "
-                "likely, but what was fitted of it to some trials does not carry over to others"
+                f"Model {name} misses something, {effect_names(added)}{instead} most likely, but "
+                f"what is left out of these {trials} does not bear it out"
             ) + _propose(diagnosis)
         rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
         return (

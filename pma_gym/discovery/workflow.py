@@ -109,7 +109,7 @@ class _Work:
         named, given = self._input()
         named, words = prepared(named, given)
         trials = [each.trial for each in named]
-        journal = Journal(self.folder, trials, given, f"diagnosis 1 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 2 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named))
         own = own_parameters(given)
@@ -193,9 +193,10 @@ class _Work:
             *found.proposed,
             selection.chosen,
             lambda done, total: self._tell("trials left out", done, total),
+            judged=bool(selection.chosen),
         )
         without = (
-            unseen(selection.bench, found.refitted, ())
+            unseen(selection.bench, found.refitted, (), judged=True)
             if selection.chosen and left_out is not None
             else left_out
         )

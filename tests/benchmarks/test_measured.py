@@ -20,7 +20,7 @@ from benchmarks.measured.job import (
 )
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import NOTHING, Explanation, Summary
-from benchmarks.measured.rounds import ADDED, Round, rounds
+from benchmarks.measured.rounds import Round, rounds
 from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
@@ -29,6 +29,7 @@ from benchmarks.measured.triangles import TRIANGLES, Held
 from pma_gym.data.dataset import read_dataset
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial_files import TrialWarning
+from pma_gym.discovery.diagnosis import ADDED
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.noise import white_noise

@@ -5,8 +5,9 @@ import pytest
 from scipy.stats import multivariate_normal
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery import predicting
 from pma_gym.discovery.fits import Fitted
-from pma_gym.discovery.predicting import left_over, surprise
+from pma_gym.discovery.predicting import Whole, freedom, unabsorbed
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.residuals import Sums
@@ -20,7 +21,7 @@ def test_parameters_absorb_what_a_least_squares_fit_with_their_prior_does():
     fit = Fitted(STATION, (), ("a", "b"), np.ones(2), covariance, 0.0, np.ones(2), True)
     weights = np.linalg.cholesky(np.linalg.inv(covariance)).T
     stacked = np.concatenate([by.T, weights])
-    for row, found in zip(apart, left_over(apart, by, fit), strict=True):
+    for row, found in zip(apart, unabsorbed(apart, by, fit), strict=True):
         right = np.concatenate([-row, np.zeros(2)])
         rest = right - stacked @ np.linalg.lstsq(stacked, right, rcond=None)[0]
         assert found == pytest.approx(rest @ rest)
@@ -29,7 +30,7 @@ def test_parameters_absorb_what_a_least_squares_fit_with_their_prior_does():
 def test_what_no_trial_told_is_absorbed_whole():
     by = np.ones((1, 30))
     fit = Fitted(*(STATION, (), ("a",), np.ones(1), np.array([[np.inf]]), 0.0, np.ones(1), True))
-    assert left_over(7.0 * by, by, fit)[0] == pytest.approx(0.0, abs=1e-4)
+    assert unabsorbed(7.0 * by, by, fit)[0] == pytest.approx(0.0, abs=1e-4)
 
 
 PRIOR = np.array([[2.0, 0.3], [0.3, 0.5]])
@@ -55,10 +56,11 @@ class Straight:
 
 def surprised(residual, by, seen, **options):
     some, every = (Straight(residual[:k], by[:, :k], **options) for k in (seen, len(residual)))
-    return surprise(some, every, some.fit, every.fit)
+    return Whole(every.fit, freedom(every, every.fit)).surprise(some, some.fit)
 
 
-def test_surprise_is_the_likelihood_given_what_the_seen_trials_say_of_the_parameters():
+def test_surprise_is_the_likelihood_given_what_seen_trials_say_of_parameters(monkeypatch):
+    monkeypatch.setattr(predicting, "WIDE", 1e9)
     generator = np.random.default_rng(4)
     residual, by = generator.standard_normal(12), generator.standard_normal((2, 12))
     seen = Straight(residual[:7], by[:, :7])
@@ -74,6 +76,17 @@ def test_what_the_seen_trials_do_not_hold_costs_its_freedom_alone():
     residual = np.concatenate([np.zeros(5), np.full(30, 7.0)])
     found = surprised(residual, by, 5, prior=np.zeros((2, 2)), width=20.0)
     assert found == pytest.approx(np.log(30.0 * 20.0**2 + 1.0))
+    # Bounds that reach far beyond the parameter's size, 7, cost no more than ten times that.
+    wide = surprised(residual, by, 5, prior=np.zeros((2, 2)), width=1e9)
+    assert wide == pytest.approx(np.log(30.0 * 70.0**2 + 1.0))
+
+
+def test_trials_that_cannot_be_simulated_surprise_without_end():
+    residual, by = np.ones(12), np.ones((2, 12))
+    every, seen = Straight(residual, by), Straight(residual[:5], by[:, :5])
+    whole = Whole(every.fit, freedom(every, every.fit))
+    seen.curvature = np.full((2, 2), np.nan)
+    assert whole.surprise(seen, seen.fit) == np.inf
 
 
 def held(volts, kpa, truth, seed):
