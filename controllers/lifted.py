@@ -89,4 +89,5 @@ def banded(
     diagonals: Sequence[ArrayLike], offsets: Sequence[int], shape: tuple[int, int]
 ) -> sparse.csc_array:
     """A sparse matrix of diagonals, each with its offset from the main one."""
-    return sparse.diags_array(diagonals, offsets=offsets, shape=shape).tocsc()  # type: ignore[arg-type]
+    found = sparse.diags_array(diagonals, offsets=offsets, shape=shape)  # type: ignore[arg-type]
+    return found.tocsc()
