@@ -381,7 +381,9 @@ def speed(
 def hidden_effects(
     block: Annotated[
         str,
-        typer.Option(help="single, faint, nothing, parameters, pair, unknown, or all."),
+        typer.Option(
+            help="single, faint, nothing, parameters, pair, unknown, undecidable, or all."
+        ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same cases.")] = 0,

@@ -131,6 +131,15 @@ def test_a_proposal_is_commands_and_nothing_else():
     assert not found.trial.measurements and not found.trial.truth
 
 
+def test_one_effect_is_asked_about_against_nothing():
+    _, on, rivals, _ = case("hysteresis")
+    plain = on.fit(station())
+    assert plain is not None
+    found = next_experiment(on, [rivals[0], (plain, ())], 0)
+    assert found is not None and found.separates == (rivals[0][0].names[0],)
+    assert found.expected_odds > 20.0
+
+
 def test_one_rival_needs_no_experiment():
     _, on, rivals, _ = case("hysteresis")
     assert next_experiment(on, rivals[:1], 0) is None

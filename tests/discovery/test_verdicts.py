@@ -1,11 +1,15 @@
 """Verdicts: each where it belongs, with what it must bring along."""
 
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery import verdict
+from pma_gym.discovery.verdict_words import sentence
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import (
@@ -145,6 +149,35 @@ def test_an_amended_model_carries_its_intervals():
     note = found.model.notes["hysteresis.force_n"]
     estimate = found.effects[0].parameters["force_n"]
     assert (note.low, note.high) == pytest.approx((estimate.low, estimate.high))
+
+
+def found_unseen(with_it, without):
+    seen = (
+        None if each is None else SimpleNamespace(surprise=np.array(each))
+        for each in (with_it, without)
+    )
+    return SimpleNamespace(**dict(zip(("unseen", "unseen_without"), seen, strict=True)))
+
+
+@pytest.mark.parametrize(
+    ("with_it", "without", "borne_out"),
+    [
+        ([90.0, 110.0, 100.0], [95.0, 150.0, 99.0], True),  # likelier in all
+        ([90.0, 90.0, 500.0], [95.0, 95.0, 100.0], True),  # in most folds
+        ([99.0, 200.0, 150.0], [100.0, 120.0, 110.0], False),
+        ([np.inf, 90.0, 101.0], [100.0, 95.0, 100.0], False),
+        (None, None, True),
+    ],
+)
+def test_trials_left_out_bear_an_effect_out_together_or_in_most_folds(with_it, without, borne_out):
+    assert verdict._confirmed(found_unseen(with_it, without)) == borne_out
+
+
+def test_an_effect_that_is_not_borne_out_is_said_to_be_likeliest():
+    found = replace(diagnosed("hysteresis"), verdict="undecidable")
+    said = sentence(found, 0.0)
+    assert "misses something, hysteresis" in said and "most likely" in said
+    assert "left out of these 3 trials does not bear it out" in said
 
 
 def test_nothing_is_held_out_of_a_single_trial():
