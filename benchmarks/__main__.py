@@ -219,8 +219,9 @@ def measured(
     jobs: Jobs = 2,
     seed: Annotated[int, typer.Option(min=0, help="Seed of simulated chance.")] = 0,
     rounds: Annotated[
-        int, typer.Option(min=1, help="Most diagnoses, each of what the one before amended.")
-    ] = 2,
+        int | None,
+        typer.Option(min=1, help="Diagnoses, each of what the one before amended; 2 if not given."),
+    ] = None,
     write: Annotated[
         Path | None,
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
@@ -228,6 +229,7 @@ def measured(
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.job import run_measured, write_trials
+    from benchmarks.measured.rounds import MOST_ROUNDS
 
     for folder, option in ((out, "--out"), (write, "--write")):
         if folder is not None and folder.exists() and not folder.is_dir():
@@ -236,7 +238,7 @@ def measured(
         print(f"{write_trials(write)} trials in {write}")
         return
     try:
-        run_measured(out, jobs, seed, rounds)
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS)
     except KeyboardInterrupt:
         print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 KEPT = Path(__file__).resolve().parents[2] / "docs" / "figures" / "hidden-effects.json"
-"""What `hidden-effects-report` wrote of the blocks."""
+"""What runs of `hidden-effects --json` wrote of their blocks, put together."""
 
 ROWS = (
     ("one effect of 0.5 to 2 times the noise: named", "single", "named right"),

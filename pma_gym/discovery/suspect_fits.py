@@ -92,25 +92,35 @@ def led_nearer(
 
 def better(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
     """A fit, or a better one from a careful search: what it misses would look like an effect."""
-    key = f"better {bench.noise} {fit.names} {fit.values.tolist()}"
-    kept = journal.found(key)
-    if kept is not None:
-        return restored(kept, bench, fit, chosen)
-    given = dict(zip(bench.own.free, values(bench.given, bench.own.free).tolist(), strict=True))
-    found = bench.careful_fit(fit.model.replace(given), chosen)
-    best = fit if found is None or found.chi_square >= fit.chi_square else found
-    best = bench.led_out(best, chosen)
-    journal.keep(key, kept_form(best))
-    return best
+
+    def search() -> Fitted:
+        given = dict(zip(bench.own.free, values(bench.given, bench.own.free).tolist(), strict=True))
+        found = bench.careful_fit(fit.model.replace(given), chosen)
+        best = fit if found is None or found.chi_square >= fit.chi_square else found
+        return bench.led_out(best, chosen)
+
+    return _once("better", bench, fit, chosen, journal, search)
 
 
 def refit(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
     """A fit, from where it is, beside the noise that the bench has now."""
-    key = f"again {bench.noise} {fit.names} {fit.values.tolist()}"
+    return _once("again", bench, fit, chosen, journal, lambda: bench.fit(fit.model, chosen) or fit)
+
+
+def _once(
+    what: str,
+    bench: Bench,
+    fit: Fitted,
+    chosen: tuple[Suspect, ...],
+    journal: Journal,
+    search: Callable[[], Fitted],
+) -> Fitted:
+    """What a search from a fit found, from the journal where it was made before."""
+    key = f"{what} {bench.noise} {fit.names} {fit.values.tolist()}"
     kept = journal.found(key)
     if kept is not None:
         return restored(kept, bench, fit, chosen)
-    found = bench.fit(fit.model, chosen) or fit
+    found = search()
     journal.keep(key, kept_form(found))
     return found
 
