@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.foretelling import foretold, proposal
-from pma_gym.discovery.predicting import derivatives, unabsorbed
+from pma_gym.discovery.foretelling import Columns, columns, derivatives, proposal
+from pma_gym.discovery.predicting import unabsorbed
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN, Look
 from pma_gym.discovery.suspects import Suspect, bounds
@@ -47,8 +47,8 @@ def for_blind(
     before = np.array([_strength(known[suspect.name]) for suspect in wanted])
     pairs = [(suspect, _usual(suspect)) for suspect in wanted]
     best: tuple[tuple[float, float], Protocol, Array] | None = None
-    for protocol in library([fit.model, bench.given], seed):
-        gains = _shown(bench, fit, protocol, pairs)
+    protocols = list(library([fit.model, bench.given], seed))
+    for protocol, gains in zip(protocols, _shown(bench, fit, protocols, pairs), strict=True):
         new = float(np.sum(chance_to_show(before + gains) - chance_to_show(before)))
         rank = round(new, 6), -protocol.minutes
         if (hidden & (gains >= SHOWN_GAIN)).any() and (best is None or rank > best[0]):
@@ -83,21 +83,26 @@ def _was_visible(each: Look) -> bool:
 def _shown(
     bench: Bench,
     fit: Fitted,
-    protocol: Protocol,
+    protocols: Sequence[Protocol],
     hidden: Sequence[tuple[Suspect, Array]],
 ) -> Array:
-    """Chi-square that hidden suspects of usual size would gain in a protocol, shape (k,)."""
-    simulated = protocol.simulated[0]
-    by = derivatives(foretold(bench, fit.model, fit.paths, simulated), fit)
-    if by is None:
-        return np.zeros(len(hidden))
-    changes = np.zeros((len(hidden), by.shape[1]))
-    for row, (suspect, usual) in zip(changes, hidden, strict=True):
-        evidence = foretold(bench, suspect.beside(fit.model), suspect.paths, simulated)
-        columns = evidence.columns(np.stack([suspect.absent, usual]))
-        if columns is not None:
-            row[:] = columns[0][1].ravel()
-    return unabsorbed(changes, by, fit)
+    """Chi-square that hidden suspects of usual size would gain in protocols, shape (n, k)."""
+    trials = [protocol.simulated[0] for protocol in protocols]
+    grown = list[list[Columns | None]]()
+    for suspect, usual in hidden:
+        model, tried = suspect.beside(fit.model), np.stack([suspect.absent, usual])
+        grown.append(columns(bench, model, suspect.paths, trials, tried))
+    found = np.zeros((len(protocols), len(hidden)))
+    for k, by in enumerate(derivatives(bench, fit.model, fit, trials)):
+        if by is None:
+            continue
+        changes = np.zeros((len(hidden), by.shape[1]))
+        for row, each in zip(changes, grown, strict=True):
+            one = each[k]
+            if one is not None:
+                row[:] = one[1].ravel()
+        found[k] = unabsorbed(changes, by, fit)
+    return found
 
 
 def _usual(suspect: Suspect) -> Array:

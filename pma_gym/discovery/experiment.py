@@ -16,12 +16,8 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.foretelling import (
-    as_measured,
-    foretold,
-    proposal,
-)
-from pma_gym.discovery.predicting import covariance_root, derivatives, unabsorbed
+from pma_gym.discovery.foretelling import as_measured, columns, derivatives, proposal
+from pma_gym.discovery.predicting import covariance_root, unabsorbed
 from pma_gym.discovery.protocols import Protocol, library
 from pma_gym.discovery.screening import SHOWN_GAIN
 from pma_gym.discovery.suspects import Suspect, bounds
@@ -100,52 +96,64 @@ class Contest:
         return list(permutations(range(len(self.fits)), 2))
 
     def odds(
-        self, protocol: Protocol, pairs: Sequence[tuple[int, int]], refitted: bool = True
+        self,
+        protocols: Sequence[Protocol],
+        pairs: Sequence[tuple[int, int]],
+        refitted: bool = True,
     ) -> Array:
-        """Log odds to expect of a protocol for each pair, shape (pairs,).
+        """Log odds to expect of protocols for each pair, shape (protocols, pairs).
 
         The lower quartile over what the true rival may be: a promise that is mostly kept.
 
         Args:
-            protocol: simulated by the models, in their order.
+            protocols: simulated by the models, in their order.
             pairs: true and wrong rivals.
             refitted: take out what the wrong one's parameters absorb, which costs its derivatives.
         """
-        found = np.zeros(len(pairs))
-        changes: dict[int, Array] = {}
-        absorbing: dict[int, Array | None] = {}
-        for k, (true, wrong) in enumerate(pairs):
-            fit, simulated = self.fits[wrong], protocol.simulated[true]
-            evidence = foretold(self.bench, self.models[wrong], fit.paths, simulated)
-            columns = evidence.columns(fit.values[None])
-            if columns is None:
-                continue
-            if true not in changes:
-                changes[true] = self._changes(true, simulated)
-            apart = columns[0][0].astype(np.float64).ravel() - changes[true]
-            if refitted:
-                if wrong not in absorbing:
-                    absorbing[wrong] = derivatives(evidence, fit)
-                by = absorbing[wrong]
-                gains = np.zeros(1) if by is None else unabsorbed(apart, by, fit)
-            else:
-                gains = np.sum(apart**2, axis=1)
-            found[k] = 0.5 * float(np.quantile(gains, 0.25))
+        found = np.zeros((len(protocols), len(pairs)))
+        changes = {true: self._changes(true, protocols) for true, _ in pairs}
+        first = {wrong: true for true, wrong in reversed(pairs) if refitted}
+        absorbing = {
+            wrong: self._slopes(wrong, _simulated(protocols, true)) for wrong, true in first.items()
+        }
+        for at, (true, wrong) in enumerate(pairs):
+            fit, trials = self.fits[wrong], _simulated(protocols, true)
+            given = columns(self.bench, self.models[wrong], fit.paths, trials, fit.values[None])
+            for k, each in enumerate(given):
+                if each is None:
+                    continue
+                apart = each[0].astype(np.float64).ravel() - changes[true][k]
+                if refitted:
+                    by = absorbing[wrong][k]
+                    gains = np.zeros(1) if by is None else unabsorbed(apart, by, fit)
+                else:
+                    gains = np.sum(apart**2, axis=1)
+                found[k, at] = 0.5 * float(np.quantile(gains, 0.25))
         return found
 
-    def _changes(self, true: int, simulated: Trial) -> Array:
-        """What draws of a rival change of its simulation, whitened, shape (1 + k, n).
+    def _changes(self, true: int, protocols: Sequence[Protocol]) -> list[Array]:
+        """What draws of a rival change of its simulations, whitened, shape (1 + k, n) each.
 
         To first order, which size is nearly: a simulation of every draw may meet parameters so
         odd that it hardly ends.
         """
         fit, draws = self.fits[true], self.draws[true]
         effects = np.flatnonzero(np.any(draws != fit.values, axis=0))
-        evidence = foretold(self.bench, self.models[true], fit.paths, simulated)
-        by = derivatives(evidence, fit, effects) if len(effects) else None
-        if by is None:
-            return np.zeros((1, 4 * len(simulated)))
-        return (draws - fit.values)[:, effects] @ by
+        if not len(effects):
+            return [np.zeros((1, 1))] * len(protocols)
+        by = self._slopes(true, _simulated(protocols, true), effects)
+        moves = (draws - fit.values)[:, effects]
+        return [np.zeros((1, 1)) if each is None else moves @ each for each in by]
+
+    def _slopes(
+        self, rival: int, trials: Sequence[Trial], which: NDArray[np.int64] | None = None
+    ) -> list[Array | None]:
+        """Derivatives of trials, if a rival is true, by its parameters, or some of them."""
+        return derivatives(self.bench, self.models[rival], self.fits[rival], trials, which)
+
+
+def _simulated(protocols: Sequence[Protocol], rival: int) -> list[Trial]:
+    return [protocol.simulated[rival] for protocol in protocols]
 
 
 def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExperiment | None:
@@ -183,7 +191,7 @@ def fastest(contest: Contest, protocols: Sequence[Protocol]) -> Hope | None:
     if not protocols:
         return None
     pairs = contest.pairs()
-    bound = np.array([contest.odds(each, pairs, refitted=False) for each in protocols])
+    bound = contest.odds(protocols, pairs, refitted=False)
     # Two rivals that nothing tells apart must not hide what tells them from a third.
     told = np.max(bound, axis=0) >= LEAST
     kept = np.flatnonzero(told if told.any() else ~told)
@@ -195,7 +203,7 @@ def fastest(contest: Contest, protocols: Sequence[Protocol]) -> Hope | None:
     for hope in sorted(hoped, key=lambda each: each.rank, reverse=True):
         if best is not None and hope.rank <= best.rank:
             break
-        odds = contest.odds(hope.protocol, chosen)
+        (odds,) = contest.odds([hope.protocol], chosen)
         found = Hope(hope.protocol, float(np.min(odds)), chosen[int(np.argmin(odds))])
         if best is None or found.rank > best.rank:
             best = found

@@ -51,25 +51,6 @@ def covariance_root(fit: Fitted) -> Array:
     return scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
 
-def derivatives(
-    evidence: Evidence, fit: Fitted, which: Sequence[int] | NDArray[np.int64] | None = None
-) -> Array | None:
-    """Derivatives of one trial's whitened readings, shape (p, 4 rows); None if it has none.
-
-    Args:
-        evidence: the trial.
-        fit: where, and how far parameters are moved for it.
-        which: by which parameters; all if not given.
-    """
-    chosen = np.arange(len(fit.values)) if which is None else np.asarray(which)
-    moved = fit.values + np.diag(fit.steps)[chosen]
-    columns = evidence.columns(np.concatenate([fit.values[None], moved]))
-    if columns is None:
-        return None
-    changes = columns[0][1:].astype(np.float64)
-    return changes.reshape(len(chosen), -1) / fit.steps[chosen, None]
-
-
 @dataclass(frozen=True)
 class Whole:
     """The fit of all trials, which parts of them are set against.

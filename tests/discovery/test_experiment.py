@@ -107,7 +107,7 @@ def test_it_tells_more_a_minute_than_most_of_the_library():
     _, on, rivals, found = case("hysteresis")
     contest = Contest.of(on, rivals, 0)
     hopes = {
-        each.name: float(np.min(contest.odds(each, contest.pairs()))) / each.minutes
+        each.name: float(np.min(contest.odds([each], contest.pairs()))) / each.minutes
         for each in library([*contest.models, on.given], 0)
     }
     assert found is not None
