@@ -9,7 +9,6 @@ from pathlib import Path
 from benchmarks.files import write_text
 from controllers import CONTROLLERS
 from pma_gym.envs import PMAEnv
-from pma_gym.tasks import TASKS
 from pma_gym.units import SI_FACTORS
 
 FEEDFORWARDS = ("serres_replay", "serres_feedforward", "improved_feedforward")
@@ -79,11 +78,6 @@ def _environment(order: Order) -> PMAEnv:
             f"--controller must be a feed-forward, whose voltages are known before the trial: "
             f"{', '.join(FEEDFORWARDS)}; {order.controller!r} {why}"
         )
-    if order.controller == "serres_replay" and order.task not in TASKS:
-        raise ValueError(
-            f"serres_replay has the printed voltages of the tasks {' and '.join(TASKS)} alone, got "
-            f"--task {order.task}; take serres_feedforward or improved_feedforward"
-        )
     environment = PMAEnv(
         order.task,
         model=order.model,
@@ -91,11 +85,6 @@ def _environment(order: Order) -> PMAEnv:
         control_rate_hz=order.rate_hz,
         noise=False,
     )
-    if environment.task.actuator == "regulator" and order.controller != "improved_feedforward":
-        raise ValueError(
-            f"{order.controller} gives voltages of the motor, and the regulator moves in task "
-            f"{order.task}; take improved_feedforward, or a task of displacement or rotation"
-        )
     environment.reset(seed=0)
     return environment
 

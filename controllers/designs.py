@@ -44,9 +44,12 @@ def designed(
     Returns:
         The defaults of the task's kind with the file's values in their place.
     Raises:
-        ValueError: the file gives a value that the settings do not have, or has another schema.
+        ValueError: the task is an exercise, and the controller follows positions; or the file gives
+            a value that the settings do not have, or has another schema.
     """
     kind = task_kind(station)
+    if kind not in defaults:
+        must_give_a_position(station)
     loops = _read(path)["controllers"].get(controller, {})
     known = [name for name, kinds in loops.items() if kind in kinds]
     if not known:
@@ -71,6 +74,20 @@ def kind_of(task: Task) -> str:
     if task.exercise is not None:
         return EXERCISE_KINDS[0 if task.exercise.prescription is None else 1]
     return KINDS[task.protocol.quantity]
+
+
+def must_give_a_position(station: Station) -> None:
+    """Refuse a task that gives no position to follow.
+
+    Raises:
+        ValueError: the task is an exercise; says who can do it.
+    """
+    if station.task.exercise is not None:
+        raise ValueError(
+            "this controller follows a position: the task must give one in mm or deg, got "
+            f"{station.task.name}, an exercise, in which a person moves and a speed or a moment is "
+            "prescribed; take a controller of exercises, such as constant_pressure or exercise_mpc"
+        )
 
 
 def loop_name(station: Station) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from controllers.designs import loop_name, nearest_loop, task_kind
+from controllers.designs import loop_name, must_give_a_position, nearest_loop, task_kind
 from pma_gym.envs import Station
 from pma_gym.units import SI_FACTORS
 
@@ -99,9 +99,10 @@ def scheduled_gains(controller: str, station: Station, path: Path = GAINS_FILE) 
         The gains in SI: those tuned on the model of this name, else those of the shipped model
         of the same plant; below and above the tuned pressures those of the nearest.
     Raises:
-        ValueError: there are none.
+        ValueError: there are none, or the task is an exercise, which has no position to follow.
     """
     models = _read(path)["models"]
+    must_give_a_position(station)
     model, task, kind = station.model, station.task, task_kind(station)
     name = model.name if model.name in models else model.plant
     loops = models.get(name, {})

@@ -5,6 +5,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from controllers.controller import Reference
+from controllers.designs import must_give_a_position
 from controllers.inverse import Inverse, inverse_of
 from controllers.local_model import LocalModel, Stroke
 from controllers.nominal import Nominal
@@ -130,7 +131,10 @@ def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
     Args:
         reference: what to follow; 0 at the start.
         station: nominal model, task, pressure, control period, delays.
+    Raises:
+        ValueError: the task is an exercise, which has no position to follow.
     """
+    must_give_a_position(station)
     inverse = _inverse(Nominal(station.model), station.task.actuator)
     parts, span = inverse.parts(station.period), station.task.protocol.span
     step, first = station.period / parts, round(parts * station.action_delay / station.period)

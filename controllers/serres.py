@@ -6,9 +6,11 @@ from typing import Literal
 import numpy as np
 
 from controllers.controller import Reference
+from controllers.designs import must_give_a_position
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.envs import Reading, Station
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
+from pma_gym.tasks import TASKS
 
 PROFILE_RADIUS = 45e-3 / (math.pi / 2.0)
 """Radius of the pulley that the rotation profiles assume: 45 mm for 90 deg, 28.65 mm (m).
@@ -75,8 +77,14 @@ class SerresReplay(VoltageTable):
         """Look up the profile of the trial.
 
         Raises:
-            ValueError: no profile was printed for this pressure; says for which one was.
+            ValueError: no profile was printed for this task or pressure; says for which one was.
         """
+        if station.task.name not in TASKS:
+            raise ValueError(
+                f"the dissertation printed voltages of the tasks {' and '.join(TASKS)}, not of "
+                f"{station.task.name}; take serres_feedforward for another extension or rotation, "
+                "or another controller"
+            )
         task, pressure_kpa = station.task.name, station.pressure / 1e3
         known = pressures(task)
         if not any(math.isclose(pressure_kpa, one) for one in known):
@@ -124,8 +132,15 @@ class SerresFeedforward(VoltageTable):
 
         Raises:
             ValueError: a pressure outside 150-575 kPa, or a reference beyond what the map reaches
-                there; names the reachable range.
+                there, names the reachable range; or a task that the motor does not move.
         """
+        must_give_a_position(station)
+        if station.task.actuator != "motor":
+            raise ValueError(
+                f"{self.name} gives voltages of the motor: the task must be one of extension or "
+                f"rotation, got {station.task.name}, in which the {station.task.actuator} moves; "
+                "take improved_feedforward"
+            )
         rotation = station.task.protocol.quantity == "rotation"
         radius = PROFILE_RADIUS if rotation else 1.0
         pressure_kpa = station.pressure / 1e3

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from controllers import CONTROLLERS
+from controllers.policy_document import PolicyError
 from pma_gym.envs import PMAEnv
 
 
@@ -49,4 +50,30 @@ def test_what_a_controller_cannot_do_is_refused(name, task):
     env = PMAEnv(task)
     env.reset(seed=0)
     with pytest.raises(ValueError, match=f"{name}.*got {task}"):
+        CONTROLLERS[name]().reset(env.reference, env.station)
+
+
+@pytest.mark.parametrize("task", ["isokinetic_exercise", "isotonic_exercise"])
+def test_who_follows_positions_refuses_exercises_in_words(task):
+    env = PMAEnv(task)
+    env.reset(seed=0)
+    refused = []
+    for name, kind in CONTROLLERS.items():
+        if name == "oracle" or getattr(kind, "kinds", ()):
+            continue
+        try:
+            kind().reset(env.reference, env.station)
+        except PolicyError as error:
+            assert "take a" in str(error)
+        except ValueError as error:
+            assert task in str(error) and "take" in str(error)
+            refused.append(name)
+    assert {"serres_replay", "serres_feedforward", "pid", "lqg", "mpc", "ilc"} <= set(refused)
+
+
+@pytest.mark.parametrize("name", ["serres_replay", "serres_feedforward"])
+def test_voltages_of_the_motor_are_none_of_the_regulator(name):
+    env = PMAEnv("isotonic")
+    env.reset(seed=0)
+    with pytest.raises(ValueError, match=r"isotonic.*take"):
         CONTROLLERS[name]().reset(env.reference, env.station)
