@@ -73,6 +73,15 @@ def suffix(unit: str) -> str:
     return words.lower()
 
 
+def with_unit(number: str, unit: str) -> str:
+    """A number in words with its unit, which a pure number has none of.
+
+    >>> with_unit("0.5", "N/mm"), with_unit("0.5", "1")
+    ('0.5 N/mm', '0.5')
+    """
+    return number if unit == "1" else f"{number} {unit}"
+
+
 @dataclass(frozen=True)
 class Quantity:
     """Unit, bounds, neutral value, usual value and source of one physical parameter.
@@ -100,7 +109,8 @@ class Quantity:
         if self.unit not in SI_FACTORS:
             raise ValueError(f"unknown unit {self.unit!r}; add it to pma_gym.units.SI_FACTORS")
         if not self.lower <= self.upper:
-            raise ValueError(f"bounds {self.lower} to {self.upper} {self.unit} are reversed")
+            bounds = with_unit(f"{self.lower} to {self.upper}", self.unit)
+            raise ValueError(f"bounds {bounds} are reversed")
         if self.usual is not None:
             self.check("usual", self.usual)
 
@@ -134,6 +144,7 @@ class Quantity:
         """
         if not self.lower <= value <= self.upper:
             raise ValueError(
-                f"{name} must lie in {self.lower:g} to {self.upper:g} {self.unit}, got {value!r}; "
+                f"{name} must lie in {with_unit(f'{self.lower:g} to {self.upper:g}', self.unit)}, "
+                f"got {value!r}; "
                 f"{self.instead or 'check unit and decimal point'} (usual: {self.source})"
             )

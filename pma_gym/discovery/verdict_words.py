@@ -17,7 +17,7 @@ from pma_gym.discovery.words import (
     signal_name,
     signal_unit,
 )
-from pma_gym.units import suffix
+from pma_gym.units import suffix, with_unit
 
 MUCH = 1.3
 """Misfit over the noise that is more than parameters leave where the structure is right."""
@@ -114,7 +114,7 @@ def _effects(diagnosis: Diagnosis) -> str:
     named = []
     for effect in diagnosis.effects:
         sizes = ", ".join(
-            f"{_stem(parameter, each.unit)} {figure(each.value)} {each.unit}".removesuffix(" 1")
+            f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
             for parameter, each in effect.parameters.items()
         )
         others = effect_names(list(effect.confused_with), "or")

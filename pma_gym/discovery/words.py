@@ -8,6 +8,7 @@ import sys
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap
 from pma_gym.effects import CATALOGUE
+from pma_gym.units import with_unit
 
 VERDICTS = {
     "effect": "An effect is missing",
@@ -146,8 +147,8 @@ def interval(known: Estimate) -> str:
 
 def estimate_words(known: Estimate) -> str:
     """`14.2 N (95 %: 13.1 to 15.4)`."""
-    unit = "" if known.unit == "1" else f" {known.unit}"
-    return f"{estimate(known.value, known.low, known.high)}{unit} (95 %: {interval(known)})"
+    value = with_unit(estimate(known.value, known.low, known.high), known.unit)
+    return f"{value} (95 %: {interval(known)})"
 
 
 def chance(p_value: float) -> str:

@@ -171,17 +171,14 @@ class Effect:
 
     def _si(self, door: str, stem: str, value: Value) -> Value:
         quantity, many = self.quantities[stem], isinstance(value, list | tuple)
+        unit = "without a unit" if quantity.unit == "1" else f"in {quantity.unit}"
         if many != (stem in self.rows):
             wanted = "a list of numbers" if stem in self.rows else "one number"
-            raise ValueError(
-                f"{self.name}.{door} must be {wanted} in {quantity.unit}, got {value!r}"
-            )
+            raise ValueError(f"{self.name}.{door} must be {wanted} {unit}, got {value!r}")
         numbers = value if isinstance(value, list | tuple) else (value,)
         for number in numbers:
             if isinstance(number, bool) or not isinstance(number, int | float):
-                raise ValueError(
-                    f"{self.name}.{door} must be a number in {quantity.unit}, got {number!r}"
-                )
+                raise ValueError(f"{self.name}.{door} must be a number {unit}, got {number!r}")
             quantity.check(f"{self.name}.{door}", number)
         converted = tuple(quantity.to_si(float(number)) for number in numbers)
         return converted if many else converted[0]

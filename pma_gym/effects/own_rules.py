@@ -10,6 +10,7 @@ from pma_gym.effects.effect import Effect, signals
 from pma_gym.effects.ports import EVERYTHING, PLACES, STATES, example
 from pma_gym.kernels.graph import CHANGING, FIXED, Graph
 from pma_gym.kernels.trace import trace
+from pma_gym.units import with_unit
 
 
 def broken_rule(effect: Effect, module: ModuleType) -> str:
@@ -50,7 +51,7 @@ def _parameters(effect: Effect, _module: ModuleType) -> str:
         if default != getattr(effect.usual, name):
             return (
                 f"gives {name} a default of {default!r} (SI) and another usual value, "
-                f"{quantities[name].usual:g} {quantities[name].unit}; write the same"
+                f"{with_unit(f'{quantities[name].usual:g}', quantities[name].unit)}; write the same"
             )
     if effect.neutral is None:
         return "is never absent: give a parameter a neutral value, Quantity(..., neutral=0.0)"
