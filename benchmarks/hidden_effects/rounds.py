@@ -15,7 +15,7 @@ from benchmarks.hidden_effects.asking import Answer, Judge, asked
 from benchmarks.hidden_effects.cases import Case, measure
 from benchmarks.hidden_effects.library import Volts, random_experiment
 from benchmarks.hidden_effects.physics.simulation import RATE
-from benchmarks.hidden_effects.verdicts import compare
+from benchmarks.hidden_effects.verdicts import compare, judged
 
 WAYS = ("proposed", "random")
 """Who chooses the experiment. The random one's length is that of the first proposal."""
@@ -77,8 +77,8 @@ def with_trial(case: Case, volts: Volts, g: np.random.Generator) -> Case:
 
 
 def _round(case: Case, answer: Answer, words: str) -> Round:
-    if answer.document is None:
-        return {"protocol": words, "said": "no answer", "settled": False, "wrong": False}
-    outcome = compare(case.truth, answer.document)
-    settled = outcome.verdict == "effect" and outcome.near
-    return {"protocol": words, "said": outcome.said, "settled": settled, "wrong": outcome.wrong}
+    said = "no answer"
+    if answer.document is not None:
+        said = compare(case.truth, answer.document).said
+    hidden = [effect["name"] for effect in case.truth["effects"]]
+    return {"protocol": words, "said": said, **judged(said, hidden)}

@@ -21,7 +21,7 @@ from benchmarks.hidden_effects.targets import (
     SIZE_ERROR,
     Target,
 )
-from benchmarks.hidden_effects.verdicts import Outcome, compare, unanswered
+from benchmarks.hidden_effects.verdicts import Outcome, compare, judged, unanswered
 
 Z = 1.959964
 """Of a 95 % interval."""
@@ -63,7 +63,11 @@ def outcome_of(record: Record) -> Outcome:
         outcome = unanswered(record.truth, record.message)
     else:
         outcome = compare(record.truth, record.answer)
-    outcome.number, outcome.rounds = record.number, record.rounds
+    outcome.number = record.number
+    outcome.rounds = {
+        way: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
+        for way, rounds in record.rounds.items()
+    }
     outcome.seconds = record.seconds.get("diagnose")
     return outcome
 
@@ -112,6 +116,7 @@ def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
         "seconds": _seconds(some),
         "by_kind": _by_kind(some),
         "rounds": _rounds(some),
+        "by_parameter_off": _by_parameter_off(some),
         "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
         "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
     }
@@ -137,8 +142,11 @@ def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
 
 
 def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
-    """How often effects alone were named, named or their group, and detected, by ranges of r."""
-    alone = [outcome for outcome in some if len(outcome.truth) == 1 and outcome.ratio is not None]
+    """How often effects alone were named, named or their group, and detected, by ranges of r.
+
+    Those that come in one size are left out.
+    """
+    alone = [o for o in some if len(o.truth) == 1 and o.ratio is not None and o.sized]
     rows = []
     for low, high in pairwise(SIZES):
         those = [each for each in alone if low <= (each.ratio or 0.0) < high]
@@ -235,6 +243,22 @@ def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
     return figures
 
 
+def _by_parameter_off(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How often each base parameter that was off was named, and what was where it was not."""
+    names = sorted({name for outcome in some for name in outcome.off})
+    found: dict[str, Any] = {}
+    for name in names:
+        those = [outcome for outcome in some if name in outcome.off]
+        without = [outcome for outcome in those if name in outcome.missing]
+        instead = Counter(path for outcome in without for path in outcome.beyond)
+        found[name] = {
+            "named": rate(name not in outcome.missing for outcome in those),
+            "instead": dict(instead.most_common()),
+            "nothing_instead": sum(not outcome.beyond for outcome in without),
+        }
+    return found
+
+
 def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
@@ -248,11 +272,19 @@ def _missed(outcome: Outcome) -> bool:
     return outcome.detected
 
 
+def _said(outcome: Outcome) -> str:
+    """What was said; of parameters, which were named, and which that were off were not."""
+    if not outcome.off or outcome.named:
+        return outcome.said
+    named = f"{outcome.said}: {', '.join(outcome.moved)}" if outcome.moved else outcome.said
+    return f"{named}; without {', '.join(outcome.missing)}" if outcome.missing else named
+
+
 def _miss(outcome: Outcome) -> dict[str, Any]:
     return {
         "number": outcome.number,
         "hidden": " ".join([outcome.hidden, *outcome.off]) + (outcome.kind and f", {outcome.kind}"),
         "r": outcome.ratio,
-        "said": outcome.said,
+        "said": _said(outcome),
         "sentence": outcome.sentence,
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.job import SCORE, JobError, merged
-from benchmarks.hidden_effects.tables import listed, percent
+from benchmarks.hidden_effects.tables import instead, listed, percent
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
 MISSES = 40
@@ -109,6 +109,8 @@ def _own(figures: dict[str, Any]) -> list[Block]:
         blocks.append(_sizes(figures["sizes"]["by_parameter"]))
     if figures["by_kind"]:
         blocks.append(_by_kind(figures["by_kind"]))
+    if figures["by_parameter_off"]:
+        blocks.append(_by_parameter_off(figures["by_parameter_off"]))
     if "proposed" in figures["rounds"]:
         blocks.append(_rounds(figures["rounds"]))
     if figures["misses"]:
@@ -157,6 +159,12 @@ def _sizes(parameters: dict[str, Any]) -> TextTable:
 def _by_kind(kinds: dict[str, Any]) -> TextTable:
     rows = [[kind, percent(each), listed(each["verdicts"])] for kind, each in kinds.items()]
     return TextTable("By kind of data", ["data", "undecidable", "verdicts"], rows)
+
+
+def _by_parameter_off(parameters: dict[str, Any]) -> TextTable:
+    rows = [[name, percent(each["named"]), instead(each)] for name, each in parameters.items()]
+    header = ["off by a tenth", "named", "named where it was not, and was right"]
+    return TextTable("By parameter", header, rows)
 
 
 def _rounds(rounds: dict[str, Any]) -> TextTable:

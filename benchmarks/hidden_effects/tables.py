@@ -36,13 +36,21 @@ def listed(counts: dict[str, int]) -> str:
     return ", ".join(f"{name} {n}" for name, n in counts.items())
 
 
+def instead(off: dict[str, Any]) -> str:
+    """What was named where a parameter that was off was not: `cable.stiffness 2, nothing 1`."""
+    nothing = {"nothing": off["nothing_instead"]} if off["nothing_instead"] else {}
+    return listed(off["instead"] | nothing) or "-"
+
+
 def _block(block: str, figures: dict[str, Any]) -> list[str]:
     lines = [f"{block}, n = {figures['n']}"]
     for name, figure in figures["rates"].items():
-        lines.append(f"  {name:38s}{percent(figure):36s} {judged(figure)}".rstrip())
+        lines.append(f"  {name:46s}{percent(figure):36s} {judged(figure)}".rstrip())
     lines.append(f"  verdicts: {listed(figures['verdicts'])}")
     lines += _gap(figures["gap_closed"]) + _sizes(figures["sizes"])
     lines += _rounds(figures["rounds"]) + _kinds(figures["by_kind"])
+    for name, off in figures["by_parameter_off"].items():
+        lines.append(f"  {name} off, named {percent(off['named'])}; instead: {instead(off)}")
     seconds = figures["seconds"]
     if seconds["median"] is not None:
         lines.append(

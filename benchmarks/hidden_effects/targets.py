@@ -53,6 +53,7 @@ def _within(hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool |
 _SINGLE = (
     Rate("named right", lambda o: o.right, Target(least=0.92)),
     Rate("right or in its group", lambda o: o.near, Target(least=0.98)),
+    Rate("... or said to be what may be meant", lambda o: o.beside),
     Rate("confidently wrong", lambda o: o.wrong, Target(most=0.02)),
     Rate("detected", lambda o: o.detected),
     Rate("a spurious second", lambda o: o.spurious),
@@ -65,6 +66,7 @@ _FAINT = (
     Rate("confidently wrong", lambda o: o.wrong, Target(most=0.03)),
     Rate("named right", lambda o: o.right),
     Rate("right or in its group", lambda o: o.near),
+    Rate("... or said to be what may be meant", lambda o: o.beside),
     Rate("detected, r as promised", _within(lambda o: o.detected)),
 )
 

@@ -2,14 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, get_args
 
+from benchmarks.hidden_effects.effects import ALL
 from benchmarks.hidden_effects.groups import group
 from benchmarks.hidden_effects.odds import UNTOLD
 from benchmarks.hidden_effects.sizes import expected
+from pma_gym.discovery.diagnosis import Verdict
 
 STRUCTURAL = ("effect", "unknown")
 """Verdicts that claim more than parameters."""
+
+VERDICTS = (*get_args(Verdict), "no answer")
+"""What is said where nothing is named."""
 
 PATHS: dict[str, tuple[str, ...]] = {
     "force_slope": ("contractile_force.slope",),
@@ -46,7 +51,9 @@ class Outcome:
         verdict: of the diagnosis.
         named: effects that it names.
         right: exactly what was hidden, no more.
-        near: the first name, or what it is confused with, is the truth or of its group.
+        near: what it names first is the truth or of its group (`groups`).
+        beside: as near, where it also counts to say that the truth or one of its group may be
+            meant instead: the first two that `confused_with` lists.
         wrong: it names an effect, and not so.
         detected: it says that structure is missing.
         hits: how many hidden effects it names.
@@ -64,6 +71,7 @@ class Outcome:
         strong: whether each hidden effect is as large as its block promises.
         answered: whether there was an answer; without one it hits nothing and claims nothing.
         off: base parameters that were off by a tenth, where nothing else is hidden.
+        moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
         kind: of data that excite too little; empty elsewhere.
         rounds: what came of experiments that followed, by who chose them.
@@ -75,6 +83,7 @@ class Outcome:
     named: tuple[str, ...]
     right: bool
     near: bool
+    beside: bool
     wrong: bool
     detected: bool
     hits: int
@@ -92,6 +101,7 @@ class Outcome:
     strong: bool = True
     answered: bool = True
     off: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
     kind: str = ""
     rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     sentence: str = ""
@@ -107,6 +117,22 @@ class Outcome:
     def said(self) -> str:
         """What was named, or the verdict that names nothing."""
         return " + ".join(sorted(self.named)) or self.verdict
+
+    @property
+    def sized(self) -> bool:
+        """Whether what is hidden could have been of any size."""
+        return all(name not in ALL or ALL[name].sized for name in self.truth)
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Paths of base parameters that are named and were right."""
+        known = tuple(start for name in self.off for start in PATHS[name])
+        return tuple(path for path in self.moved if not path.startswith(known))
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Base parameters that were off and are not named."""
+        return tuple(name for name in self.off if not _begun(self.moved, PATHS[name]))
 
     def settled_by(self, way: str, most: int) -> bool:
         """Whether the truth or its group was named within so many rounds of a way, or at once."""
@@ -125,7 +151,10 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     verdict = answer["verdict"]
     effects = answer["effects"] if verdict == "effect" else []
     named = tuple(effect["name"] for effect in effects)
-    near = any(_near(effect, hidden) for effect in effects[:1])
+    near = any(of_group([effect["name"]], hidden) for effect in effects[:1])
+    beside = any(
+        of_group([effect["name"], *effect["confused_with"][:2]], hidden) for effect in effects[:1]
+    )
     right = bool(hidden) and sorted(named) == sorted(hidden)
     outcome = _of(
         truth,
@@ -133,6 +162,7 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         named=named,
         right=right,
         near=right or near,
+        beside=right or beside,
         wrong=verdict == "effect" and not (right or near),
         detected=verdict in STRUCTURAL,
         hits=len(set(named) & set(hidden)),
@@ -156,6 +186,7 @@ def unanswered(truth: Mapping[str, Any], message: str) -> Outcome:
         named=(),
         right=False,
         near=False,
+        beside=False,
         wrong=False,
         detected=False,
         hits=0,
@@ -185,15 +216,30 @@ def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
     )
 
 
-def _near(effect: Mapping[str, Any], hidden: tuple[str, ...]) -> bool:
-    named = {effect["name"], *effect["confused_with"][:2]}
-    return any(name in named or effect["name"] in group(name) for name in hidden)
+def of_group(named: Sequence[str], hidden: Sequence[str]) -> bool:
+    """Whether one of some names is of the group of one that is hidden."""
+    return any(name in group(truth) for truth in hidden for name in named)
+
+
+def judged(said: str, hidden: Sequence[str]) -> dict[str, bool]:
+    """Whether what was said, as `Outcome.said` has it, settles what is hidden, or is wrong.
+
+    It settles where it names the truth or its group and nothing else; it is wrong where it names
+    something and does not settle.
+    """
+    settled = all(of_group([name], hidden) for name in said.split(" + "))
+    return {"settled": settled, "wrong": not settled and said not in VERDICTS}
 
 
 def _off(truth: Mapping[str, Any]) -> list[str]:
     """Base parameters that were off by a tenth at least."""
     off = [n for n, factor in truth["base_factors"].items() if abs(factor - 1.0) >= 0.0999]
     return [name for name in off if name in PATHS]
+
+
+def _begun(paths: Sequence[str], starts: tuple[str, ...]) -> bool:
+    """Whether one of some paths begins in one of some ways."""
+    return any(path.startswith(starts) for path in paths)
 
 
 def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> None:
@@ -203,10 +249,10 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
         return
     moved = [path for path, each in answer["parameters"].items() if each["significant"]]
     told = [*moved, *answer.get("not_identifiable", {})]
-    outcome.parameters = all(any(p.startswith(PATHS[name]) for p in moved) for name in off)
-    outcome.parameters_told = all(any(p.startswith(PATHS[name]) for p in told) for name in off)
-    known = tuple(start for name in off for start in PATHS[name])
-    outcome.parameters_spurious = any(not path.startswith(known) for path in moved)
+    outcome.moved = tuple(moved)
+    outcome.parameters = not outcome.missing
+    outcome.parameters_told = all(_begun(told, PATHS[name]) for name in off)
+    outcome.parameters_spurious = bool(outcome.beyond)
 
 
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:

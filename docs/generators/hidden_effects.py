@@ -51,6 +51,25 @@ def _own(block: str, title: str) -> str:
     return to_markdown(found, {}, "")
 
 
+def hidden_kinds() -> str:
+    """What was said of each kind of data that excite too little."""
+    return _own("undecidable", "By kind")
+
+
+def hidden_parameters() -> str:
+    """How often each base parameter that was off was named, and what was where it was not."""
+    return _own("parameters", "By parameter")
+
+
+def hidden_seconds() -> str:
+    """How long a diagnosis took on one core, by block."""
+    rows = [
+        [code(name), each["n"], f"{each['seconds']['median']:.1f}", f"{each['seconds']['most']:.0f}"]
+        for name, each in _read("hidden-effects")["blocks"].items()
+    ]
+    return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3))
+
+
 def hidden_misses() -> str:
     """Every case in which the diagnosis did not say what it should."""
     rows = [

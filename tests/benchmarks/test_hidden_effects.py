@@ -15,6 +15,7 @@ from benchmarks.hidden_effects.physics.simulation import RATE, Commands
 from benchmarks.hidden_effects.protocols import PROTOCOLS, draw_trial
 from benchmarks.hidden_effects.size import simulate_variants
 from benchmarks.hidden_effects.sizes import expected
+from benchmarks.hidden_effects.verdicts import judged
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import load_model
@@ -306,9 +307,55 @@ def test_an_answer_is_compared_with_its_truth():
 
     assert outcome("single", ["creep"], "effect", "creep").right
     assert outcome("single", ["creep"], "effect", "filling").wrong
-    assert not outcome("single", ["creep"], "effect", "filling", confused=["creep"]).wrong
+    # Groups were fixed before; a doubt that an answer has is counted by itself.
+    doubting = outcome("single", ["creep"], "effect", "filling", confused=["creep"])
+    assert doubting.wrong and doubting.beside and not doubting.near
+    akin = outcome("single", ["creep"], "effect", "warm_up")
+    assert akin.near and not akin.wrong and not akin.right
     assert outcome("single", ["creep"], "effect", "creep", "filling").spurious
     assert not outcome("single", ["creep"], "undecidable").wrong
     assert outcome("pair", ["creep", "filling"], "effect", "filling", "creep").hits == 2
     assert outcome("parameters", [], "parameters").parameters is False
     assert {"single", "pair", "parameters"} < set(BLOCKS)
+
+
+def test_what_follows_settles_only_by_the_truth_or_its_group_alone():
+    for said, settled, wrong in (
+        ("creep", True, False),
+        ("slow_creep", True, False),
+        ("filling", False, True),
+        ("creep + filling", False, True),
+        ("undecidable", False, False),
+        ("no answer", False, False),
+    ):
+        assert judged(said, ["creep"]) == {"settled": settled, "wrong": wrong}
+
+
+def test_a_parameter_that_was_missed_is_told_with_what_was_named_instead():
+    factors = {"mass": 1.2, "radius": 0.8}
+    truth = {"block": "parameters", "effects": [], "base_factors": factors, "number": 3}
+    moved = {
+        path: {"significant": path != "drive.gain_n_per_v"}
+        for path in ("rotor.radius_mm", "cable.stiffness_n_per_mm", "drive.gain_n_per_v")
+    }
+    missed = scoring.compare(truth, answer("parameters") | {"parameters": moved})
+    assert missed.parameters is False and missed.missing == ("mass",)
+    assert missed.beyond == ("cable.stiffness_n_per_mm",)
+    block = scoring.count([missed])["blocks"]["parameters"]
+    by = block["by_parameter_off"]
+    assert by["radius"]["named"]["hits"] == 1 and by["mass"]["named"]["hits"] == 0
+    assert by["mass"]["instead"] == {"cable.stiffness_n_per_mm": 1}
+    (miss,) = block["misses"]
+    assert miss["said"].endswith("cable.stiffness_n_per_mm; without mass")
+
+
+def test_what_comes_in_one_size_is_in_no_range_of_sizes():
+    def outcome(name):
+        effects = [{"name": name, "parameters": TYPICAL[name], "r": 3.0}]
+        truth = {"block": "single", "effects": effects, "base_factors": {}}
+        return scoring.compare(truth, answer("effect", name))
+
+    (row,) = scoring.count([outcome("sensor_quantisation"), outcome("creep")])["blocks"]["single"][
+        "by_size"
+    ]
+    assert row["named"]["n"] == 1

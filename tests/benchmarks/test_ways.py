@@ -24,7 +24,7 @@ from benchmarks.hidden_effects.ways.prepared import prepare
 from benchmarks.hidden_effects.ways.registry import WAYS
 from benchmarks.hidden_effects.ways.signatures import signature
 from pma_gym.data.dataset import read_dataset
-from pma_gym.discovery import leftovers, selection, workflow
+from pma_gym.discovery import bursts, leftovers, selection, workflow
 from pma_gym.discovery.fits import Bench
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
@@ -162,7 +162,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     def spied(*_, **__):
         own = workflow.own_parameters(ready.bench.given)
         noise = leftovers.autoregression([np.sin(np.arange(400.0))], 0.1)
-        seen.update(prior=own.prior, noise=noise)
+        seen.update(prior=own.prior, noise=noise, chance=selection.look()[0].p_value)
+        seen["bursts"] = bursts.autoregression([np.sin(np.arange(400.0))], 0.1)
 
         class Nothing:
             def document(self):
@@ -170,6 +171,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
         return Nothing()
 
+    found = selection.Look(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
+    monkeypatch.setattr(selection, "look", lambda: [found])
     monkeypatch.setattr(ablations, "diagnose", spied)
     ablations.ours(dataset, 0, 1)
     prior, memory = seen["prior"], seen["noise"].coefficients
@@ -178,18 +181,13 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     assert np.allclose(seen["prior"], ablations.HELD * prior)
     assert answer["parameters"] == {} and answer["not_identifiable"] == {}
     ablations.no_whitening(dataset, 0, 1)
-    assert seen["noise"] == white_noise(pytest.approx(np.sqrt(0.5), rel=0.01))
+    assert seen["bursts"] == seen["noise"] == white_noise(pytest.approx(np.sqrt(0.5), rel=0.01))
+    assert seen["chance"] == 0.3
     whole = selection.look
     ablations.no_gate(dataset, 0, 1)
-    assert selection.look is whole
+    assert seen["chance"] == 0.0 and selection.look is whole
     ablations.ours(dataset, 0, 1)
     assert np.array_equal(seen["prior"], prior) and seen["noise"].coefficients == memory
-
-
-def test_a_likelihood_ratio_alone_passes_by_chi_square(ready):
-    suspect = next(each for each in ready.catalogue if each.fitted.sum() == 1)
-    found = selection.Look(suspect, 7.879, 0.9, 0, 1.0, 1.0, None, ())
-    assert ablations.wilks(found) == pytest.approx(0.005, rel=1e-3)
 
 
 def test_a_run_goes_on_and_counts_what_failed(folder, monkeypatch, tmp_path):

@@ -12,10 +12,9 @@ from unittest.mock import patch
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from pma_gym.data.dataset import Dataset
-from pma_gym.discovery import diagnose, leftovers, selection, workflow
+from pma_gym.discovery import bursts, diagnose, leftovers, selection, workflow
 from pma_gym.discovery.noise import Whitening, white_noise
 from pma_gym.discovery.parameters import Own
 from pma_gym.discovery.screening import Look
@@ -34,7 +33,10 @@ def ours(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_whitening(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the noise's memory: what a fit leaves counts as white noise of its variance."""
-    with _instead(leftovers, "autoregression", _no_memory):
+    with (
+        _instead(leftovers, "autoregression", _no_memory),
+        _instead(bursts, "autoregression", _no_memory),
+    ):
         return ours(dataset, seed, jobs)
 
 
@@ -53,19 +55,14 @@ def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 
 def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
-    """Without the simulated chance: a likelihood ratio passes by chi-square, by itself."""
+    """Without the simulated chance: every effect passes that changes enough, as if sure."""
     whole = selection.look
 
-    def by_chi_square(*args: Any, **options: Any) -> list[Look]:  # noqa: ANN401
-        return [replace(each, p_value=wilks(each)) for each in whole(*args, **options)]
+    def sure(*args: Any, **options: Any) -> list[Look]:  # noqa: ANN401
+        return [replace(each, p_value=0.0) for each in whole(*args, **options)]
 
-    with _instead(selection, "look", by_chi_square):
+    with _instead(selection, "look", sure):
         return ours(dataset, seed, jobs)
-
-
-def wilks(found: Look) -> float:
-    """Chance of so large a gain by chi-square with as many degrees as parameters are fitted."""
-    return float(chi2.sf(found.gain, int(found.suspect.fitted.sum())))
 
 
 def _no_memory(parts: Sequence[Array], level: float) -> Whitening:
