@@ -46,6 +46,23 @@ def draw(
 
 
 @app.command()
+def take(
+    blocks: Annotated[str, typer.Option(help="By commas, of the benchmark's own.")],
+    cases: Annotated[int, typer.Option(min=1, help="How many of each.")],
+    out: Annotated[Path, typer.Option(help="Folder to write to; cases that it has are kept.")],
+    seed: Annotated[int, typer.Option(help="Same seed, same bits.")] = 0,
+    jobs: Jobs = 1,
+) -> None:
+    """Write the first cases of blocks of `python -m benchmarks hidden-effects`, as `draw` does."""
+    chosen = blocks.split(",")
+    for name in chosen:
+        if name not in drawing.EVERY:
+            known = ", ".join(drawing.EVERY)
+            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--blocks")
+    drawing.take(chosen, cases, seed, out, jobs)
+
+
+@app.command()
 def judge(
     folder: Folder,
     jobs: Jobs = 1,

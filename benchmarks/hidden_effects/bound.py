@@ -8,8 +8,10 @@ fitted too. What is left, in units of the true noise made white, is the distance
 hypotheses; for Gaussian noise the log-likelihood ratio has mean d^2 / 2 and standard deviation d.
 A test that knows effect, sizes and noise then detects with Phi(d - z) at an alarm rate of
 Phi(-z), and tells it from its nearest rival with Phi(d / 2). No test does better that has to learn
-any of it. Distances are taken in proportion to r; rivals that were not fitted count by their best
-probe, and fits end where they end, so that a distance to a rival may be too large, never too small.
+any of it. Rivals that were not fitted count by their best probe, and fits end where they end, so
+that a distance to a rival may be too large, never too small. Curves over r take distances in
+proportion to r, which holds near the case's own r alone: what a delay and a lag differ by goes with
+the square of their size.
 """
 
 import json
@@ -240,7 +242,7 @@ def table(by_effect: Mapping[str, Mapping[str, Any]]) -> str:
 
 @app.command()
 def main(
-    cases: Annotated[Path, typer.Option(help="Folder that `draw` wrote.", exists=True)],
+    cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
     json_file: Annotated[Path | None, typer.Option("--json", help="Curves to a file.")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="Processes.")] = 1,
 ) -> None:

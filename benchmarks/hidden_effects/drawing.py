@@ -3,13 +3,16 @@
 import os
 import sys
 import time
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from benchmarks.hidden_effects.cases import draw_case
+from benchmarks.hidden_effects.cases import Case, draw_case
 from benchmarks.hidden_effects.effects import KINDS
 from benchmarks.hidden_effects.files import case_name, is_written, write_case
+from benchmarks.hidden_effects.undecidable import BLOCKS as EVERY
 
 
 @dataclass(frozen=True)
@@ -54,19 +57,44 @@ def draw(plan: Plan, count: int, folder: Path, jobs: int) -> None:
         folder: what has been written there whole is kept.
         jobs: processes.
     """
-    missing = [k for k in range(1, count + 1) if not is_written(folder, k)]
+    places = range(1, count + 1)
+    _write({place: partial(_draw_one, plan, place, folder) for place in places}, folder, jobs)
+
+
+def take(blocks: Sequence[str], count: int, seed: int, folder: Path, jobs: int) -> None:
+    """Write the first cases of some blocks into a folder, as the benchmark itself draws them.
+
+    Args:
+        blocks: names of blocks.
+        count: how many of each.
+        seed: of the blocks.
+        folder: what has been written there whole is kept; a case's truth has its block and number.
+        jobs: processes.
+    """
+    every = [(block, number) for block in blocks for number in range(1, count + 1)]
+    work = {
+        place: partial(_take_one, block, seed, number, place, folder)
+        for place, (block, number) in enumerate(every, 1)
+    }
+    _write(work, folder, jobs)
+
+
+def _write(work: Mapping[int, Callable[[], str]], folder: Path, jobs: int) -> None:
+    """Make the cases that a folder lacks, by their places there."""
+    missing = [make for place, make in work.items() if not is_written(folder, place)]
+    count = len(work)
     began, done = time.monotonic(), count - len(missing)
     if done:
         print(f"{done} of {count} cases are there already", file=sys.stderr)
     if jobs == 1:
-        for number in missing:
+        for make in missing:
             done += 1
-            _tell(done, count, _draw_one(plan, number, folder), began)
+            _tell(done, count, make(), began)
         return
     # A process a core; numpy's own threads would only get in each other's way.
     os.environ["OMP_NUM_THREADS"] = "1"
     with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_draw_one, plan, number, folder) for number in missing]
+        futures = [pool.submit(make) for make in missing]
         for future in as_completed(futures):
             done += 1
             _tell(done, count, future.result(), began)
@@ -76,10 +104,18 @@ def _draw_one(plan: Plan, number: int, folder: Path) -> str:
     block = plan.block(number)
     hidden = plan.hidden(number)
     case = draw_case(plan.seed, number, block, hidden, plan.trials, plan.seconds, plan.ratio)
-    write_case(case, folder, number)
-    effects = case.truth["effects"]
-    sizes = ", ".join(f"{e['name']} r {e['r']:.2f}" for e in effects)
-    return f"{case_name(number)} {block} {sizes}"
+    return _kept(case, folder, number)
+
+
+def _take_one(block: str, seed: int, number: int, place: int, folder: Path) -> str:
+    return _kept(EVERY[block].draw(seed, number), folder, place)
+
+
+def _kept(case: Case, folder: Path, place: int) -> str:
+    """Write a case; what it is, in words."""
+    write_case(case, folder, place)
+    sizes = ", ".join(f"{e['name']} r {e['r']:.2f}" for e in case.truth["effects"])
+    return f"{case_name(place)} {case.truth['block']} {sizes}"
 
 
 def _tell(done: int, count: int, words: str, began: float) -> None:

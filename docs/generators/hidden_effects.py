@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.hidden_effects.bound import detected, told
 from benchmarks.hidden_effects.summary import report_blocks
 from benchmarks.hidden_effects.ways.compared import COLUMNS
 from benchmarks.hidden_effects.ways.registry import WAYS
@@ -63,9 +64,11 @@ def hidden_parameters() -> str:
 
 def hidden_seconds() -> str:
     """How long a diagnosis took on one core, by block."""
+    blocks = _read("hidden-effects")["blocks"]
+    times = {name: each["seconds"] for name, each in blocks.items()}
     rows = [
-        [code(name), each["n"], f"{each['seconds']['median']:.1f}", f"{each['seconds']['most']:.0f}"]
-        for name, each in _read("hidden-effects")["blocks"].items()
+        [code(name), blocks[name]["n"], f"{each['median']:.1f}", f"{each['most']:.0f}"]
+        for name, each in times.items()
     ]
     return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3))
 
@@ -94,14 +97,31 @@ def hidden_ways() -> str:
 
 def hidden_bound() -> str:
     """How far effects are from nothing and from their nearest rival, and what that allows."""
-    shown = (0.1, 0.3, 0.5, 1.0)
-    rows = []
-    for name, each in sorted(_read("bound")["effects"].items()):
-        told = [f"{100 * each['told'][each['r'].index(r)]:.0f}" for r in shown]
-        distances = [f"{each['d_nothing']:.0f}", f"{each['d_rival']:.1f}"]
-        rows.append([code(name), each["n"], *distances, code(each["rivals"][0]), *told])
-    header = ["Hidden", "Cases", "d to nothing", "d to the nearest rival", "Rival"]
-    return table([*header, *(f"told, r = {r:g} (%)" for r in shown)], rows, (1, 2, 3, *range(5, 9)))
+    every: dict[str, list[dict[str, Any]]] = {}
+    for each in _read("bound")["cases"]:
+        every.setdefault(each["effect"], []).append(each)
+    rows = [
+        [code(name), *(" / ".join(column) for column in zip(*map(_bound, some), strict=True))]
+        for name, cases in sorted(every.items())
+        for some in [sorted(cases, key=lambda each: each["r"])]
+    ]
+    header = ["Hidden", "r", "d to nothing", "detected (%)", "Nearest rival", "d to it", "told (%)"]
+    return table(header, rows, range(1, 7))
+
+
+def _bound(each: dict[str, Any]) -> list[str]:
+    """One case: r, what it is apart from, and what the ideal test makes of that."""
+    chances = (100.0 * float(detected(each["nothing"])), 100.0 * float(told(each["to_rival"])))
+    found, known = (f"{chance:.0f}" for chance in chances)
+    rival = code(each["rival"])
+    return [
+        f"{each['r']:.2f}",
+        f"{each['nothing']:.0f}",
+        found,
+        rival,
+        f"{each['to_rival']:.1f}",
+        known,
+    ]
 
 
 def _hits(figure: dict[str, Any]) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.hidden_effects import drawing, files, judging, physics, scoring
+from benchmarks.hidden_effects.blocks import Block
 from benchmarks.hidden_effects.cases import BLOCKS, draw_case
 from benchmarks.hidden_effects.effects import ALL, KINDS
 from benchmarks.hidden_effects.groups import GROUPS, group
@@ -227,6 +228,15 @@ def test_the_same_seed_gives_the_same_bits(drawn, tmp_path):
     drawing.draw(plan, 2, tmp_path, 1)
     for path in (tmp_path / "cases").rglob("*.*"):
         assert path.read_bytes() == (folder / path.relative_to(tmp_path)).read_bytes()
+
+
+def test_what_is_taken_of_a_block_is_what_the_block_draws(tmp_path, monkeypatch):
+    block = Block("nothing", trials=3, seconds=3.0)
+    monkeypatch.setattr(drawing, "EVERY", {"nothing": block, "again": block})
+    drawing.take(["nothing", "again"], 1, 3, tmp_path, 1)
+    found = [(tmp_path / "truth" / f"case_000{k}.json").read_text("utf-8") for k in (1, 2)]
+    assert found[0] == found[1]
+    assert json.loads(found[0]) == json.loads(json.dumps(block.draw(3, 1).truth))
 
 
 def test_the_truth_is_not_in_the_case(drawn):

@@ -18,7 +18,7 @@ TRAINING_SEED = 7001
 
 @app.command()
 def run(
-    cases: Annotated[Path, typer.Option(help="Folder that `draw` wrote.", exists=True)],
+    cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
     ways: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
     jobs: Jobs = 1,
     seed: Annotated[int, typer.Option(help="Of the ways' own chance.")] = 0,
