@@ -47,19 +47,23 @@ def draw(
 
 @app.command()
 def take(
-    blocks: Annotated[str, typer.Option(help="By commas, of the benchmark's own.")],
-    cases: Annotated[int, typer.Option(min=1, help="How many of each.")],
+    blocks: Annotated[str, typer.Option(help="And how many of each: single=27,nothing=40.")],
     out: Annotated[Path, typer.Option(help="Folder to write to; cases that it has are kept.")],
     seed: Annotated[int, typer.Option(help="Same seed, same bits.")] = 0,
     jobs: Jobs = 1,
 ) -> None:
     """Write the first cases of blocks of `python -m benchmarks hidden-effects`, as `draw` does."""
-    chosen = blocks.split(",")
-    for name in chosen:
-        if name not in drawing.EVERY:
-            known = ", ".join(drawing.EVERY)
-            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--blocks")
-    drawing.take(chosen, cases, seed, out, jobs)
+    chosen: dict[str, int] = {}
+    for item in blocks.split(","):
+        name, _, count = item.partition("=")
+        if name not in drawing.EVERY or not count.isdecimal():
+            raise typer.BadParameter(
+                f"must be BLOCK=CASES by commas, such as single=27,nothing=40, got {item!r}; blocks "
+                f"are {', '.join(drawing.EVERY)}",
+                param_hint="--blocks",
+            )
+        chosen[name] = int(count)
+    drawing.take(chosen, seed, out, jobs)
 
 
 @app.command()

@@ -3,7 +3,7 @@
 import os
 import sys
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import partial
@@ -61,17 +61,16 @@ def draw(plan: Plan, count: int, folder: Path, jobs: int) -> None:
     _write({place: partial(_draw_one, plan, place, folder) for place in places}, folder, jobs)
 
 
-def take(blocks: Sequence[str], count: int, seed: int, folder: Path, jobs: int) -> None:
+def take(blocks: Mapping[str, int], seed: int, folder: Path, jobs: int) -> None:
     """Write the first cases of some blocks into a folder, as the benchmark itself draws them.
 
     Args:
-        blocks: names of blocks.
-        count: how many of each.
+        blocks: names of blocks, and how many cases of each.
         seed: of the blocks.
         folder: what has been written there whole is kept; a case's truth has its block and number.
         jobs: processes.
     """
-    every = [(block, number) for block in blocks for number in range(1, count + 1)]
+    every = [(name, number) for name, count in blocks.items() for number in range(1, count + 1)]
     work = {
         place: partial(_take_one, block, seed, number, place, folder)
         for place, (block, number) in enumerate(every, 1)
