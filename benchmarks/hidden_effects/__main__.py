@@ -58,8 +58,8 @@ def take(
         name, _, count = item.partition("=")
         if name not in drawing.EVERY or not count.isdecimal():
             raise typer.BadParameter(
-                f"must be BLOCK=CASES by commas, such as single=27,nothing=40, got {item!r}; blocks "
-                f"are {', '.join(drawing.EVERY)}",
+                f"must be BLOCK=CASES by commas, such as single=27,nothing=40, got {item!r}; "
+                f"blocks are {', '.join(drawing.EVERY)}",
                 param_hint="--blocks",
             )
         chosen[name] = int(count)

@@ -33,6 +33,7 @@ from generators.files import calibrations, columns, raw_columns, tables
 from generators.hidden_effects import (
     hidden_bound,
     hidden_cases,
+    hidden_confused,
     hidden_kinds,
     hidden_misses,
     hidden_parameters,
@@ -67,6 +68,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(suites, deals, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_ways, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
+        hidden_confused,
         *(policies_shipped, policies_judged, policies_trained),
         *(policies_ablations, policies_robustness, policies_operators),
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),

@@ -73,6 +73,20 @@ def hidden_seconds() -> str:
     return table(["Block", "Cases", "Median (s)", "Most (s)"], rows, (1, 2, 3))
 
 
+def hidden_confused() -> str:
+    """What was taken for what, in the blocks that hide one effect, and how often."""
+    blocks = _read("hidden-effects")["blocks"]
+    counts: dict[tuple[str, str], list[int]] = {}
+    shown = ("single", "faint")
+    for place, block in enumerate(shown):
+        for hidden, said in blocks[block]["confusion"].items():
+            for other, number in said.items():
+                if other != hidden:
+                    counts.setdefault((hidden, other), [0, 0])[place] += number
+    rows = [[code(hidden), code(said), *each] for (hidden, said), each in sorted(counts.items())]
+    return table(["Hidden", "Said", *(code(each) for each in shown)], rows, (2, 3))
+
+
 def hidden_misses() -> str:
     """Every case in which the diagnosis did not say what it should."""
     rows = [
