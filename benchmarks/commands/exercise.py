@@ -1,10 +1,11 @@
 """The commands about the exercise device: `exercise`, `safety` and `lag`."""
 
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from benchmarks.commands.options import RESULTS, refuse
 
 
 def register(app: typer.Typer) -> None:
@@ -37,7 +38,7 @@ def exercise(
             help="Prescription: CSV with angle_deg and moment_nm; the pressure follows the angle."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the report.")] = Path("results/exercise"),
+    out: Annotated[Path, typer.Option(help="Folder of the report.")] = RESULTS / "exercise",
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from rich.console import Console
@@ -56,15 +57,14 @@ def exercise(
         wanted = read_profile(profile) if profile else None if moment is None else held(moment)
         run_exercise(choice, wanted, out, Console())
     except (ChoiceError, ProfileError, UnreachableError) as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
+        refuse(error)
 
 
 def safety(
     episodes: Annotated[int, typer.Option(help="With the safety layer.")] = 10_000,
     bare: Annotated[int, typer.Option(help="Without it, to be compared with.")] = 1_000,
     seed: Annotated[int, typer.Option(help="Of operators, stations and agents.")] = 1,
-    out: Annotated[Path, typer.Option(help="Folder of the figures.")] = Path("results/safety"),
+    out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RESULTS / "safety",
 ) -> None:
     """Count how often wild commands hurt the operator of the exercise device; a minute or two."""
     from rich.console import Console
@@ -76,8 +76,7 @@ def safety(
             raise SafetyError(f"--out {out} is a file; name a folder for the results")
         run_safety(episodes, bare, seed, out, Console())
     except SafetyError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
+        refuse(error)
 
 
 def lag(
@@ -89,7 +88,7 @@ def lag(
         str, typer.Option(help="That episodes begin at (kPa), by commas; by the seed if empty.")
     ] = "",
     safety: Annotated[bool, typer.Option(help="Also behind the safety layer.")] = False,
-    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = Path("results/lag"),
+    out: Annotated[Path, typer.Option(help="Folder of the tables.")] = RESULTS / "lag",
 ) -> None:
     """Bound what the regulator's lag makes impossible in an exercise; a minute an operator."""
     from rich.console import Console
@@ -103,5 +102,4 @@ def lag(
             raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}") from None
         run_lag(task, operators, listed, safety, out, Console())
     except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
+        refuse(error)

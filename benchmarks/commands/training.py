@@ -6,9 +6,7 @@ from typing import Annotated
 
 import typer
 
-RESULTS = Path("results")
-INTERRUPTED = 130
-"""Exit code after Ctrl-C, as shells have it."""
+from benchmarks.commands.options import INTERRUPTED, RESULTS, refuse
 
 
 def register(app: typer.Typer) -> None:
@@ -64,8 +62,7 @@ def train(
         order = ordered(algo, task, preset, seed, steps, device, threads, patience)
         run_train(order, folder, Console())
     except PresetError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
+        refuse(error)
     except CheckpointError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(1) from None
@@ -104,6 +101,5 @@ def export(
             usual.parent.mkdir(parents=True, exist_ok=True)
         written = export_model(order)
     except ValueError as error:
-        print(f"error: {error}", file=sys.stderr)
-        raise typer.Exit(2) from None
+        refuse(error)
     print("\n".join(map(str, written)))

@@ -1,0 +1,1 @@
+"""The commands of `python -m benchmarks`, one subject a module."""

@@ -1,0 +1,109 @@
+"""The commands about the dissertation: its profiles, tables, feed-forward, studies and model."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, OptionalOut, Out, refuse
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command()(profiles)
+    app.command()(budget)
+    app.command()(measured)
+    app.command()(voltages)
+    app.command()(studies)
+    app.command()(identify)
+
+
+def profiles(out: Out) -> None:
+    """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
+    from benchmarks.profiles import run_profiles
+
+    print(f"{run_profiles(out)} rows in {out}")
+
+
+def budget(
+    out: Annotated[
+        Path, typer.Option(help="Folder of tables (CSV, Markdown) and pictures.")
+    ] = RESULTS / "budget",
+) -> None:
+    """Say why the dissertation's feed-forward misses what it misses, at every pressure."""
+    from benchmarks.budget.job import run_budget
+
+    if out.exists() and not out.is_dir():
+        refuse(ValueError(f"--out {out} is a file; name a folder for the results"))
+    run_budget(out)
+
+
+def measured(
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "measured",
+    jobs: Jobs = 2,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of simulated chance.")] = 0,
+    rounds: Annotated[
+        int | None,
+        typer.Option(min=1, help="Diagnoses, each of what the one before amended; 2 if not given."),
+    ] = None,
+    write: Annotated[
+        Path | None,
+        typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
+    ] = None,
+) -> None:
+    """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
+    from benchmarks.measured.job import run_measured, write_trials
+    from benchmarks.measured.rounds import MOST_ROUNDS
+
+    for folder, option in ((out, "--out"), (write, "--write")):
+        if folder is not None and folder.exists() and not folder.is_dir():
+            refuse(ValueError(f"{option} {folder} is a file; name a folder"))
+    if write is not None:
+        print(f"{write_trials(write)} trials in {write}")
+        return
+    try:
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS)
+    except KeyboardInterrupt:
+        print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def voltages(
+    controller: Annotated[
+        str, typer.Option(help="serres_replay, serres_feedforward or improved_feedforward.")
+    ],
+    task: Annotated[str, typer.Option(help="Name of a task, such as displacement or rotation.")],
+    pressure: Annotated[float, typer.Option(help="Gauge pressure (kPa).")],
+    out: Out,
+    rate: Annotated[float, typer.Option(help="Rows a second (Hz), each held.")] = 100.0,
+    model: Annotated[
+        str, typer.Option(help="Nominal model: shipped name or TOML file.")
+    ] = "station",
+) -> None:
+    """Write a feed-forward's voltages for a real rig as CSV."""
+    from benchmarks.voltages import Order, run_voltages
+
+    try:
+        rows = run_voltages(Order(controller, task, pressure, rate, model), out)
+    except ValueError as error:
+        refuse(error)
+    print(f"{rows} rows in {out}")
+
+
+def studies(out: OptionalOut = None) -> None:
+    """Recompute the dissertation's regressions and variance tables beside the printed ones."""
+    from benchmarks.studies import run_studies
+
+    run_studies(out)
+
+
+def identify(out: Out, jobs: Jobs = 2) -> None:
+    """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
+    from benchmarks.identify import run_identify
+
+    try:
+        run_identify(out, jobs)
+    except KeyboardInterrupt:
+        print("Interrupted: nothing is written", file=sys.stderr)
+        raise typer.Exit(INTERRUPTED) from None

@@ -1,0 +1,77 @@
+"""The commands about hidden effects: `hidden-effects` and `hidden-effects-report`."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from benchmarks.commands.options import RESULTS, Jobs, refuse, require_writable, writable_out
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command("hidden-effects")(hidden_effects)
+    app.command("hidden-effects-report")(hidden_effects_report)
+
+
+def hidden_effects(
+    block: Annotated[
+        str,
+        typer.Option(
+            help="single, faint, nothing, parameters, pair, unknown, undecidable, or all."
+        ),
+    ],
+    n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same cases.")] = 0,
+    jobs: Jobs = 1,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder; results/hidden_effects/BLOCK-SEED if not given."),
+    ] = None,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", help="File for all figures, in a folder that exists.")
+    ] = None,
+    rounds: Annotated[
+        int, typer.Option(min=0, max=3, help="Experiments that follow, in block undecidable.")
+    ] = 2,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
+) -> None:
+    """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
+    from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
+
+    require_writable(json_file, "--json")
+    try:
+        blocks, orders = ordered(block, rounds), []
+        for each in blocks:
+            usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
+            folder = usual if out is None or len(blocks) > 1 else out
+            orders.append(Order(each, n, seed, folder, jobs, keep, again))
+        code = run_hidden_effects(orders, json_file)
+    except JobError as error:
+        refuse(error)
+    raise typer.Exit(code)
+
+
+def hidden_effects_report(
+    places: Annotated[
+        list[Path], typer.Argument(help="Folders or --json files of `hidden-effects`.")
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Markdown or .html file; printed if not given.", callback=writable_out),
+    ] = None,
+) -> None:
+    """Write the figures of several blocks of hidden effects as one page of tables."""
+    from benchmarks.files import write_text
+    from benchmarks.hidden_effects.job import JobError
+    from benchmarks.hidden_effects.summary import read_scores, report
+
+    try:
+        text = report(read_scores(places), out.suffix if out else ".md")
+    except JobError as error:
+        refuse(error)
+    if out is None:
+        print(text)
+    else:
+        write_text(out, text)

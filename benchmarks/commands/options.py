@@ -1,0 +1,50 @@
+"""What the commands share: options, where results go, and how one refuses."""
+
+import sys
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+
+RESULTS = Path("results")
+INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it."""
+
+
+def refuse(error: Exception) -> NoReturn:
+    """One message and exit code 2."""
+    print(f"error: {error}", file=sys.stderr)
+    raise typer.Exit(2)
+
+
+def require_writable(path: Path | None, option: str) -> None:
+    """Refuse a file that cannot be written before anything is computed for it.
+
+    Args:
+        path: what was given; None if nothing was.
+        option: that it was given by, for the message.
+    """
+    from pma_gym.files import OutputError, check_output
+
+    try:
+        if path is not None:
+            check_output(path)
+    except OutputError as error:
+        refuse(ValueError(f"{option}: {error}"))
+
+
+def writable_out(out: Path | None) -> Path | None:
+    """The file of `--out` as it was given, if it can be written."""
+    require_writable(out, "--out")
+    return out
+
+
+def listed(text: str) -> list[str]:
+    """What stands between commas."""
+    return [part.strip() for part in text.split(",") if part.strip()]
+
+
+_OUT = typer.Option(help="File to write, in a folder that exists.", callback=writable_out)
+Out = Annotated[Path, _OUT]
+OptionalOut = Annotated[Path | None, _OUT]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]

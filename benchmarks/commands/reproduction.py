@@ -1,0 +1,71 @@
+"""The main job, which runs without a command: all controllers on the dissertation's trials."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, listed, refuse
+
+
+def register(app: typer.Typer) -> None:
+    """Make it what the program does without a command."""
+    app.callback()(reproduction)
+
+
+def reproduction(
+    context: typer.Context,
+    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "reproduction",
+    controllers: Annotated[
+        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; all if empty.")
+    ] = "",
+    model: Annotated[
+        str,
+        typer.Option(help="Models by commas: shipped names or TOML files; the suite's if empty."),
+    ] = "",
+    task: Annotated[str, typer.Option(help="displacement or rotation; both if empty.")] = "",
+    pressures: Annotated[str, typer.Option(help="Pressures in kPa by commas; all if empty.")] = "",
+    jobs: Jobs = 2,
+) -> None:
+    """Run every controller through every trial and write the report (the main job)."""
+    if context.invoked_subcommand is not None:
+        return
+    try:
+        code = reproduce(out, controllers, model, task, pressures, jobs)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case: nothing is measured or written", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str, jobs: int) -> int:
+    """The main job; its exit code."""
+    from rich.console import Console
+
+    from benchmarks.contender import ControllerError, parse_contenders
+    from benchmarks.job import run_job
+    from benchmarks.suite import SuiteError, load_suite
+    from pma_gym.plant.model import ModelError, load_model
+
+    suite = load_suite()
+    try:
+        models = listed(model)
+        for name in models or suite.models:
+            load_model(name)
+        chosen = parse_contenders(controllers, suite.controllers) if controllers else []
+        suite = suite.select(models, chosen, listed(task), _pressures(pressures))
+        if out.exists() and not out.is_dir():
+            raise SuiteError(f"--out {out} is a file; name a folder for the results")
+    except (ControllerError, ModelError, SuiteError) as error:
+        refuse(error)
+    return run_job(suite, out, jobs, Console())
+
+
+def _pressures(text: str) -> list[float]:
+    from benchmarks.suite import SuiteError
+
+    try:
+        return [float(part) for part in listed(text)]
+    except ValueError:
+        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}") from None

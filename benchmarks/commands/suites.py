@@ -1,0 +1,110 @@
+"""The commands about frozen suites: `run`, `report`, `add` and `suites`."""
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, listed, refuse
+from benchmarks.commands.reproduction import reproduce
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands to the program."""
+    app.command()(run)
+    app.command()(report)
+    app.command()(add)
+    app.command()(suites)
+
+
+def run(
+    suite: Annotated[str, typer.Option(help="Name, see `suites`, or path of a TOML file.")],
+    controllers: Annotated[
+        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; or all.")
+    ] = "all",
+    jobs: Jobs = 2,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the results; results/SUITE if not given.")
+    ] = None,
+) -> None:
+    """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
+    from rich.console import Console
+
+    from benchmarks.comparison.job import chosen, run_comparison
+    from benchmarks.comparison.suite import frozen_suite
+    from benchmarks.contender import ControllerError
+    from benchmarks.suite import SuiteError
+
+    try:
+        if suite == "reproduction":
+            every = "" if controllers == "all" else controllers
+            raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", jobs))
+        frozen = frozen_suite(suite)
+        entries = chosen(frozen, controllers)
+        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, jobs, Console())
+    except (ControllerError, SuiteError) as error:
+        refuse(error)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case; run it again", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+def report(
+    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of the run; results/SUITE if not given.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the page; that of the run if not given.")
+    ] = None,
+) -> None:
+    """Write a suite's leaderboard from the journal of its run."""
+    from benchmarks.comparison.publish import run_report
+    from benchmarks.comparison.suite import frozen_suite
+    from benchmarks.suite import SuiteError
+
+    try:
+        frozen = frozen_suite(suite)
+        folder = results or RESULTS / frozen.name
+        print(f"Report: {run_report(frozen, folder, out or folder)}")
+    except SuiteError as error:
+        refuse(error)
+
+
+def add(
+    controller: Annotated[str, typer.Argument(help="path/to/file.py:ClassName")],
+    suite: Annotated[str, typer.Option(help="Suites by commas; all but `many` if empty.")] = "",
+    jobs: Jobs = 2,
+    results: Annotated[
+        Path, typer.Option(help="Folder with a folder of results for each suite.")
+    ] = RESULTS,
+) -> None:
+    """Score your own controller on all suites, and say where it stands or what to mend."""
+    from rich.console import Console
+
+    from benchmarks.comparison.add import own_contender, run_add
+    from benchmarks.comparison.suite import frozen_suite, suite_names
+    from benchmarks.contender import ControllerError
+    from benchmarks.suite import SuiteError
+
+    try:
+        frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
+        frozen = [one for one in frozen if suite or not one.only_by_name]
+        code = run_add(own_contender(controller), frozen, results, jobs, Console())
+    except (ControllerError, SuiteError) as error:
+        refuse(error)
+    except KeyboardInterrupt:
+        print("Interrupted before the first case; run it again", file=sys.stderr)
+        code = INTERRUPTED
+    raise typer.Exit(code)
+
+
+def suites() -> None:
+    """List the frozen suites: their versions, cases and controllers."""
+    from rich.console import Console
+
+    from benchmarks.comparison.listing import print_suites
+
+    print_suites(Console())
