@@ -9,8 +9,7 @@ The residual is taken in units of the noise, not whitened: whitening leaves litt
 changes slowly, and such are the gaps that a person sees.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -21,19 +20,14 @@ from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.leftovers import left_over
-from pma_gym.plant.logged import Logged
+from pma_gym.discovery.regions import LARGEST, SMALLEST, Region, single_regions
+from pma_gym.discovery.residual_maps import residual_map
+from pma_gym.discovery.ticks import PIECE_TICKS, Ticks, ticks_of
 from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Single = NDArray[np.float32]
-
-TICK_S = 0.05
-"""Readings of so long (s) are taken together: finer than any region."""
-
-PIECE_TICKS = 20
-"""Ticks of a piece that is dealt as a whole: a second, longer than the memory of noise and
-plant."""
 
 RESAMPLES = 999
 """Deals for p-values."""
@@ -43,9 +37,6 @@ SIGNIFICANT = 0.05
 
 MOST_OF_A_SIGNAL, MOST = 3, 8
 """Regions that are told at most."""
-
-SMALLEST, LARGEST = 0.02, 0.9
-"""Shares of a signal's readings between which a region is one."""
 
 LEAST_SHARE, LEAST_LIFT = 0.15, 1.25
 """Least share of the gap in a region that is told, and how many times its share of readings."""
@@ -58,67 +49,6 @@ OVERLAP = 0.5
 
 VISIBLE = 1.05
 """Mean square of a residual, in units of the noise's, from which there is a gap."""
-
-MOVING = 0.5e-3
-"""Slowest speed (m/s) that counts as motion."""
-
-SMOOTH_S = 0.03
-"""Width of the mean over simulated contraction that speed is taken of (s): not each slip of dry
-friction is a reversal."""
-
-STEP_V, STEP_V_PER_S = 0.1, 8.0
-"""Least change of a command (V) between two rows, and its rate, that is a step."""
-
-CELLS = 10
-"""Cells along each axis of a map."""
-
-
-@dataclass(frozen=True)
-class Ticks:
-    """All trials in ticks, padded to whole pieces; shape (n,) each unless said otherwise.
-
-    Attributes:
-        excess: sum of residual squared less 1, in units of noise, shape (4, n).
-        total: sum of the residual, shape (4, n).
-        counts: readings, shape (4, n); 0 where a tick is padding.
-        pressure: (kPa), as simulated, as all conditions.
-        load: (N).
-        contraction: (mm).
-        speed: of contraction (mm/s), positive where the muscle shortens.
-        reversal: time since the last reversal of motion (s); infinite before the first.
-        step: time since the last step of a command (s); infinite before the first.
-        held: time since the last motion (s), 0 while moving.
-        phase: 0 before the first change of a command, 1 from then on, 2 after the last.
-        order: number of the trial, as a share of all, 0 to 1.
-    """
-
-    excess: Array
-    total: Array
-    counts: Array
-    pressure: Array
-    load: Array
-    contraction: Array
-    speed: Array
-    reversal: Array
-    step: Array
-    held: Array
-    phase: Array
-    order: Array
-
-
-@dataclass(frozen=True)
-class Region:
-    """One condition, or two.
-
-    Attributes:
-        kinds: what they are about; two of one kind are never joined.
-        words: in words.
-        inside: which ticks it holds, shape (n,).
-    """
-
-    kinds: tuple[str, ...]
-    words: str
-    inside: Mask
 
 
 def localise(
@@ -141,7 +71,7 @@ def localise(
     residuals = [part / levels for part in left_over(evidence, readings)]
     ticks = ticks_of(evidence.logged, readings, residuals)
     seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(ticks, channel)]
-    return _places(ticks, seen, seed), tuple(_map(ticks, channel) for channel in seen)
+    return _places(ticks, seen, seed), tuple(residual_map(ticks, channel) for channel in seen)
 
 
 def _has_gap(ticks: Ticks, channel: int) -> bool:
@@ -149,111 +79,8 @@ def _has_gap(ticks: Ticks, channel: int) -> bool:
     return bool(count > 0 and np.sum(ticks.excess[channel]) > (VISIBLE - 1.0) * count)
 
 
-# ---- conditions ----
-
-
-def ticks_of(
-    logs: Sequence[Logged], readings: Sequence[Array], residuals: Sequence[Array]
-) -> Ticks:
-    """All trials in ticks.
-
-    Args:
-        logs: the trials.
-        readings: what the sensors hold (SI), shape (4, rows) for each trial.
-        residuals: those less what was measured, in units of the noise, NaN where nothing was.
-    """
-    parts = []
-    for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
-        order = number / max(len(logs) - 1, 1)
-        parts.append(_of_trial(logged, held, residual, order))
-    return Ticks(**{name: np.concatenate([p[name] for p in parts], axis=-1) for name in parts[0]})
-
-
-def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dict[str, Array]:
-    time = logged.time
-    width = max(TICK_S, float(np.median(np.diff(time)))) if len(time) > 1 else TICK_S
-    starts = np.unique(np.floor((time - time[0]) / width + 1e-9), return_index=True)[1]
-    known = np.isfinite(residual)
-    filled = np.where(known, residual, 0.0)
-    sums = {
-        "excess": np.where(known, filled**2 - 1.0, 0.0),
-        "total": filled,
-        "counts": known.astype(float),
-    }
-    found = {name: np.add.reduceat(each, starts, axis=1) for name, each in sums.items()}
-    # A tick's conditions are those of its middle row.
-    middle = (starts + np.append(starts[1:], len(time)) - 1) // 2
-    conditions = _conditions(logged, held) | {"order": np.full(len(time), order)}
-    found |= {name: each[middle] for name, each in conditions.items()}
-    spare = -len(starts) % PIECE_TICKS
-    return {name: _padded(each, spare) for name, each in found.items()}
-
-
-def _padded(values: Array, spare: int) -> Array:
-    """Some more ticks: without readings, in a condition that lies in no region."""
-    if values.ndim == 2:
-        return np.pad(values, ((0, 0), (0, spare)))
-    return np.pad(values, (0, spare), constant_values=np.nan)
-
-
-def _conditions(logged: Logged, held: Array) -> dict[str, Array]:
-    """Conditions of each row, from what is simulated: measured speed is mostly noise."""
-    time, contraction = logged.time, held[0]
-    speed = _speed(time, contraction)
-    moving = np.abs(speed) > MOVING
-    direction = np.where(moving, np.sign(speed), 0.0)
-    # The direction of the last motion, also while held.
-    last = np.maximum.accumulate(np.where(moving, np.arange(len(time)), -1))
-    heading = np.where(last >= 0, direction[np.maximum(last, 0)], 0.0)
-    turned = np.append(False, heading[1:] * heading[:-1] < 0.0)
-    # What never moved has been held since the beginning.
-    rested = np.where(last >= 0, time - time[np.maximum(last, 0)], time - time[0])
-    changed = np.append(False, (np.diff(logged.motor) != 0) | (np.diff(logged.regulator) != 0))
-    phase = np.zeros(len(time))
-    if changed.any():
-        rows = np.flatnonzero(changed)
-        phase[rows[0] :] = 1.0
-        phase[rows[-1] + 1 :] = 2.0
-    return {
-        "pressure": held[3] / 1e3,
-        "load": held[2],
-        "contraction": contraction * 1e3,
-        "speed": speed * 1e3,
-        "reversal": _since(time, turned),
-        "step": _since(time, _stepped(logged)),
-        "held": np.where(moving, 0.0, np.maximum(rested, 1e-9)),
-        "phase": phase,
-    }
-
-
-def _speed(time: Array, contraction: Array) -> Array:
-    if len(time) < 3:
-        return np.zeros(len(time))
-    width = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
-    sums = np.cumsum(np.append(0.0, contraction))
-    half, rows = width // 2, np.arange(len(time))
-    first, end = np.maximum(rows - half, 0), np.minimum(rows + half + 1, len(time))
-    return np.gradient((sums[end] - sums[first]) / (end - first), time)
-
-
-def _since(time: Array, event: Mask) -> Array:
-    last = np.maximum.accumulate(np.where(event, np.arange(len(time)), -1))
-    return np.where(last >= 0, time - time[np.maximum(last, 0)], np.inf)
-
-
-def _stepped(logged: Logged) -> Mask:
-    found = np.zeros(len(logged.time), bool)
-    for volts in (logged.motor, logged.regulator):
-        change = np.abs(np.diff(volts))
-        found[1:] |= (change > STEP_V) & (change > STEP_V_PER_S * np.diff(logged.time))
-    return found
-
-
-# ---- regions ----
-
-
 def _places(ticks: Ticks, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
-    singles = _singles(ticks)
+    singles = single_regions(ticks)
     regions = singles + [
         Region(first.kinds + second.kinds, "", first.inside & second.inside)
         for first, second in combinations(singles, 2)
@@ -355,130 +182,3 @@ def _scores(share: Array, readings: Array) -> Array:
     s, n = np.clip(share, 1e-9, 1.0 - 1e-9), np.clip(readings, 1e-9, 1.0 - 1e-9)
     ratio = s * np.log(s / n) + (1.0 - s) * np.log((1.0 - s) / (1.0 - n))
     return np.where(s > n, ratio, 0.0)
-
-
-def _singles(ticks: Ticks) -> list[Region]:
-    """Regions of one condition, those of motion first, as a person says them."""
-    there = np.isfinite(ticks.order)
-    held, speed = ticks.held, ticks.speed
-    found: list[tuple[str, str, Mask]] = []
-    for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
-        since = np.where(there, getattr(ticks, kind), np.nan)
-        found += [(kind, f"0-{t:g} s after {words}", since <= t) for t in (0.1, 0.2, 0.5)]
-        found.append((kind, f"more than 1 s after {words}", (since > 1.0) & np.isfinite(since)))
-    found.append(("motion", "while held", held > 0.0))
-    found.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
-    moving = held == 0.0
-    for sign, words in ((1.0, "shortening"), (-1.0, "pulling out")):
-        along = np.where(moving, sign * speed, np.nan)
-        found.append(("motion", f"while {words}", along > 0.0))
-        found += [
-            ("motion", f"{words} faster than {v:g} mm/s", along > v)
-            for v in _round_cuts(along[along > 0.0], (0.5, 0.8))
-        ]
-    found.append(("motion", "while moving", moving))
-    crawl = _round_cuts(np.abs(speed[moving]), (0.3,))
-    found += [
-        ("motion", f"moving slower than {v:g} mm/s", moving & (abs(speed) < v)) for v in crawl
-    ]
-    phases = ("before the first command", "between the first command and the last", "")
-    for number, words in enumerate(phases[:2]):
-        found.append(("phase", words, ticks.phase == number))
-    found.append(("phase", "in the final hold", ticks.phase == 2.0))
-    for kind, name, unit in _LEVELS:
-        values = getattr(ticks, kind)
-        for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
-            found.append((kind, f"{name}above {cut:g} {unit}", values > cut))
-            found.append((kind, f"{name}under {cut:g} {unit}", values < cut))
-    found.append(("order", "in the first half of the trials", ticks.order < 0.5))
-    found.append(("order", "in the second half of the trials", ticks.order > 0.5))
-    count = int(there.sum())
-    kept = {}
-    for kind, words, inside in found:
-        if SMALLEST * count <= inside.sum() <= LARGEST * count:
-            # Of two ways to say the same, the first.
-            kept.setdefault(inside.tobytes(), Region((kind,), words, inside))
-    return list(kept.values())
-
-
-_LEVELS = (
-    ("pressure", "", "kPa"),
-    ("load", "load ", "N"),
-    ("contraction", "contraction ", "mm"),
-)
-
-
-def _round_cuts(values: Array, quantiles: Sequence[float]) -> list[float]:
-    """Round numbers near quantiles, distinct and within the values."""
-    if not values.size:
-        return []
-    low, high = np.quantile(values, [0.01, 0.99])
-    span = high - low
-    if span <= 1e-3 * max(abs(low), abs(high), 1e-9):
-        return []
-    # The roundest step that still tells the quantiles apart.
-    step = 10.0 ** np.floor(np.log10(span / 4.0))
-    cuts = {float(np.round(np.quantile(values, q) / step) * step) for q in quantiles}
-    return sorted(round(cut, 9) for cut in cuts if low < cut < high)
-
-
-# ---- maps ----
-
-_AXES: Mapping[str, str] = {
-    "pressure": "pressure (kPa)",
-    "load": "load (N)",
-    "contraction": "contraction (mm)",
-    "speed": "speed of contraction (mm/s)",
-    "reversal": "time since reversal (s)",
-    "held": "time since the last motion (s)",
-}
-
-
-def _map(ticks: Ticks, channel: int) -> Map:
-    """The signal's mean residual over the two conditions that explain most of it."""
-    total, counts = ticks.total[channel], ticks.counts[channel]
-    edges = {name: _edges(getattr(ticks, name)[counts > 0]) for name in _AXES}
-    best = None
-    for x, y in combinations(_AXES, 2):
-        sums, there = _grid(ticks, x, y, edges, total), _grid(ticks, x, y, edges, counts)
-        filled = there > 0
-        means = np.divide(sums, there, out=np.full_like(sums, np.nan), where=filled)
-        # What noise alone would make of so many cells is no explanation.
-        explained = float(np.sum(sums[filled] * means[filled]) - np.sum(filled))
-        if best is None or explained > best[0]:
-            best = explained, x, y, means
-    assert best is not None
-    _, x, y, means = best
-    signal = BY_QUANTITY[OUTPUTS[channel]].name
-    return Map(signal, _AXES[x], _AXES[y], edges[x], edges[y], means)
-
-
-def _grid(ticks: Ticks, x: str, y: str, edges: Mapping[str, Array], weights: Array) -> Array:
-    """Sums over cells, shape (cells of y, cells of x)."""
-    across, along = getattr(ticks, x), getattr(ticks, y)
-    there = np.isfinite(across) & np.isfinite(along) & (weights != 0.0)
-    columns = _cell(across[there], edges[x])
-    rows = _cell(along[there], edges[y])
-    width, height = len(edges[x]) - 1, len(edges[y]) - 1
-    flat = np.bincount(rows * width + columns, weights[there], width * height)
-    return np.asarray(flat, float).reshape(height, width)
-
-
-def _cell(values: Array, edges: Array) -> NDArray[np.intp]:
-    at = np.searchsorted(edges, values, side="right") - 1
-    return np.clip(at, 0, len(edges) - 2)
-
-
-def _edges(values: Array) -> Array:
-    """Even cells over all but the outermost values, which count with the outermost cells."""
-    known = values[np.isfinite(values)]
-    if not known.size:
-        return np.array([0.0, 1.0])
-    low, high = np.quantile(known, [0.01, 0.99])
-    if high - low <= 1e-6 * max(abs(low), abs(high), 1e-6):
-        # A condition that does not vary explains nothing: one cell.
-        return np.array([low - 0.5, low + 0.5])
-    return np.linspace(low, high, CELLS + 1)
-
-
-__all__ = ["Ticks", "adjusted", "localise", "ticks_of"]

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.ways.prepared import Prepared
-from pma_gym.discovery.where import TICK_S, Ticks, ticks_of
+from pma_gym.discovery.ticks import TICK_S, Ticks, ticks_of
 from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
