@@ -2,8 +2,8 @@
 
 from llvmlite import ir
 
+from pma_gym.envs.block_memory import narrowed
 from pma_gym.envs.cuda_memory import ThreadMemory
-from pma_gym.envs.kernel import narrowed
 from pma_gym.kernels.control import DOUBLE, FLOAT, INTEGER, Builder, Operand, integer, loop, offset
 from pma_gym.kernels.llvm import Lanes
 from pma_gym.plant.program import FIRST_S, balanced

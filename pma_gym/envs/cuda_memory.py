@@ -4,7 +4,8 @@ A number of all environments lies side by side, so that threads beside each othe
 other.
 """
 
-from pma_gym.envs.kernel import Plan, Writer, narrowed
+from pma_gym.envs.block_memory import Plan, narrowed
+from pma_gym.envs.kernel_writer import Writer
 from pma_gym.envs.record import DRAW
 from pma_gym.kernels.control import DOUBLE, FLOAT, INDEX, INTEGER, Builder, Operand, integer, offset
 from pma_gym.kernels.graph import Kind, Value

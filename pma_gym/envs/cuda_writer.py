@@ -10,8 +10,8 @@ from typing import Protocol
 
 from llvmlite import ir
 
+from pma_gym.envs.block_memory import narrowed, widened
 from pma_gym.envs.cuda_begin import BeginWriter
-from pma_gym.envs.kernel import narrowed, widened
 from pma_gym.envs.scoring import Sampling
 from pma_gym.kernels.control import (
     DOUBLE,

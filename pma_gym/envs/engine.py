@@ -14,7 +14,9 @@ from pma_gym.envs.beginning import (
     settled_at_no_load,
     settled_under_load,
 )
-from pma_gym.envs.kernel import ARGUMENTS, BAD_ACTION, Kernel
+from pma_gym.envs.block_memory import ARGUMENTS
+from pma_gym.envs.kernel import Kernel
+from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import Engine
-from pma_gym.envs.kernel import BAD_ACTION
+from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import (
     Pressure,

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from pma_gym.data.protocol import Phase, Protocol
-from pma_gym.envs import PMAEnv
+from pma_gym.envs import PMAEnv, kernel
 from pma_gym.envs.device import DeviceEngine
 from pma_gym.envs.engine import Engine
-from pma_gym.envs.kernel import Kernel
 from pma_gym.envs.options import Options
 from pma_gym.envs.stand_in import StandIn
 from pma_gym.metrics import rmse
@@ -121,8 +120,8 @@ def test_references_of_one_structure_share_their_code(make, monkeypatch):
     assert make("displacement")._engine.kernel.library not in libraries
     narrow = following("narrow", "extension", _ramp, span=10e-3)
     assert make(narrow)._engine.kernel.library not in libraries
-    built: list[Kernel] = []
-    monkeypatch.setattr(Kernel, "_build", built.append)
+    built: list[kernel.Kernel] = []
+    monkeypatch.setattr(kernel, "Writer", built.append)
     make(multisine("extension", 99))
     assert built == []
 

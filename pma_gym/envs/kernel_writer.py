@@ -1,0 +1,401 @@
+"""Writes the control step of environments: command, march, sensors, reward, and the beginning."""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from llvmlite import ir
+
+from pma_gym.envs.block_memory import BlockMemory, Plan, narrowed, widened
+from pma_gym.envs.record import TARE
+from pma_gym.envs.scoring import COURSE, Course, course, sampling
+from pma_gym.kernels.control import (
+    DOUBLE,
+    FLOAT,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    function,
+    integer,
+    loop,
+    offset,
+    repeat,
+)
+from pma_gym.kernels.generic import to_real
+from pma_gym.kernels.graph import FIXED, HELD, Value
+from pma_gym.kernels.llvm import Lanes
+from pma_gym.kernels.trace import split
+from pma_gym.plant.attempt import attempt
+from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
+from pma_gym.plant.model import PLANTS
+
+TARE_READINGS = 192
+"""Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""
+
+BAD_ACTION = 4
+"""What `step` returns where an action is no finite number; nothing has happened then."""
+
+
+class Numbers(Protocol):
+    """Numbers of their own that lanes keep during the march."""
+
+    def vector(self, what: str) -> Operand:
+        """All lanes' numbers of a name."""
+        ...
+
+    def put_vector(self, what: str, numbers: Operand) -> None:
+        """Write them."""
+        ...
+
+
+class Writer(BlockMemory):
+    """Writes a kernel's module.
+
+    Attributes:
+        traces: whether it writes down a single environment's course.
+    """
+
+    def __init__(self, kernel: Plan) -> None:
+        super().__init__(kernel)
+        self.traces = kernel.width == 1
+        self.module = ir.Module()
+        self.attempt = attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
+        self.course: Course = course(self.eq, self.attempt, kernel.record.task)
+        extra = [*self.course.values, self.attempt.taken, self.attempt.length]
+        layout = Layout.of(self.attempt, extra)
+        self.extra = extra
+        self.commanded = self.circuit.command()
+        count = self.circuit.slot("count")
+        self.sensed = self.circuit.sense(count + 1, first=False)
+        self.sensed["reward"] = self.circuit.reward(self.sensed)
+        self.begun = self.circuit.sense(count, first=True)
+        self.tare = self.circuit.read(TARE, self.eq.graph.input("reading", 2, "integer"))
+        later = [*self.sensed.values(), *self.begun.values(), *self.tare, *self._more()]
+        fixed = {v.id: v for v in [*layout.fixed, *split(later, FIXED)]}
+        self.fixed = [fixed[i] for i in sorted(fixed)]
+        self.layout = Layout(layout.changing, layout.outputs, layout.held, layout.fixed, self.fixed)
+        self._write()
+
+    def _more(self) -> list[Value]:
+        """What else is computed, for its part of the table."""
+        return []
+
+    def _write(self) -> None:
+        self._table()
+        self._step()
+        self._begin()
+
+    def _table(self) -> None:
+        b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
+        known = self.kernel.program.parameters(b, vector, self.fixed)
+        found = Lanes(1).emit(b, self.fixed, known)
+        for i, value in enumerate(self.fixed):
+            b.store(found[value.id], offset(b, out, i))
+        b.ret_void()
+        b, _ = function(self.module, "table_size", [], INTEGER)
+        b.ret(integer(len(self.fixed)))
+
+    # -- a step ------------------------------------------------------------------------------------
+
+    def _step(self) -> None:
+        b, (arguments,) = function(self.module, "step", [("arguments", POINTER)], INTEGER)
+        given = self._arguments(b, arguments)
+        bad = memory(b, INTEGER)
+        b.store(integer(0), bad)
+        with loop(b, given["last"], given["first"]) as block:
+            self._check_actions(b, given, block, bad)
+        refused = b.icmp_signed("!=", b.load(bad, typ=INTEGER), integer(0))
+        with b.if_then(refused, likely=False):
+            b.ret(integer(BAD_ACTION))
+        with loop(b, given["last"], given["first"]) as block:
+            self._command(b, given, block)
+        self._march(b, given)
+        ended = memory(b, INTEGER)
+        b.store(integer(0), ended)
+        with loop(b, given["last"], given["first"]) as block:
+            self._sense(b, given, block, ended)
+        b.ret(b.load(ended, typ=INTEGER))
+
+    def _action(self, b: Builder, given: dict[str, Operand], index: Operand, i: int) -> Operand:
+        at = b.add(b.mul(index, integer(self.record.actions)), integer(i))
+        return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
+
+    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
+        if lanes.width == 1:
+            return numbers[0]
+        vector = ir.Constant(lanes.real, ir.Undefined)
+        for k, number in enumerate(numbers):
+            vector = lanes.insert(b, vector, number, k)
+        return vector
+
+    def _actions(
+        self, b: Builder, lanes: Lanes, given: dict[str, Operand], block: Operand, i: int
+    ) -> Operand:
+        first = b.mul(block, integer(self.width))
+        return self._gathered(
+            b,
+            lanes,
+            [self._action(b, given, b.add(first, integer(k)), i) for k in range(self.width)],
+        )
+
+    def _check_actions(
+        self, b: Builder, given: dict[str, Operand], block: Operand, bad: Operand
+    ) -> None:
+        lanes = Lanes(self.width)
+        for i in range(self.record.actions):
+            action = self._actions(b, lanes, given, block, i)
+            # Zero times a number that is not finite is none.
+            nothing = b.fmul(action, lanes.constant(0.0))
+            wrong = lanes.any(b, b.fcmp_unordered("uno", nothing, nothing))
+            count = b.add(b.load(bad, typ=INTEGER), b.zext(wrong, INTEGER))
+            b.store(count, bad)
+
+    def _command(self, b: Builder, given: dict[str, Operand], block: Operand) -> None:
+        lanes = self._lanes(self.width)
+        records, tables = self._block(b, given, block)
+        values = list(self.commanded.values())
+        known = self._known(b, lanes, values, records, tables, 0)
+        for i in range(self.record.actions):
+            known[self.circuit.action(i).id] = self._actions(b, lanes, given, block, i)
+        found = lanes.emit(b, values, known)
+        self._store(b, lanes, found, self.commanded, records, 0)
+
+    def _march(self, b: Builder, given: dict[str, Operand]) -> None:
+        lanes = Lanes(self.width, "float" if self.kernel.single else "double", FUSED)
+        sums = [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
+        lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
+        period = self.record.options.period
+        following = memory(b, INTEGER)
+        b.store(b.mul(given["first"], integer(self.width)), following)
+        stop = b.mul(given["last"], integer(self.width))
+        stop = b.select(b.icmp_signed("<", stop, given["count"]), stop, given["count"])
+        kept = [*self.record.states, "size"]
+        values = {name: self.circuit.slot(name) for name in self.record.states}
+        values["size"] = self.attempt.size
+        own = ["sample", *sums]
+
+        def address(job: Operand, name: str) -> Operand:
+            block, k = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
+            return self._place(b, given["records"], block, name, k)
+
+        def number(job: Operand, name: str) -> Operand:
+            return b.load(address(job, name), typ=DOUBLE)
+
+        def take(k: Operand) -> Operand:
+            job = b.load(following, typ=INTEGER)
+            found = b.icmp_signed("<", job, stop)
+            with b.if_then(found):
+                b.store(b.add(job, integer(1)), following)
+                b.store(job, lane.job(k))
+                if self.width == 1:
+                    steps = b.load(address(job, "count"), typ=INTEGER)
+                    heard = number(job, f"{self.record.task.actuator}_voltage")
+                    b.store(heard, offset(b, given["voltages"], steps))
+                for name in kept:
+                    lane.put(values[name], k, lane.narrow(number(job, name)))
+                for name in own:
+                    lane.put(name, k, lane.narrow(number(job, name)))
+                lane.put(self.attempt.left, k, ir.Constant(lanes.element, period))
+                steps = b.load(address(job, "count"), typ=INTEGER)
+                time = b.fmul(b.uitofp(steps, DOUBLE), ir.Constant(DOUBLE, period))
+                lane.put("clock", k, lane.narrow(time))
+                inputs = {
+                    self.circuit.slot(name).id: lane.narrow(number(job, name))
+                    for name in self.record.held
+                }
+                block, rest = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
+                _, tables = self._block(b, given, block)
+                lane.fill(k, offset(b, tables, rest), inputs, self.width)
+            return found
+
+        def proceed(k: Operand) -> Operand:
+            job = b.load(lane.job(k), typ=INTEGER)
+            for name in kept:
+                b.store(lane.widen(lane.get(values[name], k)), address(job, name))
+            for name in own:
+                b.store(lane.widen(lane.get(name, k)), address(job, name))
+            return take(k)
+
+        def watch(found: dict[int, Operand]) -> None:
+            self._sample(b, lanes, lane, found, given)
+
+        made = march(lane, self.attempt, take, proceed, watch, self.extra)
+        b.store(b.load(made, typ=INTEGER), given["attempts"])
+
+    def _sample(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        lane: Numbers,
+        found: dict[int, Operand],
+        given: dict[str, Operand],
+    ) -> None:
+        """Take every sample that lies in the attempt."""
+        options, task = self.record.options, self.record.task
+        one = sampling(self.eq, self.attempt, task, options.period)
+        graph = self.eq.graph
+        known = {self.attempt.left.id: found[self.attempt.left.id]}
+        for name, value in zip(COURSE, self.course.values, strict=True):
+            known[graph.input(f"course.{name}", 2).id] = found[value.id]
+        known[graph.input("length", 2).id] = found[self.attempt.length.id]
+        known[graph.input("taken", 2, "truth").id] = found[self.attempt.taken.id]
+        known[graph.input("clock", HELD).id] = lane.vector("clock")
+        phases = task.protocol.phases
+        with repeat(b) as leave_if:
+            for name in ("sample", *(f"sum_{phase.name}" for phase in phases)):
+                known[graph.input(f"record.{name}", 2).id] = lane.vector(name)
+            known |= self._exact_times(b, one, known)
+            outputs = [one.due, one.position, one.sample, *one.sums]
+            if one.ideal is not None:
+                # Whoever passes no sample looks nothing up.
+                known = lanes.emit(b, [one.due], known)
+                leave_if(b.not_(lanes.any(b, known[one.due.id])))
+                known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
+            taken = lanes.emit(b, outputs, known)
+            if one.ideal is None:
+                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
+            if self.traces:
+                number = known[graph.input("record.sample", 2).id]
+                index = b.fptoui(number, INTEGER)
+                where = offset(b, given["trace"], index)
+                b.store(widened(b, taken[one.position.id]), where)
+            lane.put_vector("sample", taken[one.sample.id])
+            for phase, value in zip(phases, one.sums, strict=True):
+                lane.put_vector(f"sum_{phase.name}", taken[value.id])
+
+    def _ideals(
+        self, b: Builder, lanes: Lanes, given: dict[str, Operand], samples: Operand
+    ) -> Operand:
+        """Ideal position at the next sample of every lane, from the table."""
+        found = []
+        for k in range(lanes.width):
+            index = b.fptoui(lanes.extract(b, samples, k), INTEGER)
+            where = offset(b, given["ideals"], index, self.element)
+            found.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
+        return self._gathered(b, lanes, found)
+
+    # -- what comes of it --------------------------------------------------------------------------
+
+    def _references(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        records: Operand,
+        lane: Operand | int,
+        ahead: int,
+        later: int,
+    ) -> Operand:
+        """References so many steps ahead, for a block or one lane."""
+        found = []
+        for k in range(lanes.width):
+            index = self._row(b, "count", k)
+            if lanes.width == 1:
+                index = b.add(index, integer(lane))
+            steps = self._count(b, offset(b, records, index, self.element))
+            row = b.add(steps, integer(ahead + later))
+            where = offset(b, given["references"], row, self.element)
+            found.append(b.load(where, typ=self.element))
+        return self._gathered(b, lanes, found)
+
+    def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
+        lanes = self._lanes(self.width)
+        records, tables = self._block(b, given, block)
+        entries = self.circuit.observation(self.kernel.observed, self.sensed)
+        options = self.record.options
+        steps = float(self.record.task.steps(options.control_rate_hz))
+        is_over = self.sensed["ended"] > 0.0
+        at_end = to_real(self.sensed["count"]) >= steps
+        truncated = at_end & ~is_over
+        values = [*self.sensed.values(), *entries, is_over, truncated]
+        known = self._known(b, lanes, values, records, tables, 0)
+        for ahead in range(options.preview + 1):
+            known[self.circuit.reference(ahead).id] = self._references(
+                b, lanes, given, records, 0, ahead, 1
+            )
+        found = lanes.emit(b, values, known)
+        self._store(b, lanes, found, self.sensed, records, 0)
+        first = b.mul(block, integer(self.width))
+        self._put_observation(b, lanes, given, found, entries, first)
+        for k in range(self.width):
+            index = b.add(first, integer(k))
+            reward = lanes.extract(b, found[self.sensed["reward"].id], k)
+            b.store(reward, offset(b, given["rewards"], index, self.element))
+            for name, truth in (("terminated", is_over), ("truncated", truncated)):
+                flag = b.zext(lanes.extract(b, found[truth.id], k), ir.IntType(8))
+                b.store(flag, offset(b, given[name], index, ir.IntType(8)))
+        # Lanes beyond the last environment never end: their records are copies of a rest.
+        any_over = b.zext(lanes.any(b, found[is_over.id]), INTEGER)
+        any_end = b.zext(lanes.any(b, found[truncated.id]), INTEGER)
+        both = b.or_(any_over, b.shl(any_end, integer(1)))
+        b.store(b.or_(b.load(ended, typ=INTEGER), both), ended)
+
+    def _put_observation(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        found: dict[int, Operand],
+        entries: Sequence[Value],
+        first: Operand,
+    ) -> None:
+        for i, entry in enumerate(entries):
+            for k in range(lanes.width):
+                number = lanes.extract(b, found[entry.id], k)
+                row = b.mul(b.add(first, integer(k)), integer(len(entries)))
+                where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
+                b.store(narrowed(b, number, FLOAT), where)
+
+    def _begin(self) -> None:
+        """Begin trials of environments whose states, key and episode are set: zero the sensors."""
+        b, (arguments,) = function(self.module, "begin", [("arguments", POINTER)])
+        given = self._arguments(b, arguments)
+        lanes = Lanes(1, fused=FUSED)
+        with loop(b, given["last"], given["first"]) as row:
+            index = b.load(offset(b, given["indices"], row, INTEGER), typ=INTEGER)
+            lane = b.srem(index, integer(self.width))
+            records, tables = self._block(b, given, b.sdiv(index, integer(self.width)))
+            self._zero_sensors(b, lanes, records, tables, lane)
+            self._first(b, lanes, given, records, tables, lane, index)
+        b.ret_void()
+
+    def _zero_sensors(
+        self, b: Builder, lanes: Lanes, records: Operand, tables: Operand, lane: Operand
+    ) -> None:
+        readings = TARE_READINGS if self.record.options.noise else 1
+        known = self._known(b, lanes, self.tare, records, tables, lane)
+        totals = [memory(b, DOUBLE) for _ in range(2)]
+        for total in totals:
+            b.store(ir.Constant(DOUBLE, 0.0), total)
+        with loop(b, readings) as k:
+            known[self.eq.graph.input("reading", 2, "integer").id] = k
+            found = lanes.emit(b, self.tare, known)
+            for total, value in zip(totals, self.tare[:2], strict=True):
+                reading = widened(b, found[value.id])
+                b.store(b.fadd(b.load(total, typ=DOUBLE), reading), total)
+        for total, name in zip(totals, ("tare_contraction", "tare_rotation"), strict=True):
+            mean = b.fmul(b.load(total, typ=DOUBLE), ir.Constant(DOUBLE, 1.0 / readings))
+            at = b.add(self._row(b, name), lane)
+            b.store(narrowed(b, mean, self.element), offset(b, records, at, self.element))
+
+    def _first(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        records: Operand,
+        tables: Operand,
+        lane: Operand,
+        index: Operand,
+    ) -> None:
+        options = self.record.options
+        entries = self.circuit.observation(self.kernel.observed, self.begun)
+        values = [*self.begun.values(), *entries]
+        known = self._known(b, lanes, values, records, tables, lane)
+        for ahead in range(options.preview + 1):
+            known[self.circuit.reference(ahead).id] = self._references(
+                b, lanes, given, records, lane, ahead, 0
+            )
+        found = lanes.emit(b, values, known)
+        self._store(b, lanes, found, self.begun, records, lane)
+        self._put_observation(b, lanes, given, found, entries, index)
