@@ -35,9 +35,10 @@ from pma_gym.plant.compose import Equations
 from pma_gym.plant.march import Layout
 from pma_gym.plant.model import PLANTS, Model, load_model
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.program import Program, System, structure, table
+from pma_gym.plant.program import Program, structure, table
 from pma_gym.plant.rosenbrock import VELDHUIZEN, Method, step
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.system import System
 
 MODEL, PRESSURE, CONTROL_STEPS = "station", 350e3, 60
 TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)

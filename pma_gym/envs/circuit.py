@@ -19,7 +19,7 @@ from pma_gym.kernels.substitute import substitute
 from pma_gym.plant import sensors
 from pma_gym.plant.attempt import first_size
 from pma_gym.plant.compose import COMMANDS, ZERO, Equations
-from pma_gym.plant.program import at_rest
+from pma_gym.plant.system import at_rest
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 

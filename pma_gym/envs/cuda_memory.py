@@ -14,7 +14,7 @@ from pma_gym.kernels.random import philox, uniform
 from pma_gym.kernels.substitute import substitute
 from pma_gym.kernels.trace import live_inputs
 from pma_gym.plant.march import FUSED
-from pma_gym.plant.program import static_force
+from pma_gym.plant.system import static_force
 
 
 class ThreadMemory(Writer):

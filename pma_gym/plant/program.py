@@ -6,7 +6,6 @@ as a vector when they run. So a drawn station, or a fit's next guess, compiles n
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -21,19 +20,19 @@ from pma_gym.kernels.control import (
     Operand,
     function,
     integer,
-    intrinsic,
     loop,
     offset,
 )
-from pma_gym.kernels.graph import CHANGING, FIXED, Value
+from pma_gym.kernels.graph import FIXED, Value
 from pma_gym.kernels.llvm import Lanes
 from pma_gym.kernels.native import compiled
 from pma_gym.kernels.substitute import substitute
 from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.attempt import Attempt, attempt, first_size
 from pma_gym.plant.compose import COMMANDS, ZERO, Equations
-from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
+from pma_gym.plant.march import memory
 from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.system import System, at_rest, rates, static_force, system
+from pma_gym.plant.trial_kernel import write_simulate
 
 WIDTH = 16
 """Lanes of the kernels for many plants: two registers of AVX-512, the fastest measured."""
@@ -42,31 +41,6 @@ FIRST_S = 7e-4
 """First attempt at a step from rest (s)."""
 
 _POINTER, _INTEGER, _REAL = ctypes.c_void_p, ctypes.c_int64, ctypes.c_double
-
-
-@dataclass(frozen=True)
-class System:
-    """A model's equations with the arithmetic of one step.
-
-    Attributes:
-        equations: the equations.
-        attempt: one attempt at a step.
-        layout: what a lane works on.
-    """
-
-    equations: Equations
-    attempt: Attempt
-    layout: Layout
-
-
-def system(model: Model, ramped: bool) -> System:
-    """A model's equations and step; with `ramped`, commands change linearly in time."""
-    plant = PLANTS[model.plant]
-    equations = Equations(model.effects, model.parameters, ramped)
-    plant.write_equations(equations)
-    equations.finish()
-    made = attempt(equations, plant.POSITIONS)
-    return System(equations, made, Layout.of(made))
 
 
 def parameter_names(model: Model) -> list[str]:
@@ -152,7 +126,7 @@ class Program:
         if self.model.plant == "station":
             self._balance(module)
         for width in (1, WIDTH):
-            _simulate(module, self.ramped, width)
+            write_simulate(module, self.ramped, width)
         return module
 
     def parameters(self, builder: Builder, vector: Operand, values: list[Value]) -> dict:
@@ -285,139 +259,6 @@ def balanced(
         b.store(b.select(pulls, c, middle), high)
     half = b.fadd(b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE))
     return b.fmul(ir.Constant(DOUBLE, 0.5), half)
-
-
-def at_rest(eq: Equations) -> dict[int, Value]:
-    """What paths and their direction are where a step begins, by id."""
-    here = {path.after.id: path.value for path in eq.paths}
-    if eq.travelled is not None and eq.paths:
-        here[eq["origin"].id] = eq.travelled[0]
-    return here
-
-
-def rates(eq: Equations) -> list[Value]:
-    """Rates of states, then of memories of the way: their slope along it, times the speed."""
-    from pma_gym.kernels.derivative import derivative
-    from pma_gym.plant.attempt import beginning
-
-    frozen, here = beginning(eq)
-    own = [state.rate for state in eq.states if state.name not in COMMANDS]
-    found = substitute(own, {**frozen, **here})
-    for path in eq.paths:
-        assert eq.travelled is not None
-        (slope,) = derivative(path.after, [eq.travelled[0]])
-        assert slope is not None
-        found.append(substitute([slope], frozen)[0] * eq.travelled[1])
-    return found
-
-
-def static_force(eq: Equations) -> Value:
-    """Force of the muscle on the slide at rest, without the cable, memories at zero."""
-    force = eq["muscle_force"] + eq["slide_force"]
-    nothing = eq.graph.constant(0.0)
-    memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
-    here = at_rest(eq) | {eq["velocity"].id: nothing}
-    (first,) = substitute([force], here)
-    return substitute([first], memories | {eq["velocity"].id: nothing})[0]
-
-
-JOB = ("rows", "joined", "time", "motor", "regulator", "table", "start", "out")
-"""Entries of a job of `simulate`: counts, then addresses. `start` holds the state vector, the size
-of the first step and the contraction x0; `out` takes the states, one row a time."""
-
-
-def _simulate(module: ir.Module, system: System, width: int) -> None:
-    """Whole trials, one after the other in every lane."""
-    eq, made = system.equations, system.attempt
-    b, (count, jobs, attempts) = function(
-        module,
-        f"simulate_{width}",
-        [("count", INTEGER), ("jobs", POINTER), ("attempts", POINTER)],
-    )
-    lanes = Lanes(width, fused=FUSED)
-    lane = Lane(b, lanes, system.layout)
-    following = memory(b, INTEGER)
-    b.store(integer(0), following)
-    rows = memory(b, ir.ArrayType(INTEGER, width))
-    n = len(eq.remembered)
-
-    def entry(job: Operand, name: str) -> Operand:
-        where = b.add(b.mul(job, integer(len(JOB))), integer(JOB.index(name)))
-        return b.load(offset(b, jobs, where, INTEGER), typ=INTEGER)
-
-    def address(job: Operand, name: str) -> Operand:
-        return b.inttoptr(entry(job, name), POINTER)
-
-    def at(job: Operand, name: str, row: Operand) -> Operand:
-        return b.load(offset(b, address(job, name), row), typ=DOUBLE)
-
-    jump = eq.graph.input("jump", CHANGING)
-    begun = first_size(made.size, jump)
-
-    def begin_row(k: Operand, job: Operand, row: Operand) -> None:
-        ahead = b.add(row, integer(1))
-        duration = b.fsub(at(job, "time", ahead), at(job, "time", row))
-        lane.put(made.left, k, duration)
-        joined = b.icmp_signed("!=", entry(job, "joined"), integer(0))
-        start = address(job, "start")
-        known = {eq[ZERO].id: b.load(offset(b, start, n + 1), typ=DOUBLE)}
-        moved: Operand = ir.Constant(DOUBLE, 0.0)
-        for name, column in zip(COMMANDS, ("motor", "regulator"), strict=True):
-            first, last = at(job, column, row), at(job, column, ahead)
-            slope = b.fdiv(b.fsub(last, first), duration)
-            known[eq.graph.input(f"{name}_slope", 1).id] = b.select(
-                joined, slope, ir.Constant(DOUBLE, 0.0)
-            )
-            lane.put(eq[name], k, first)
-            # A trial begins settled at its first commands: nothing jumps there.
-            before = b.select(b.icmp_signed(">", row, integer(0)), b.sub(row, integer(1)), row)
-            moves = intrinsic(b, "fabs", b.fsub(first, at(job, column, before)))
-            larger = b.fcmp_ordered(">", moves, moved)
-            moved = b.select(larger, moves, moved)
-        size = lane.get(made.size, k)
-        found = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
-        lane.put(made.size, k, b.select(joined, size, found[begun.id]))
-        lane.hold(k, known)
-        b.store(row, offset(b, rows, k, INTEGER))
-
-    def keep(k: Operand, job: Operand, row: Operand) -> None:
-        out = offset(b, address(job, "out"), b.mul(row, integer(n)))
-        for i, state in enumerate(eq.remembered):
-            b.store(lane.get(state.value, k), offset(b, out, i))
-
-    def take(k: Operand) -> Operand:
-        job = b.load(following, typ=INTEGER)
-        found = b.icmp_signed("<", job, count)
-        with b.if_then(found):
-            b.store(b.add(job, integer(1)), following)
-            b.store(job, lane.job(k))
-            start = address(job, "start")
-            for i, state in enumerate(eq.remembered):
-                lane.put(state.value, k, b.load(offset(b, start, i), typ=DOUBLE))
-            lane.put(made.size, k, b.load(offset(b, start, n), typ=DOUBLE))
-            lane.tabulate(k, address(job, "table"))
-            keep(k, job, integer(0))
-            begin_row(k, job, integer(0))
-        return found
-
-    def proceed(k: Operand) -> Operand:
-        job = b.load(lane.job(k), typ=INTEGER)
-        row = b.add(b.load(offset(b, rows, k, INTEGER), typ=INTEGER), integer(1))
-        keep(k, job, row)
-        more = b.icmp_signed("<", row, b.sub(entry(job, "rows"), integer(1)))
-        goes_on = memory(b, ir.IntType(1))
-        b.store(ir.Constant(ir.IntType(1), 1), goes_on)
-        with b.if_else(more) as (yes, no):
-            with yes:
-                begin_row(k, job, row)
-            with no:
-                b.store(lane.get(made.size, k), offset(b, address(job, "start"), n))
-                b.store(take(k), goes_on)
-        return b.load(goes_on, typ=ir.IntType(1))
-
-    made_ones = march(lane, made, take, proceed)
-    b.store(b.load(made_ones, typ=INTEGER), attempts)
-    b.ret_void()
 
 
 _programs: dict[tuple[str, ...], Program] = {}

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pma_gym.plant.program import FIRST_S, JOB, Program
+from pma_gym.plant.program import FIRST_S, Program
+from pma_gym.plant.trial_kernel import JOB
 
 FEW = 4
 """Fewer trials than this run in scalar code, whose single step is faster."""
