@@ -59,7 +59,9 @@ def hidden_effects_report(
     ],
     out: Annotated[
         Path | None,
-        typer.Option(help="Markdown or .html file; printed if not given.", callback=writable_out),
+        typer.Option(
+            help="Markdown, .html or .json file; printed if not given.", callback=writable_out
+        ),
     ] = None,
 ) -> None:
     """Write the figures of several blocks of hidden effects as one page of tables."""

@@ -142,7 +142,9 @@ def merged(documents: Sequence[dict[str, Any]]) -> dict[str, Any]:
     codes = Counter[str]()
     for document in documents:
         codes.update(document["code"])
-    seeds = sorted({document["seed"] for document in documents})
+    # A document that was merged before has a list of them.
+    given = [document["seed"] for document in documents]
+    seeds = sorted({s for each in given for s in (each if isinstance(each, list) else [each])})
     failures = [each for document in documents for each in document["failures"]]
     return {
         "schema": 1,

@@ -44,7 +44,9 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
 
 
 def report(document: dict[str, Any], suffix: str = ".md") -> str:
-    """A score as a page: Markdown, or HTML for the suffix `.html`."""
+    """A score as a page: Markdown, or HTML for the suffix `.html`; as it is for `.json`."""
+    if suffix == ".json":
+        return json.dumps(document, indent=1) + "\n"
     blocks = report_blocks(document)
     return to_html(blocks, {}) if suffix == ".html" else to_markdown(blocks, {}, "")
 

@@ -279,6 +279,10 @@ def test_a_page_has_every_block_once(whole, tmp_path):
     )
     assert CliRunner().invoke(app, [*call, "--out", str(tmp_path / "page.html")]).exit_code == 0
     assert "false alarm" in (tmp_path / "page.html").read_text("utf-8")
+    # As JSON it can be read again, and says the same.
+    kept = tmp_path / "kept.json"
+    assert CliRunner().invoke(app, [*call, "--out", str(kept)]).exit_code == 0
+    assert CliRunner().invoke(app, ["hidden-effects-report", str(kept)]).stdout == text
     twice = CliRunner().invoke(app, [*call, str(score)])
     assert twice.exit_code == 2 and "block nothing is in 2 of the files" in twice.stderr
     torn = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path / "page.html")])
