@@ -5,14 +5,22 @@ from typing import Any
 import typer.main
 
 import benchmarks.__main__
+import benchmarks.hidden_effects.__main__
+import benchmarks.hidden_effects.ways.__main__
 import pma_gym.cli
 from generators.text import code, table
 
 PROGRAMS = {
     "pma-gym": pma_gym.cli.app,
     "benchmarks": benchmarks.__main__.app,
+    "hidden_effects": benchmarks.hidden_effects.__main__.app,
+    "ways": benchmarks.hidden_effects.ways.__main__.app,
 }
-_CALLED = {"benchmarks": "python -m benchmarks"}
+_CALLED = {
+    "benchmarks": "python -m benchmarks",
+    "hidden_effects": "python -m benchmarks.hidden_effects",
+    "ways": "python -m benchmarks.hidden_effects.ways",
+}
 
 
 def commands(program: str) -> str:
