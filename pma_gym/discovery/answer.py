@@ -25,7 +25,8 @@ from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
 from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover, tones
-from pma_gym.discovery.verdict import shapeless_laws, suspicious, telling, verdict_of
+from pma_gym.discovery.unknown import shapeless_laws, telling, why_unknown
+from pma_gym.discovery.verdict import suspicious, verdict_of
 from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.where import localise
 from pma_gym.plant.model import Model, Note
@@ -58,7 +59,8 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
     fit = found.selection.fit
     parameters = _moved(found, fit) if found.fewest is None else _off(found, found.fewest.fit)
     off = any(moved.significant for moved in parameters.values())
-    verdict = verdict_of(found, left, laws, blind, bool(coarse), off)
+    unknown = why_unknown(found, left, laws)
+    verdict = verdict_of(found, unknown, blind, bool(coarse), off)
     effects = (*_effects(found), *coarse) if verdict == "effect" else ()
     model = _amended(found, verdict)
     tell("putting the answer together", 1, 3)
@@ -95,7 +97,7 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         warnings=_warnings(found),
     )
     return replace(
-        diagnosis, sentence=sentence(diagnosis, left.most), steps=steps(found, diagnosis, left.most)
+        diagnosis, sentence=sentence(diagnosis, unknown), steps=steps(found, diagnosis, left)
     )
 
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pma_gym.discovery.bursts import NO_BURSTS, Bursts, bursts
 from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.excess import memory
+from pma_gym.discovery.excess import Memory, memory
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.noise import Whitening, autoregression, step_between
 from pma_gym.discovery.suspects import Suspect
@@ -52,16 +52,21 @@ def left_over(evidence: Evidence, readings: Sequence[Array]) -> list[Array]:
 
 
 def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
-    """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden.
+    """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden."""
+    return any(each.sure for each in memories(bench, fit, chosen).values())
 
-    Not beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts are
-    taken from readings, so that what is left remembers their noise.
+
+def memories(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> dict[str, Memory]:
+    """What the rest that a fit leaves of each output remembers of itself.
+
+    Nothing beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts
+    are taken from readings, so that what is left remembers their noise.
     """
     if not _tells(bench):
-        return False
+        return {}
     left = residuals(bench.evidence(fit.model, chosen), fit)
     rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))
-    return any(memory([part[c] for part in left], rate).sure for c in range(len(OUTPUTS)))
+    return {name: memory([part[c] for part in left], rate) for c, name in enumerate(OUTPUTS)}
 
 
 def burst_of(bench: Bench, fit: Fitted) -> Bursts:

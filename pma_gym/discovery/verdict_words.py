@@ -7,6 +7,9 @@ from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
+from pma_gym.discovery.slowness import Left
+from pma_gym.discovery.unknown import Reason
+from pma_gym.discovery.unknown_words import unknown_words
 from pma_gym.discovery.verdict import BLIND_SHARE, MOST_RIVALS, MOVED_CHANGE
 from pma_gym.discovery.words import (
     chance,
@@ -26,8 +29,13 @@ ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""
 
 
-def sentence(diagnosis: Diagnosis, left: float) -> str:
-    """The verdict as a person would say it."""
+def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
+    """The verdict as a person would say it.
+
+    Args:
+        diagnosis: the diagnosis.
+        unknown: why its verdict is `unknown`; None where it is another.
+    """
     count = len(diagnosis.trials)
     trials = f"{count} trial{'s' if count != 1 else ''}"
     name = diagnosis.given.name
@@ -51,12 +59,8 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
         if rest:
             return f"No parameter of model {name} is off by much in these {trials}, but {rest}."
         return f"Model {name} agrees with these {trials}: what is left is the noise of the sensors."
-    if diagnosis.verdict == "unknown":
-        return (
-            f"Something is missing in model {name} that no effect of the catalogue carries: of "
-            f"what is slow in the residual of these {trials}, the best leaves "
-            f"{percent(min(left, 1.0))}."
-        ) + _tones(diagnosis)
+    if unknown is not None:
+        return unknown_words(diagnosis, unknown, trials)
     if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
         if len(equal) <= MOST_RIVALS:
@@ -80,14 +84,6 @@ def sentence(diagnosis: Diagnosis, left: float) -> str:
         f"These {trials} cannot tell whether model {name} misses anything: "
         f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
     ) + _propose(diagnosis)
-
-
-def _tones(diagnosis: Diagnosis) -> str:
-    rings = [
-        f"{signal_name(signal)} rings at {figure(hertz)} Hz"
-        for signal, hertz in diagnosis.tones.items()
-    ]
-    return f" What is left of {' and that of '.join(rings)}." if rings else ""
 
 
 def _propose(diagnosis: Diagnosis) -> str:
@@ -197,7 +193,7 @@ def twin(path: str, fit: Fitted) -> str | None:
     return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
 
 
-def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]:
+def steps(found: Findings, diagnosis: Diagnosis, left: Left) -> tuple[str, ...]:
     """What was done, a sentence each."""
     bench, selection = found.bench, found.selection
     said = [
@@ -226,8 +222,9 @@ def steps(found: Findings, diagnosis: Diagnosis, left: float) -> tuple[str, ...]
         )
     if selection.chosen:
         said.append(
-            f"Of what was slow in the residual, {percent(left)} is left by "
-            f"{effect_names([suspect.name for suspect in selection.chosen])}."
+            f"Of what was slow in the residual, {percent(left.slow)} is left by "
+            f"{effect_names([suspect.name for suspect in selection.chosen])}; of what it "
+            f"remembered of itself, {percent(left.remembered)}."
         )
     if found.fewest is not None:
         said.append(_named(len(found.fewest.fit.paths), len(bench.own.free), diagnosis.verdict))

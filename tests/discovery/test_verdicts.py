@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery import verdict
+from pma_gym.discovery import unknown, verdict
+from pma_gym.discovery.excess import SURE, Memory
+from pma_gym.discovery.slowness import Left
+from pma_gym.discovery.unknown import Reason
 from pma_gym.discovery.verdict_words import sentence
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
@@ -175,9 +178,172 @@ def test_trials_left_out_bear_an_effect_out_together_or_in_most_folds(with_it, w
 
 def test_an_effect_that_is_not_borne_out_is_said_to_be_likeliest():
     found = replace(diagnosed("hysteresis"), verdict="undecidable")
-    said = sentence(found, 0.0)
+    said = sentence(found)
     assert "misses something, hysteresis" in said and "most likely" in said
     assert "left out of these 3 trials does not bear it out" in said
+
+
+UNKNOWN = {
+    "slow": (
+        Reason("slow", 0.734, 0.35, ("hysteresis",), leaves=0.734),
+        "the best, hysteresis, leaves 73 % of what is slow in the residual of these 3 trials, "
+        "where at most 35 % may be left.",
+    ),
+    "slow, hardly": (
+        Reason("slow", 0.352, 0.35, ("hysteresis", "slow_creep"), leaves=0.352),
+        "the best, hysteresis and slow creep, leave just over 35 % of what is slow in the residual "
+        "of these 3 trials, where at most 35 % may be left.",
+    ),
+    "slow, nothing added": (
+        Reason("slow", 1.02, 0.35, nearest="creep", leaves=0.98),
+        "none was worth adding (the likeliest, creep, would leave 98 % of chi-square), so 100 % of "
+        "what is slow in the residual of these 3 trials is left, where at most 35 % may be.",
+    ),
+    "remembered": (
+        Reason("remembered", 0.21, 0.1, ("hysteresis",), leaves=0.06),
+        "the best, hysteresis, leaves 6 % of what is slow in the residual of these 3 trials, but "
+        "21 % of what it remembers of itself is left, where at most 10 % may be.",
+    ),
+    "scatters between trials": (
+        Reason("scatters", 0.34, 0.12, ("hysteresis",), leaves=0.01, of="hysteresis", by="trial"),
+        "the best, hysteresis, leaves 1 % of what is slow in the residual of these 3 trials, but "
+        "the size of hysteresis scatters from trial to trial by 34 %, where that of the right law "
+        "does by 12 % at most.",
+    ),
+    "scatters with the load": (
+        Reason(
+            "scatters", 4e8, 0.12, ("creep", "slow_creep"), leaves=0.0, of="slow_creep", by="load"
+        ),
+        "the best, creep and slow creep, leave 0 % of what is slow in the residual of these 3 "
+        "trials, but the size of slow creep scatters with the load by more than 10 times itself, "
+        "where that of the right law does by 12 % at most.",
+    ),
+    "outdone": (
+        Reason(
+            "outdone", 812.4, 483.0, ("creep",),
+            leaves=0.16, of="residual_force_of_contraction", gain=420.0,
+        ),
+        "the best, creep, leaves 16 % of what is slow in the residual of these 3 trials, but a "
+        "force on the slide drawn freely over contraction explains more: it lowers chi-square by "
+        "812, they by 420, and up to 483 would be no better.",
+    ),
+    "unexplained": (
+        Reason("unexplained", 14.2, 6.0, nearest="creep", leaves=0.983, of="rotation_deg"),
+        "none was worth adding (the likeliest, creep, would leave 98 % of chi-square), and the "
+        "residual of these 3 trials remembers itself in rotation of the pulley: by 14.2 standard "
+        "errors, where chance stays below 6.",
+    ),
+    "unexplained, nothing to try": (
+        Reason("unexplained", 14.2, 6.0, of="load_n"),
+        "there was none to try, and the residual of these 3 trials remembers itself in load: by "
+        "14.2 standard errors, where chance stays below 6.",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("reason", "said"), UNKNOWN.values(), ids=UNKNOWN)
+def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limit(reason, said):
+    found = replace(diagnosed("hysteresis"), verdict="unknown", tones={"load_n": 12.5})
+    head = "Something is missing in model lab that no effect of the catalogue carries: "
+    tone = " What is left of load rings at 12.5 Hz."
+    assert sentence(found, reason) == head + said + tone
+
+
+def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
+    """Findings of which the best look, or fit, takes `gain` off a chi-square of 1000."""
+    fit = SimpleNamespace(chi_square=1000.0 - gain)
+    stage = SimpleNamespace(
+        gate=("some",) if gate else (),
+        missing=missing,
+        bench=None,
+        before=SimpleNamespace(chi_square=1000.0),
+        fits={"creep": fit, "filling": SimpleNamespace(chi_square=990.0)} if gate else {},
+        looks=[SimpleNamespace(suspect=SimpleNamespace(name="lvdt_error"), gain=gain)],
+    )
+    before = SimpleNamespace(
+        evidence=lambda _: SimpleNamespace(
+            sums=lambda *_: SimpleNamespace(chi_square=1000.0), logged=()
+        )
+    )
+    selection = SimpleNamespace(
+        stages=(stage,),
+        chosen=tuple(SimpleNamespace(name=name) for name in chosen),
+        fit=fit,
+        bench=before,
+    )
+    return SimpleNamespace(
+        selection=selection,
+        refitted=SimpleNamespace(model=None, values=None),
+        rivals=(),
+        unseen=None,
+        unseen_without=None,
+    )
+
+
+@pytest.fixture
+def same_size(monkeypatch):
+    """The scatter of each effect's size, by condition; as many as are in it, in turn."""
+    sizes = [{"trial": 0.12, "load": 0.0}, {"trial": 0.0, "load": 0.1}]
+    monkeypatch.setattr(unknown, "spreads", lambda bench, fit, chosen, place: sizes[place])
+    return sizes
+
+
+def test_what_is_within_its_limits_is_not_unknown(same_size):
+    left, law = Left(unknown.MOST_LEFT, unknown.MOST_REMEMBERED), SimpleNamespace(gain=260.0)
+    found = made_up()
+    assert unknown.why_unknown(found, left, [law]) is None
+    assert verdict.verdict_of(found, None, (), False, False) == "effect"
+
+
+@pytest.mark.parametrize(
+    ("left", "why", "figure", "limit"),
+    [
+        (Left(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
+        (Left(0.1, 0.5), "remembered", 0.5, unknown.MOST_REMEMBERED),
+    ],
+)
+def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):
+    found = made_up(("creep", "filling"))
+    reason = unknown.why_unknown(found, left, [])
+    assert (reason.why, reason.figure, reason.limit) == (why, figure, limit)
+    assert (reason.effects, reason.leaves) == (("creep", "filling"), left.slow)
+    assert verdict.verdict_of(found, reason, (), False, False) == "unknown"
+
+
+def test_a_size_that_scatters_is_told_by_where_it_scatters_most(same_size):
+    same_size[1].update(pressure=0.2, contraction=0.5)
+    reason = unknown.why_unknown(made_up(("creep", "filling")), Left(0.01, 0.0), [])
+    assert (reason.why, reason.of, reason.by) == ("scatters", "filling", "contraction")
+    assert (reason.figure, reason.limit) == (0.5, unknown.MOST_SPREAD)
+
+
+@pytest.mark.parametrize(("gain", "limit"), [(200.0, 260.0), (600.0, 690.0)])
+def test_a_law_that_explains_more_is_named_with_both_gains(same_size, gain, limit):
+    law = SimpleNamespace(gain=limit + 1.0, name="residual_load")
+    reason = unknown.why_unknown(made_up(gain=gain), Left(0.1, 0.0), [law])
+    assert (reason.why, reason.of) == ("outdone", "residual_load")
+    assert (reason.figure, reason.limit, reason.gain) == (law.gain, pytest.approx(limit), gain)
+
+
+@pytest.mark.parametrize(("gate", "nearest"), [(True, "creep"), (False, "lvdt_error")])
+def test_what_remembers_itself_with_nothing_added_is_told_by_its_surest_signal(
+    monkeypatch, gate, nearest
+):
+    kept = {"contraction": 7.0, "rotation": 30.0, "load": 40.0, "pressure": 9.0}
+    memories = {
+        name: Memory(0.0 if name == "load" else 0.2, score, 1.0) for name, score in kept.items()
+    }
+    monkeypatch.setattr(unknown, "memories", lambda bench, fit: memories)
+    reason = unknown.why_unknown(made_up((), gate=gate, missing=True), Left(0.0, 0.0), [])
+    assert (reason.why, reason.of) == ("unexplained", "rotation_deg")
+    assert (reason.figure, reason.limit) == (30.0, SURE)
+    assert (reason.effects, reason.nearest) == ((), nearest)
+    assert reason.leaves == pytest.approx(0.8)
+
+
+def test_nothing_added_and_nothing_slow_is_for_other_verdicts(same_size):
+    assert unknown.why_unknown(made_up(()), Left(0.0, 0.0), []) is None
+    assert unknown.why_unknown(made_up((), gate=False), Left(1.0, 1.0), []) is None
 
 
 def test_nothing_is_held_out_of_a_single_trial():
