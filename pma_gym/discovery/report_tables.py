@@ -15,6 +15,7 @@ from pma_gym.discovery.words import (
     readable,
     signal_name,
     signal_unit,
+    unit_cell,
 )
 from pma_gym.pages.document import TextTable
 
@@ -54,7 +55,7 @@ def effect_table(effect: NamedEffect) -> TextTable:
             f"`{name}`",
             estimate(known.value, known.low, known.high),
             interval(known),
-            _unit(known.unit),
+            unit_cell(known.unit),
         ]
         for name, known in effect.parameters.items()
     ]
@@ -71,7 +72,7 @@ def moved_table(parameters: Mapping[str, Moved], title: str = "Parameters refitt
             figure(moved.start, 4),
             estimate(moved.now.value, moved.now.low, moved.now.high),
             interval(moved.now),
-            _unit(moved.now.unit),
+            unit_cell(moved.now.unit),
             "yes" if moved.significant else "no",
         ]
         for path, moved in ordered
@@ -137,7 +138,3 @@ def confusion_table(effects: tuple[NamedEffect, ...]) -> TextTable:
         if each.confused_with
     ]
     return TextTable("Not told apart by these data", ["Named", "Also possible"], rows, words=2)
-
-
-def _unit(unit: str) -> str:
-    return "" if unit == "1" else unit

@@ -23,6 +23,7 @@ from pma_gym.discovery.words import (
     readable,
     signal_name,
     signal_unit,
+    unit_cell,
     what_to_do,
 )
 
@@ -107,7 +108,7 @@ def print_fit(diagnosis: Diagnosis) -> None:
         now = moved.now
         value = estimate(now.value, now.low, now.high)
         note = unknown.pop(path, "differs" if moved.significant else "")
-        cells = (path, figure(moved.start, 4), value, interval(now), now.unit, note)
+        cells = (path, figure(moved.start, 4), value, interval(now), unit_cell(now.unit), note)
         table.add_row(*map(escape, cells))
     for path, note in unknown.items():
         table.add_row(escape(path), "", "", "", "", escape(note))

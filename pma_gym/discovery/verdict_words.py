@@ -171,8 +171,8 @@ def unidentified(path: str, fit: Fitted, own: Own) -> str:
         return f"{other} does the same to the signals"
     prior = own.prior[own.free.index(path)]
     return (
-        f"these trials hold it to {spread[at]:.2g} {unit(path)}, hardly less than the "
-        f"{prior:.2g} that was assumed beforehand"
+        f"these trials hold it to {with_unit(f'{spread[at]:.2g}', unit(path))}, hardly less than "
+        f"the {prior:.2g} that was assumed beforehand"
     )
 
 

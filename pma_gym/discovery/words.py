@@ -106,6 +106,15 @@ def signal_unit(signal: str) -> str:
     return BY_NAME[signal].unit
 
 
+def unit_cell(unit: str) -> str:
+    """A unit in a column of units, which a pure number leaves blank.
+
+    >>> unit_cell("N/mm"), unit_cell("1")
+    ('N/mm', '')
+    """
+    return "" if unit == "1" else unit
+
+
 def door_name(quantity: str) -> str:
     """`contraction` is `contraction_mm` at the door."""
     return BY_QUANTITY[quantity].name
