@@ -9,6 +9,7 @@ pressure is then foretold from the others, by the fit's own derivatives.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import prior, values
 from pma_gym.discovery.suspects import Suspect, bounds, suspects
 from pma_gym.metrics import PHASE_DURATION, regression
-from pma_gym.plant.model import Model
+from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import OUTPUTS, Plant
 from pma_gym.units import SI_FACTORS
 
@@ -31,8 +32,8 @@ Array = NDArray[np.float64]
 RATE_HZ = 60.0
 """Rows a second of a simulated trial: the printed voltages fall on them."""
 
-PULLEY_M = 25.4e-3
-"""What makes an angle comparable with a way (m)."""
+PRINTED = "serres2008"
+"""The model with the dissertation's pulley."""
 
 PARAMETERS = (
     "drive.gain_n_per_v",
@@ -160,8 +161,8 @@ class Summary:
         trials: the commands, one trial a profile.
         tasks: task of each trial.
         pressure: of each residual (kPa), shape (n,).
-        task: whether each residual is of a rotation, shape (n,).
-        measured: slope, mid-phase position and roughness of all phases, in mm, shape (n,).
+        rotation: whether each residual is of a rotation, shape (n,).
+        figures: slope, mid-phase position and roughness of all phases, in mm, shape (n,).
     """
 
     trials: list[Trial]
@@ -213,7 +214,7 @@ class Summary:
             position = (
                 (contraction[0] - contraction) * 1e3
                 if task == "displacement"
-                else signals[OUTPUTS.index("rotation")] * PULLEY_M * 1e3
+                else signals[OUTPUTS.index("rotation")] * pulley() * 1e3
             )
             for number in range(len(PHASES[task])):
                 begin = PHASE_DURATION * number
@@ -284,7 +285,16 @@ class Summary:
 
 def _millimetres(task: str) -> float:
     """Millimetres at the muscle in the unit that a task is measured in."""
-    return 1.0 if task == "displacement" else SI_FACTORS["deg"] * PULLEY_M * 1e3
+    return 1.0 if task == "displacement" else SI_FACTORS["deg"] * pulley() * 1e3
+
+
+@cache
+def pulley() -> float:
+    """Radius of the dissertation's pulley (m), which makes an angle comparable with a way.
+
+    Not that of the model that is explained: it is fitted too, and would change the scale.
+    """
+    return load_model(PRINTED).parameters["rotor"].radius
 
 
 def _rms(left: Array) -> float:
