@@ -51,6 +51,7 @@ def measured(
         Path | None,
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
     ] = None,
+    again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.job import run_measured, write_trials
@@ -63,7 +64,7 @@ def measured(
         print(f"{write_trials(write)} trials in {write}")
         return
     try:
-        run_measured(out, jobs, seed, rounds or MOST_ROUNDS)
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, again=again)
     except KeyboardInterrupt:
         print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None

@@ -1,6 +1,5 @@
 """`python -m benchmarks hidden-effects`: draw and diagnose a block, case by case; count."""
 
-import hashlib
 import json
 import sys
 import time
@@ -10,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.comparison.fingerprint import code_digest
+from benchmarks.comparison.fingerprint import code_digest_with
 from benchmarks.files import write_text
 from benchmarks.hidden_effects import records, scoring
 from benchmarks.hidden_effects.asking import Judge, diagnosed
@@ -183,11 +182,8 @@ def json_text(document: dict[str, Any]) -> str:
 
 def fingerprint() -> str:
     """Of all code that a record depends on: the package's and the generator's."""
-    digest = hashlib.sha256(code_digest().encode())
     here = Path(__file__).parent
-    for path in sorted([*here.glob("*.py"), *(here / "physics").glob("*.py")]):
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:16]
+    return code_digest_with(sorted([*here.glob("*.py"), *(here / "physics").glob("*.py")]))
 
 
 class Progress:

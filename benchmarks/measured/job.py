@@ -18,6 +18,7 @@ from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
 from benchmarks.measured.smooth import smooth_errors
+from benchmarks.measured.stages import Stages
 from benchmarks.measured.steps import Step, folds, steps
 from benchmarks.measured.tables import print_measured
 from benchmarks.measured.trials import measured_dataset
@@ -74,7 +75,7 @@ class Measured:
         reverse: what explains the misfit of the identified station in tables 21-30, round by round.
         held: models against the validation under triangular pressure.
         seconds: how long this run took (s), without stages kept from an earlier one.
-        settings: what was diagnosed.
+        settings: what was diagnosed, and how many stages which code made.
     """
 
     rounds: list[Round]
@@ -96,6 +97,7 @@ def run_measured(
     seed: int = 0,
     most: int = MOST_ROUNDS,
     console: Console | None = None,
+    again: bool = False,
 ) -> Measured:
     """Diagnose, judge and write.
 
@@ -106,15 +108,18 @@ def run_measured(
         seed: of simulated chance.
         most: most diagnoses, one after the other.
         console: where to print.
+        again: anew what other code made.
     """
     console, begun = console or Console(), time.perf_counter()
-    folder, given = out / "stages", load_model(GIVEN)
+    stages, given = Stages(out / "stages", again), load_model(GIVEN)
+    if others := stages.others():
+        console.print(others, highlight=False, markup=False, soft_wrap=True)
     few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
     with _bar(console) as tell:
         found, amended = rounds(
             (few, more),
             given,
-            folder,
+            stages,
             seed,
             jobs,
             lambda number: _prefixed(tell, f"round {number}: "),
@@ -127,7 +132,7 @@ def run_measured(
             amended,
             effects,
             (diagnosed(DIAGNOSED_KPA), *judged),
-            folder,
+            stages,
             jobs,
             lambda done, total: tell("effect by effect", done, total),
         )
@@ -140,11 +145,11 @@ def run_measured(
             jobs,
             lambda done, total: tell("pressures left out", done, total),
         )
-        final = load_model(folder / f"step_{len(stepped) - 1}.toml")
+        final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
         blind, proposals = undecidable(
             final, few, jobs, seed, lambda done, total: tell("what cannot be told", done, total)
         )
-        reverse = _reverse(folder, lambda done, total: tell("the reverse", done, total))
+        reverse = _reverse(stages, lambda done, total: tell("the reverse", done, total))
     models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
     held = held_against(models, given)
     seconds = time.perf_counter() - begun
@@ -159,7 +164,7 @@ def run_measured(
         reverse,
         held,
         seconds,
-        _settings(seed),
+        _settings(seed, stages),
     )
     write_text(out / "model.toml", stepped[-1].model)
     write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
@@ -169,18 +174,20 @@ def run_measured(
     return result
 
 
-def _reverse(folder: Path, progress: Callable[[int, int], None]) -> list[list[Explanation]]:
-    """What explains the misfit of the identified station, from the folder where it is there."""
-    path, model = folder / "reverse.json", load_model(STATION)
-    asked = digest([], model, "reverse 1")
-    if path.is_file():
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["asked"] == asked:
-            return [[Explanation(**each) for each in every] for every in kept["found"]]
+def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[Explanation]]:
+    """What explains the misfit of the identified station, from what is kept where it is there."""
+    model = load_model(STATION)
+    asked = digest([], model, "reverse")
+    kept = stages.kept("reverse", asked, _explanations)
+    if kept is not None:
+        return kept
     found = searched(model, REVERSE_ROUNDS, progress)
-    kept = {"asked": asked, "found": [[asdict(each) for each in every] for every in found]}
-    write_text(path, json.dumps(kept, indent=1))
+    stages.keep("reverse", asked, {"found": [[asdict(each) for each in every] for every in found]})
     return found
+
+
+def _explanations(found: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
+    return [[Explanation(**each) for each in every] for every in found]
 
 
 def diagnosed(
@@ -228,8 +235,9 @@ def write_trials(folder: Path) -> int:
     return len(data)
 
 
-def _settings(seed: int) -> dict[str, Any]:
+def _settings(seed: int, stages: Stages) -> dict[str, Any]:
     return {
+        "code": dict(stages.codes),
         "model": GIVEN,
         "seed": seed,
         "diagnosed_kpa": DIAGNOSED_KPA,

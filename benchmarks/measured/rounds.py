@@ -1,12 +1,11 @@
 """Diagnosis after diagnosis: the amended model of one round is what the next begins with."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from benchmarks.files import write_text
+from benchmarks.measured.stages import Stages
 from pma_gym.data.dataset import Dataset
 from pma_gym.discovery.diagnosis import ADDED, Diagnosis
 from pma_gym.discovery.journal import digest
@@ -55,7 +54,7 @@ class Round:
 def rounds(
     data: Sequence[Dataset],
     given: Model,
-    folder: Path,
+    stages: Stages,
     seed: int,
     jobs: int,
     progress: Callable[[int], Progress],
@@ -66,7 +65,7 @@ def rounds(
     Args:
         data: sets of trials, the smallest first: what is large shows in few, and is found sooner.
         given: the model to begin with.
-        folder: where finished rounds and fits are kept, from which an interrupted job goes on.
+        stages: finished rounds and fits, from which an interrupted job goes on.
         seed: of simulated chance.
         jobs: threads.
         progress: gives what is called with a round's steps.
@@ -79,7 +78,7 @@ def rounds(
     for some in data:
         while len(found) < most:
             number = len(found) + 1
-            each, model = _round(some, model, folder, seed, jobs, progress(number), number)
+            each, model = _round(some, model, stages, seed, jobs, progress(number), number)
             found.append(each)
             if not each.effects:
                 break
@@ -89,25 +88,25 @@ def rounds(
 def _round(
     data: Dataset,
     model: Model,
-    folder: Path,
+    stages: Stages,
     seed: int,
     jobs: int,
     progress: Progress,
     number: int,
 ) -> tuple[Round, Model]:
-    """A round and its amended model, from the folder where it is there."""
-    stage, amended = folder / f"round_{number}.json", folder / f"round_{number}.toml"
-    asked = digest([each.trial for each in data.trials], model, f"measured 2 seed {seed}")
-    if stage.is_file() and amended.is_file():
-        kept = json.loads(stage.read_text(encoding="utf-8"))
-        if kept.pop("asked", "") == asked:
-            return Round(**kept), load_model(amended)
+    """A round and its amended model, from what is kept where it is there."""
+    name = f"round_{number}"
+    amended = stages.folder / f"{name}.toml"
+    asked = digest([each.trial for each in data.trials], model, f"measured, seed {seed}")
+    kept = stages.kept(name, asked, Round) if amended.is_file() else None
+    if kept is not None:
+        return kept, load_model(amended)
     diagnosis = diagnose(
-        data, model, seed=seed, jobs=jobs, journal=folder / "journal", progress=progress
+        data, model, seed=seed, jobs=jobs, journal=stages.journal, progress=progress
     )
     found = round_of(diagnosis, len(data))
     write_text(amended, dump_model(diagnosis.model if found.effects else model))
-    write_text(stage, json.dumps({"asked": asked, **asdict(found)}, indent=1))
+    stages.keep(name, asked, asdict(found))
     # As it is read again, so that a job that goes on ends as one that was not interrupted.
     return found, load_model(amended)
 

@@ -1,6 +1,5 @@
 """Effect by effect: the error on whole pressures that took no part, and on other tables."""
 
-import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -8,6 +7,7 @@ from pathlib import Path
 from benchmarks.files import write_text
 from benchmarks.measured.held_out import AT_LOAD, FIGURES, Rig, limit_errors, rms, worked
 from benchmarks.measured.replays import Replay, replays
+from benchmarks.measured.stages import Stages
 from pma_gym.data.dataset import Dataset
 from pma_gym.discovery.journal import digest
 from pma_gym.plant.model import Model, dump_model
@@ -41,7 +41,7 @@ def steps(
     amended: Model,
     effects: Sequence[str],
     data: tuple[Dataset, Dataset, Dataset],
-    folder: Path,
+    stages: Stages,
     jobs: int,
     progress: Callable[[int, int], None],
 ) -> list[Step]:
@@ -52,7 +52,7 @@ def steps(
         amended: with all effects, where fits begin.
         effects: in the order in which a diagnosis added them.
         data: what models are fitted to; I3's trials at those pressures; those at other pressures.
-        folder: where finished steps are kept.
+        stages: finished steps.
         jobs: threads.
         progress: called with what is done and the total.
     """
@@ -64,14 +64,13 @@ def steps(
     for number, name in enumerate(names):
         progress(number, len(names))
         some = tuple(effects[: max(number - 1, 0)])
-        asked = digest(trials, amended, f"steps 2 {name} {some}")
-        kept = _kept(folder / f"step_{number}.json", asked)
-        if kept is None:
+        asked, stage = digest(trials, amended, f"steps {name} {some}"), f"step_{number}"
+        step = stages.kept(stage, asked, Step)
+        if step is None:
             model = given if name == AS_GIVEN else _fitted(rig, some, amended)
-            kept = _judged(name, some, model, seen, unseen, folder / f"step_{number}.toml")
-            text = json.dumps({"asked": asked, **asdict(kept)}, indent=1)
-            write_text(folder / f"step_{number}.json", text)
-        found.append(kept)
+            step = _judged(name, some, model, seen, unseen, stages.folder / f"{stage}.toml")
+            stages.keep(stage, asked, asdict(step))
+        found.append(step)
     progress(len(names), len(names))
     return found
 
@@ -137,10 +136,3 @@ def _judged(
 
 def _plain(replay: Replay) -> dict[str, object]:
     return {key: value for key, value in asdict(replay).items() if key != "errors"}
-
-
-def _kept(path: Path, asked: str) -> Step | None:
-    if not path.is_file():
-        return None
-    entry = json.loads(path.read_text(encoding="utf-8"))
-    return Step(**entry) if entry.pop("asked", "") == asked else None

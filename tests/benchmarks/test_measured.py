@@ -6,7 +6,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from rich.console import Console
+from typer.testing import CliRunner
 
+from benchmarks.__main__ import app
+from benchmarks.measured import job
 from benchmarks.measured import rounds as of_rounds
 from benchmarks.measured.blind import Proposal, Undecidable
 from benchmarks.measured.held_out import limit_errors, repeat_scatter, rms, worked
@@ -22,6 +25,7 @@ from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import NOTHING, Explanation, Summary
 from benchmarks.measured.rounds import Round, rounds
 from benchmarks.measured.smooth import smooth_errors
+from benchmarks.measured.stages import Stages
 from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
 from benchmarks.measured.trials import measured_dataset
@@ -148,23 +152,89 @@ def asked(monkeypatch):
     return models
 
 
-def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
+def diagnose_small(folder, code="this", again=False):
+    """Rounds of a few trials, by some code; and what it took."""
+
+    def silent(*_):
+        """No progress."""
+
     data = measured_dataset((150.0,), (75.0,), steps=0)
+    stages = Stages(folder, again, code)
+    told = stages.others()
+    return *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent), stages, told
 
-    def run():
-        def silent(*_):
-            """No progress."""
 
-        return rounds((data,), load_model("serres2008"), tmp_path, 0, 1, lambda _: silent)
-
-    found, model = run()
+def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
+    found, model, _, told = diagnose_small(tmp_path)
     assert [each.effects for each in found] == [("cable_slack",), ()]
     assert model.parameters["cable"].slack == pytest.approx(1e-3)
-    assert len(asked) == 2
-    again, same = run()
+    assert len(asked) == 2 and not told
+    again, same, stages, told = diagnose_small(tmp_path)
     assert len(asked) == 2, "a finished round is not asked again"
     assert (again[0].effects, again[1].verdict) == (["cable_slack"], "agrees")
     assert same.parameters == model.parameters
+    assert stages.codes == {"this": 2} and not told
+
+
+def test_rounds_of_other_code_are_told_and_used_unless_made_anew(tmp_path, asked):
+    diagnose_small(tmp_path, "older")
+    *_, stages, told = diagnose_small(tmp_path, "newer")
+    assert len(asked) == 2 and stages.codes == {"older": 2}
+    assert told == (
+        f"2 of 2 stages kept in {tmp_path} are by other code than this (--again makes those anew)"
+    )
+    *_, stages, told = diagnose_small(tmp_path, "newer", again=True)
+    assert len(asked) == 4 and stages.codes == {"newer": 2} and not told
+    *_, stages, told = diagnose_small(tmp_path, "newer", again=True)
+    assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --again goes on"
+
+
+def test_a_stage_answers_its_own_question_and_has_what_it_needs(tmp_path):
+    stages = Stages(tmp_path, code="this")
+    stages.keep("step_1", "question", {"fitted": 1.5})
+
+    def made(fitted):
+        return fitted
+
+    def made_otherwise(fitted, judged):
+        """A stage of which other code keeps more."""
+
+    assert stages.kept("step_1", "question", made) == 1.5
+    assert stages.kept("step_1", "another", made) is None
+    assert stages.kept("step_2", "question", made) is None
+    assert stages.kept("step_1", "question", made_otherwise) is None
+
+
+def test_a_reverse_that_is_kept_is_not_searched_again(tmp_path, monkeypatch):
+    searches, explained = (
+        [],
+        [[Explanation(NOTHING, {"rotor.radius_mm": 29.7}, 1.0, 2.0, 3.0, 4.0)]],
+    )
+
+    def searched(*_):
+        searches.append(1)
+        return explained
+
+    monkeypatch.setattr(job, "searched", searched)
+    for _ in range(2):
+        assert job._reverse(Stages(tmp_path, code="this"), None) == explained
+    assert len(searches) == 1
+    assert job._reverse(Stages(tmp_path, True, "newer"), None) == explained
+    assert len(searches) == 2
+
+
+def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
+    older, newer = Stages(tmp_path, code="older"), Stages(tmp_path, code="newer")
+    assert older.journal != newer.journal
+
+
+def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
+    orders = []
+    monkeypatch.setattr(job, "run_measured", lambda *_, again: orders.append(again))
+    for options in ([], ["--again"]):
+        done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
+        assert done.exit_code == 0, done.output
+    assert orders == [False, True]
 
 
 def test_a_worked_muscle_has_no_warmth_left():

@@ -1,0 +1,94 @@
+"""Finished stages of the job, kept in a folder: what an interrupted run goes on from."""
+
+import json
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+from benchmarks.comparison.fingerprint import ROOT, code_digest_with
+from benchmarks.files import write_text
+
+ELSEWHERE = ("contender", "execution", "replay", "results", "rollout", "score", "suite", "targets")
+"""Modules of the benchmark, beside its own, that a stage depends on."""
+
+T = TypeVar("T")
+
+
+@cache
+def fingerprint() -> str:
+    """Of all code that a stage depends on: the package's, the job's, and the replay's."""
+    own = sorted(Path(__file__).parent.glob("*.py"))
+    others = [ROOT / "benchmarks" / f"{name}.py" for name in ELSEWHERE]
+    return code_digest_with([*own, *others, ROOT / "benchmarks/suites/reproduction.toml"])
+
+
+@dataclass
+class Stages:
+    """Stages in a folder, each with its question and the code that made it.
+
+    A stage is used again where the same is asked. One that other code made is used too, unless all
+    such are to be made anew: what has taken hours is not thrown away for an edit of a comment.
+
+    Attributes:
+        folder: where they are.
+        again: anew what other code made.
+        code: fingerprint of this code.
+        codes: how many stages of this run each code made.
+    """
+
+    folder: Path
+    again: bool = False
+    code: str = field(default_factory=fingerprint)
+    codes: Counter[str] = field(default_factory=Counter)
+
+    @property
+    def journal(self) -> Path:
+        """Folder of the fits of a diagnosis that is not finished; those of other code go unused."""
+        return self.folder / "journal" / self.code
+
+    def kept(self, name: str, asked: str, made: Callable[..., T]) -> T | None:
+        """What is there of a stage, if it answers this question; None otherwise.
+
+        Args:
+            name: of the stage.
+            asked: digest of its question.
+            made: makes it of what was kept, by keywords; None too where other code kept others.
+        """
+        entry = self._entry(self._path(name))
+        code = entry.pop("code", "")
+        if entry.pop("asked", None) != asked or (code != self.code and self.again):
+            return None
+        try:
+            found = made(**entry)
+        except TypeError:
+            return None
+        self.codes[code] += 1
+        return found
+
+    def keep(self, name: str, asked: str, entry: dict[str, Any]) -> None:
+        """Keep a stage that this code has made; its file is there whole or not at all."""
+        self.codes[self.code] += 1
+        whole = {"asked": asked, "code": self.code, **entry}
+        write_text(self._path(name), json.dumps(whole, indent=1))
+
+    def others(self) -> str:
+        """A line on what is kept of other code; empty if nothing is."""
+        codes = [self._entry(path).get("code") for path in sorted(self.folder.glob("*.json"))]
+        kept = [code for code in codes if code is not None]
+        other = sum(code != self.code for code in kept)
+        if not other or self.again:
+            return ""
+        return (
+            f"{other} of {len(kept)} stages kept in {self.folder} are by other code than this "
+            "(--again makes those anew)"
+        )
+
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.json"
+
+    @staticmethod
+    def _entry(path: Path) -> dict[str, Any]:
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
