@@ -17,9 +17,9 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
     Args:
         diagnosis: the diagnosis.
         reason: why its verdict is `unknown`.
-        trials: its trials in words, `6 trials`.
+        trials: its trials in words, `these 6 trials`.
     """
-    residual = f"the residual of these {trials}"
+    residual = f"the residual of {trials}"
     beyond = {
         "unexplained": _unexplained,
         "slow": _slow,

@@ -37,10 +37,10 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         unknown: why its verdict is `unknown`; None where it is another.
     """
     count = len(diagnosis.trials)
-    trials = f"{count} trial{'s' if count != 1 else ''}"
+    trials = f"these {count} trials" if count != 1 else "this trial"
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
-        return f"In these {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}."
+        return f"In {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}."
     rest = _unexplained(diagnosis)
     if diagnosis.verdict == "parameters":
         off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
@@ -48,17 +48,17 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         more = f" and {len(off) - 3} more" if len(off) > 3 else ""
         if rest:
             return (
-                f"Refitted to these {trials}, the parameters of model {name} change ({shown}{more})"
+                f"Refitted to {trials}, the parameters of model {name} change ({shown}{more})"
                 f", but {rest}."
             )
         return (
-            f"Model {name} has the right structure for these {trials}, but its parameters are off: "
+            f"Model {name} has the right structure for {trials}, but its parameters are off: "
             f"{shown}{more}{_closed(diagnosis)}."
         )
     if diagnosis.verdict == "agrees":
         if rest:
-            return f"No parameter of model {name} is off by much in these {trials}, but {rest}."
-        return f"Model {name} agrees with these {trials}: what is left is the noise of the sensors."
+            return f"No parameter of model {name} is off by much in {trials}, but {rest}."
+        return f"Model {name} agrees with {trials}: what is left is the noise of the sensors."
     if unknown is not None:
         return unknown_words(diagnosis, unknown, trials)
     if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
@@ -68,20 +68,20 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
             instead = f" (or {effect_names(equal, 'or')})" if equal else ""
             return (
                 f"Model {name} misses something, {effect_names(added)}{instead} most likely, but "
-                f"what is left out of these {trials} does not bear it out"
+                f"what is left out of {trials} does not bear it out"
             ) + _propose(diagnosis)
         rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
         return (
-            f"Model {name} misses something, but these {trials} cannot tell which of {rivals} it is"
+            f"Model {name} misses something, but {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
     best = diagnosis.candidates[0] if diagnosis.candidates else None
     if best is not None and len(diagnosis.blind) <= BLIND_SHARE * len(diagnosis.candidates):
         return (
             f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
-            f"in too little of these {trials} to rule chance out"
+            f"in too little of {trials} to rule chance out"
         ) + _propose(diagnosis)
     return (
-        f"These {trials} cannot tell whether model {name} misses anything: "
+        f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
         f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
     ) + _propose(diagnosis)
 
