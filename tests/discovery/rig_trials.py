@@ -11,11 +11,11 @@ from unittest import mock
 import numpy as np
 
 from benchmarks.hidden_effects.physics import simulation
+from benchmarks.hidden_effects.physics.drive import CommandDelay
 from benchmarks.hidden_effects.physics.friction import Bristles, MaxwellSlip
 from benchmarks.hidden_effects.physics.muscle import Dashpots
 from benchmarks.hidden_effects.physics.rig import DAQ_STEP, NOISE, NOMINAL, SIGNALS, UNITS, VOLTS
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import write_trial
 
 FROZEN = Path(__file__).parent / "rigs"
 
@@ -25,6 +25,13 @@ KNOT_S = 0.02
 
 OFF = {"drive_gain": 1.03, "force_slope": 0.97}
 STEPS = np.array([DAQ_STEP / gain for gain, _ in VOLTS]) * np.array(UNITS)
+
+HIDDEN = {
+    "nothing": lambda lanes: [],
+    "hysteresis": lambda lanes: [MaxwellSlip(np.full(lanes, 8.0), 1.5e-3)],
+    "drive_delay": lambda lanes: [CommandDelay(np.full(lanes, 6e-3))],
+}
+"""What may be wrong with the station, by the name that a diagnosis gives it."""
 
 
 def commands(lanes, seconds, seed=5):
@@ -54,17 +61,16 @@ def station(lanes=12, seconds=4.0, hidden="hysteresis"):
     time = np.arange(round(seconds * FASTEST) + 1) / FASTEST
     told = [np.array([np.interp(time, knots, row) for row in rows]) for rows in (motor, regulator)]
     rig = {name: np.full(lanes, OFF.get(name, 1.0) * value) for name, value in NOMINAL.items()}
-    effects = [MaxwellSlip(np.full(lanes, 8.0), 1.5e-3)] if hidden == "hysteresis" else []
     with mock.patch.multiple(simulation, RATE=FASTEST, SUBSTEPS=SUBSTEPS):
         read = simulation.simulate(
-            simulation.Commands(told[0], told[1], np.zeros(lanes)), rig, effects
+            simulation.Commands(told[0], told[1], np.zeros(lanes)), rig, HIDDEN[hidden](lanes)
         )
     return knots, motor, regulator, time, read
 
 
-def logged(lane, times, hidden="hysteresis", lanes=12, step=True):
+def logged(lane, times, hidden="hysteresis", lanes=12, seconds=4.0, step=True):
     """A trial of the station, logged at some times (s), with noise and the DAQ's steps."""
-    knots, motor, regulator, fine, read = station(lanes, hidden=hidden)
+    knots, motor, regulator, fine, read = station(lanes, seconds, hidden)
     generator = np.random.default_rng(1000 + lane)
     held = np.stack([np.interp(times, fine, read[lane, :, i]) for i in range(4)], axis=1)
     held = held + generator.standard_normal(held.shape) * np.array(NOISE) * np.array(UNITS)
@@ -178,7 +184,7 @@ def hanging_load(hidden="nothing", seconds=4.5, rate=50):
 def one_long_trial(seconds=120.0, rate=50, seed=9):
     """A station that is never put to rest: load and pressure wander for minutes, hysteresis in it.
 
-    `python -m tests.discovery.rig_trials` writes the 30 s of it that are frozen in `rigs/`.
+    30 s of it are frozen in `rigs/`.
     """
     generator = np.random.default_rng(seed)
     knots = np.arange(round(seconds / KNOT_S) + 1) * KNOT_S
@@ -193,14 +199,9 @@ def one_long_trial(seconds=120.0, rate=50, seed=9):
     rig = {name: np.full(1, OFF.get(name, 1.0) * value) for name, value in NOMINAL.items()}
     with mock.patch.multiple(simulation, RATE=FASTEST, SUBSTEPS=SUBSTEPS):
         given = simulation.Commands(told[0], told[1], np.zeros(1))
-        read = simulation.simulate(given, rig, [MaxwellSlip(np.full(1, 8.0), 1.5e-3)])
+        read = simulation.simulate(given, rig, HIDDEN["hysteresis"](1))
     rows = slice(None, None, FASTEST // rate)
     noise = generator.standard_normal((len(time[rows]), 4)) * np.array(NOISE) * np.array(UNITS)
     held = np.round((read[0, rows] + noise) / STEPS) * STEPS
     volts = {"motor_voltage": told[0][0, rows], "regulator_voltage": told[1][0, rows]}
     return Trial(time[rows], volts, {"contraction": held[:, 0], "load": held[:, 2]})
-
-
-if __name__ == "__main__":
-    (FROZEN / "one_long_trial").mkdir(parents=True, exist_ok=True)
-    write_trial(one_long_trial(30.0), FROZEN / "one_long_trial" / "wander.csv")
