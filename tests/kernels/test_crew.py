@@ -113,11 +113,11 @@ envs.reset(seed=0)
 envs.step(np.zeros((32, 1)))
 child = os.fork()
 total = sum(float(envs.step(np.zeros((32, 1)))[1].sum()) for _ in range(5))
-print(total, flush=True)
-if child:
-    os.waitpid(child, 0)
-else:
+# A line that is written at once cannot be split by the other's: print may write its end apart.
+os.write(1, f"{total!r}\\n".encode())
+if not child:
     os._exit(0)
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
 
 
