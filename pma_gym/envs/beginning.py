@@ -30,13 +30,9 @@ def drawn_pressures(
         episodes: numbers of the episodes, shape (m,).
         wanted: as the option `pressure_kpa`, one each.
     """
-    words = keys.astype(np.uint64)
-    stream = (episodes * 4 + DRAW).astype(np.uint64)
-    nothing = np.zeros(len(episodes), np.uint64)
-    shares = uniform(philox((nothing, stream, nothing, nothing), (words[:, 0], words[:, 1]))[0])
     low, high = task.starts
     found = []
-    for share, one in zip(shares.tolist(), wanted, strict=True):
+    for share, one in zip(_shares(keys, episodes * 4 + DRAW), wanted, strict=True):
         if isinstance(one, str):
             found.append(low + share * (high - low))
         elif isinstance(one, Sequence):
@@ -44,6 +40,21 @@ def drawn_pressures(
         else:
             found.append(1e3 * float(one))
     return np.array(found)
+
+
+def _shares(keys: NDArray[np.int64], streams: NDArray[np.int64]) -> list[float]:
+    """A number between 0 and 1 for each key and stream."""
+    if len(streams) <= FEW:
+        pairs = zip(streams.tolist(), keys.tolist(), strict=True)
+        return [uniform(philox((0, stream, 0, 0), tuple(key))[0]) for stream, key in pairs]
+    words, counter = keys.astype(np.uint64), streams.astype(np.uint64)
+    nothing = np.zeros(len(streams), np.uint64)
+    drawn = philox((nothing, counter, nothing, nothing), (words[:, 0], words[:, 1]))
+    return uniform(drawn[0]).tolist()
+
+
+FEW = 8
+"""Environments whose numbers are drawn faster one by one than as an array, of the same bits."""
 
 
 def drawn_events(

@@ -279,37 +279,46 @@ class Engine:
         zero: NDArray[np.float64],
         regulator: NDArray[np.float64],
     ) -> None:
-        block, lane = np.divmod(indices, self.width)
-        self.records[block, :, lane] = 0.0
+        rows = np.zeros((len(indices), self.record.size))
+        wholes = rows.view(np.int64)
+
+        def put(name: str, values: ArrayLike) -> None:
+            array = wholes if self.record.kind(name) == "integer" else rows
+            array[:, self.record.places[name]] = values
+
         for i, name in enumerate(self.record.states):
-            self._set(indices, name, states[:, i])
-        self._set(indices, "size", FIRST_S)
-        self._set(indices, "zero_contraction", zero)
-        self._set(indices, "regulator_voltage", regulator)
-        self._set(indices, "rest_regulator", regulator)
+            put(name, states[:, i])
+        put("size", FIRST_S)
+        put("zero_contraction", zero)
+        put("regulator_voltage", regulator)
+        put("rest_regulator", regulator)
         for i in range(2):
-            self._set(indices, f"key_{i}", self._keys[indices, i])
-        self._set(indices, "episode", self._episodes[indices])
+            put(f"key_{i}", self._keys[indices, i])
+        put("episode", self._episodes[indices])
         volts: list[ArrayLike] = [0.0, regulator]
         actions: list[ArrayLike] = [-1.0, np.clip(0.2 * regulator - 1.0, -1.0, 1.0)]
         if self.task.actuator == "regulator":
             for name in ("motor_voltage", "rest_motor"):
-                self._set(indices, name, self.rest_motor)
-            self._set(indices, START, states[:, self.record.states.index("contraction")])
+                put(name, self.rest_motor)
+            put(START, states[:, self.record.states.index("contraction")])
             volts, actions = volts[1:], actions[1:]
         for i in range(self.record.actions):
-            self._set(indices, f"action_{i}", actions[i])
+            put(f"action_{i}", actions[i])
             for k in range(self.options.action_delay):
-                self._set(indices, f"wire_{k}_{i}", volts[i])
+                put(f"wire_{k}_{i}", volts[i])
         if self.record.events:
-            self._set_events(indices)
+            self._put_events(indices, put)
         if self.task.exercise:
             drawn_by = self._keys[indices], self._episodes[indices], self.pressures[indices]
             told = operators(self.task, self.options, self.told, *drawn_by, regulator)
             for name, values in told.items():
-                self._set(indices, name, values)
+                put(name, values)
+        block, lane = np.divmod(indices, self.width)
+        self.records[block, :, lane] = rows
 
-    def _set_events(self, indices: NDArray[np.int64]) -> None:
+    def _put_events(
+        self, indices: NDArray[np.int64], put: Callable[[str, ArrayLike], None]
+    ) -> None:
         """Draw what will disturb episodes: the control steps it comes with, and its sizes."""
         events = self._events(indices)
         gain = self.told.parameters["regulator_line"].gain
@@ -319,12 +328,12 @@ class Engine:
             ("pulse", events.pulse_times, events.pulse_forces),
         ):
             for i in range(times.shape[1]):
-                self._set(indices, f"{what}_step_{i}", np.ceil(times[:, i] * rate))
-                self._set(indices, f"{what}_{i}", sizes[:, i])
+                put(f"{what}_step_{i}", np.ceil(times[:, i] * rate))
+                put(f"{what}_{i}", sizes[:, i])
         # As many steps whatever it begins with: a pulse is as long for every controller.
         begun, lasting = np.ceil(events.pulse_times * rate), events.pulse_lengths * rate
         for i in range(begun.shape[1]):
-            self._set(indices, f"pulse_end_{i}", begun[:, i] + np.ceil(lasting[:, i] - 1e-9))
+            put(f"pulse_end_{i}", begun[:, i] + np.ceil(lasting[:, i] - 1e-9))
 
     def _events(self, indices: NDArray[np.int64]) -> Events:
         """What disturbs the episodes of environments."""

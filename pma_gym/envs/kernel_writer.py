@@ -1,6 +1,7 @@
 """Writes the control step of environments: command, march, sensors, reward, and the beginning."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from typing import Protocol
 
 from llvmlite import ir
@@ -181,7 +182,7 @@ class Writer(BlockMemory):
         def number(job: Operand, name: str) -> Operand:
             return b.load(address(job, name), typ=DOUBLE)
 
-        def take(k: Operand) -> Operand:
+        def take(k: Operand, again: bool = False) -> Operand:
             job = b.load(following, typ=INTEGER)
             found = b.icmp_signed("<", job, stop)
             with b.if_then(found):
@@ -205,7 +206,11 @@ class Writer(BlockMemory):
                 }
                 block, rest = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
                 _, tables = self._block(b, given, block)
-                lane.fill(k, offset(b, tables, rest), inputs, self.width)
+                # A lane that has worked has the table already if all share one.
+                stale = b.icmp_signed("!=", given["table_stride"], integer(0))
+                with b.if_then(stale) if again else nullcontext():
+                    lane.tabulate(k, offset(b, tables, rest), self.width)
+                lane.hold(k, inputs)
             return found
 
         def proceed(k: Operand) -> Operand:
@@ -214,7 +219,7 @@ class Writer(BlockMemory):
                 b.store(lane.widen(lane.get(values[name], k)), address(job, name))
             for name in own:
                 b.store(lane.widen(lane.get(name, k)), address(job, name))
-            return take(k)
+            return take(k, again=True)
 
         def watch(found: dict[int, Operand]) -> None:
             self._sample(b, lanes, lane, found, given)

@@ -1,5 +1,6 @@
 """Functions, loops and memory in LLVM, to be written by hand around `Lanes.emit`."""
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
@@ -129,6 +130,32 @@ def repeat(builder: Builder) -> Iterator[Callable[[Operand], None]]:
     yield leave_if
     builder.branch(body)
     builder.position_at_end(after)
+
+
+@contextmanager
+def wait(builder: Builder) -> Iterator[Callable[[Operand], None]]:
+    """Write a loop as `repeat` does, which waits for other threads.
+
+    After some ten microseconds it lets others have the processor: whom it waits for may need it.
+    """
+    looks = variable(builder, INTEGER, integer(0))
+    with repeat(builder) as leave_if:
+        yield leave_if
+        count = builder.add(builder.load(looks, typ=INTEGER), integer(1))
+        builder.store(count, looks)
+        if sys.platform != "win32":
+            with builder.if_then(builder.icmp_signed(">", count, integer(LOOKS)), likely=False):
+                builder.call(_external(builder.module, "sched_yield", INDEX), [])
+
+
+LOOKS = 10_000
+"""Looks at what another thread does before the processor is given away."""
+
+
+def _external(module: ir.Module, name: str, returns: ir.Type) -> Operand:
+    """A function of the process without arguments."""
+    found = module.globals.get(name)
+    return found or ir.Function(module, ir.FunctionType(returns, []), name)
 
 
 def intrinsic(builder: Builder, name: str, *arguments: Operand) -> Operand:

@@ -2,7 +2,8 @@
 
 A thread that sleeps is awakened on the processor of the one that calls it, and waits there until
 that is done: too late for work of less than a millisecond. So these look for work for a while
-before they sleep, in compiled code, without Python's lock.
+before they sleep, in compiled code, without Python's lock. What a thread has not taken on when
+the one that calls has done its own part, that one does too: a busy machine holds up nobody.
 """
 
 import ctypes
@@ -26,14 +27,17 @@ from pma_gym.kernels.control import (
     offset,
     repeat,
     variable,
+    wait,
 )
 from pma_gym.kernels.native import Library, compiled
 
 SPINS = 100_000
 """Looks for work before a thread sleeps: 0.1 to 0.3 ms."""
 
-BEGUN, RESULT, DONE = 0, 8, 16
-"""Places of a hand's numbers, each in a line of the cache of its own."""
+BEGUN, ARGUMENTS, RESULT, DONE, CLAIMED = 0, 1, 8, 16, 24
+"""Places of a hand's numbers, in lines of the cache of their own: how many works have been given,
+the address of its arguments, the last work's result, how many works are done, and how many someone
+has taken on."""
 
 _POINTER, _INTEGER = ctypes.c_void_p, ctypes.c_int64
 
@@ -85,7 +89,7 @@ class _Hand:
     """A thread that waits for work, awake for a while and then asleep.
 
     Attributes:
-        counts: number of works begun, the last one's result, number of works done.
+        counts: its numbers.
         wanted: number of works that there are to do, also those that begin at once.
         asleep: whether it waits for the bell.
         dismissed: whether it is to end.
@@ -93,7 +97,8 @@ class _Hand:
     """
 
     def __init__(self, address: int, arguments: np.ndarray) -> None:
-        self.counts = np.zeros(24, np.int64)
+        self.counts = np.zeros(32, np.int64)
+        self.counts[ARGUMENTS] = arguments.ctypes.data
         self.wanted = 0
         self.asleep = self.dismissed = False
         self.bell = threading.Event()
@@ -157,9 +162,10 @@ def _write_serve(module: ir.Module) -> None:
         work = b.icmp_signed("!=", _now(b, counts, BEGUN), seen)
         with b.if_else(work) as (yes, no):
             with yes:
-                b.store(_called(b, address, arguments), _at(b, counts, RESULT))
                 done = b.add(seen, integer(1))
-                b.store_atomic(done, _at(b, counts, DONE), "release", 8)
+                with b.if_then(_claim(b, counts, done)):
+                    b.store(_called(b, address, arguments), _at(b, counts, RESULT))
+                    b.store_atomic(done, _at(b, counts, DONE), "release", 8)
                 b.store(spins, left)
             with no:
                 b.store(b.sub(b.load(left, typ=INTEGER), integer(1)), left)
@@ -168,7 +174,7 @@ def _write_serve(module: ir.Module) -> None:
 
 
 def _write_lead(module: ir.Module) -> None:
-    """Begin all hands' work, do one's own, wait for theirs."""
+    """Begin all hands' work, do one's own and what no hand has taken on, wait for the rest."""
     b, (table, hands, address, arguments) = function(
         module,
         "lead",
@@ -186,11 +192,23 @@ def _write_lead(module: ir.Module) -> None:
     result = variable(b, INTEGER, _called(b, address, arguments))
     with loop(b, hands) as k:
         counts = counts_of(k)
-        with repeat(b) as leave_if:
-            leave_if(b.icmp_signed("==", _now(b, counts, DONE), _now(b, counts, BEGUN)))
+        begun = _now(b, counts, BEGUN)
+        with b.if_then(_claim(b, counts, begun)):
+            given = b.load(_at(b, counts, ARGUMENTS), typ=INTEGER)
+            b.store(_called(b, address, b.inttoptr(given, POINTER)), _at(b, counts, RESULT))
+            b.store_atomic(begun, _at(b, counts, DONE), "release", 8)
+        with wait(b) as leave_if:
+            leave_if(b.icmp_signed("==", _now(b, counts, DONE), begun))
         its = b.load(_at(b, counts, RESULT), typ=INTEGER)
         b.store(b.or_(b.load(result, typ=INTEGER), its), result)
     b.ret(b.load(result, typ=INTEGER))
+
+
+def _claim(b: Builder, counts: Operand, work: Operand) -> Operand:
+    """Take a work on, if nobody has; whether it is one's own now."""
+    free = b.sub(work, integer(1))
+    tried = b.cmpxchg(_at(b, counts, CLAIMED), free, work, "acq_rel", "acquire")
+    return b.extract_value(tried, 1)
 
 
 def _called(b: Builder, address: Operand, arguments: Operand) -> Operand:

@@ -17,7 +17,7 @@ def derivatives(values: Sequence[Value], wrt: Sequence[Value]) -> list[list[Slop
     """Partial derivatives of values, by forward accumulation.
 
     What several of them need is shared. A choice has the derivative of the side chosen; |x| at 0
-    that of x.
+    that of x; a value of `Graph.slopes` the one that is known.
 
     Args:
         values: real values.
@@ -29,7 +29,9 @@ def derivatives(values: Sequence[Value], wrt: Sequence[Value]) -> list[list[Slop
     Raises:
         TypeError: a value that depends on one of `wrt` through its bits.
     """
-    nodes = order(values)
+    known = [values[0].graph.slopes.get(node.id) for node in order(values)] if values else []
+    # What a value is known to depend on may have been simplified out of what it is made of.
+    nodes = order([*values, *(entry[0] for entry in known if entry)])
     columns = [_along(nodes, seed, {other.id for other in wrt}) for seed in wrt]
     return [[column[value.id] for column in columns] for value in values]
 
@@ -40,6 +42,10 @@ def _along(nodes: list[Value], seed: Value, held: set[int]) -> dict[int, Slope]:
     for node in nodes:
         if node.id in held:
             slopes.setdefault(node.id, None)
+            continue
+        if known := node.graph.slopes.get(node.id):
+            argument, slope = known
+            slopes[node.id] = _scaled(slopes[argument.id], slope)
             continue
         parts = [slopes[operand.id] for operand in node.operands]
         moves = any(part is not None for part in parts)

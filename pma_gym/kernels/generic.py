@@ -26,6 +26,13 @@ def where(condition: Any, yes: Any, no: Any) -> Any:  # noqa: ANN401
     return yes if condition else no
 
 
+def sloping(value: Any, argument: Any, slope: Any) -> Any:  # noqa: ANN401
+    """The value as it is; of traced ones, its derivative by the argument is kept with the graph."""
+    if isinstance(value, Value) and isinstance(argument, Value):
+        value.graph.slopes[value.id] = argument, value.graph.value(slope)
+    return value
+
+
 def to_real(integer: Any) -> Any:  # noqa: ANN401
     """The real number nearest to an unsigned 64-bit integer.
 

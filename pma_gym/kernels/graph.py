@@ -177,10 +177,13 @@ class Graph:
 
     Attributes:
         values: the values, in order of `Value.id`.
+        slopes: what a value's derivative is known to be: the value that it is by, and the
+            derivative, by the value's id.
     """
 
     def __init__(self) -> None:
         self.values: list[Value] = []
+        self.slopes: dict[int, tuple[Value, Value]] = {}
         self._known: dict[tuple, Value] = {}
 
     def input(self, name: str, level: int, kind: Kind = "real") -> Value:

@@ -5,7 +5,6 @@ straight-line arithmetic between them. Instructions carry no fast-math flags, so
 vector has the bits of the scalar code; `fused` gives that up for speed.
 """
 
-from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 from llvmlite import ir
@@ -48,8 +47,8 @@ class Lanes:
     Args:
         width: lanes of a vector; 1 writes scalar code.
         real: LLVM type of reals, "double" or "float".
-        fused: write a * b + c as one operation with one rounding, where the product has no other
-            use; faster, with other bits.
+        fused: write a * b + c as one operation with one rounding, where sums are all that the
+            product is used in; faster, with other bits.
 
     Attributes:
         width: lanes.
@@ -152,18 +151,29 @@ class Lanes:
     }
 
     def _merged(self, todo: list[Value], outputs: Sequence[Value]) -> dict[int, Value]:
-        """Products that go into a multiply-add, by the id of the sum that takes them."""
-        uses = Counter(part.id for value in todo for part in value.operands)
-        uses.update(value.id for value in outputs)
-        fresh = {value.id for value in todo}
+        """Products that go into multiply-adds, by the id of the sum that takes them.
+
+        A product goes where sums are all that it is used in, and each of them takes no other: then
+        it is not computed by itself.
+        """
+        asked = {value.id for value in outputs}
+        users: dict[int, list[Value]] = {}
+        for value in todo:
+            for part in value.operands:
+                users.setdefault(part.id, []).append(value)
         merged: dict[int, Value] = {}
         for value in todo:
-            if value.operation not in ("add", "subtract") or value.kind != "real":
+            product = value.operation == "multiply" and value.kind == "real"
+            if not product or value.id in asked:
                 continue
-            for part in value.operands:
-                single = part.operation == "multiply" and uses[part.id] == 1 and part.id in fresh
-                if single and value.id not in merged:
-                    merged[value.id] = part
+            sums = users.get(value.id, [])
+            if all(
+                total.operation in ("add", "subtract")
+                and total.id not in merged
+                and total.operands[0] is not total.operands[1]
+                for total in sums
+            ):
+                merged.update((total.id, value) for total in sums)
         return merged
 
     def _multiply_add(

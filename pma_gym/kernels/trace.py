@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterable, Sequence
 from functools import cache
 from typing import Any
 
-from pma_gym.kernels.generic import where
+from pma_gym.kernels.generic import sloping, where
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.lanes import rebind
 
@@ -24,7 +24,7 @@ def trace(law: Callable, *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
 
 @cache
 def _traceable(law: Callable) -> Callable:
-    return rebind(law, {"where": where})
+    return rebind(law, {"where": where, "sloping": sloping})
 
 
 def order(outputs: Iterable[Value]) -> list[Value]:

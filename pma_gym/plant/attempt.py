@@ -161,7 +161,7 @@ def _allowed(eq: Equations) -> Value:
     return 1.0 + where(square < 1e6, square, 1e6)
 
 
-SWIFT_M_PER_S = 0.1
+SWIFT_M_PER_S = 0.075
 """Speed of the slide at which twice the squared error is allowed (m/s)."""
 
 

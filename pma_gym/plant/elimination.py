@@ -8,27 +8,40 @@ Entry = Value | None
 """A number of a matrix; None where it is zero whatever the numbers are."""
 
 
-def solver(matrix: Sequence[Sequence[Entry]]) -> Callable[[Sequence[Entry]], list[Value]]:
-    """Factor a matrix; what comes back solves for right-hand sides.
+def solver(
+    jacobian: Sequence[Sequence[Entry]], part: Value
+) -> Callable[[Sequence[Entry]], list[Value]]:
+    """Factor I / part - J; what comes back solves for right-hand sides.
 
     Gaussian elimination on the diagonal, in the order that fills in least (Markowitz 1957). Nothing
-    is exchanged for size: made for I - h J with h small enough that the diagonal leads.
+    is exchanged for size: the part is to be small enough that the diagonal leads.
 
     Args:
-        matrix: square, every diagonal entry present.
+        jacobian: J, square.
+        part: share of a step's length (s).
     Returns:
         A function of a right-hand side that gives the solution.
     """
-    rows = [{j: v for j, v in enumerate(row) if v is not None} for row in matrix]
+    rows = [{j: -v for j, v in enumerate(row) if v is not None} for row in jacobian]
+    one = part.graph.constant(1.0)
+    scaled = {}
+    for i, row in enumerate(rows):
+        own = row.get(i)
+        row[i] = 1.0 / part if own is None else 1.0 / part + own
+        scaled[row[i].id] = one if own is None else one + part * own
     steps: list[tuple[int, Value, dict[int, Value], dict[int, Value]]] = []
     left = set(range(len(rows)))
     ready: dict[int, Value] = {}
     while left:
         if not ready:
-            ready = _first_inverses(rows, left)
-        pivot = min(sorted(ready or left), key=lambda i: _fill(rows, left, i))
+            pivots = {i: rows[i][i] for i in _apart(rows, left)}
+            if len(pivots) == 1:
+                ready = {i: 1.0 / pivot for i, pivot in pivots.items()}
+            else:
+                ready = _inverses({i: scaled.get(p.id, part * p) for i, p in pivots.items()}, part)
+        pivot = min(sorted(ready), key=lambda i: _fill(rows, left, i))
         left.discard(pivot)
-        inverse = ready.pop(pivot) if pivot in ready else 1.0 / rows[pivot][pivot]
+        inverse = ready.pop(pivot)
         across = {j: v for j, v in rows[pivot].items() if j in left}
         down = {}
         for i in sorted(left):
@@ -59,28 +72,32 @@ def solver(matrix: Sequence[Sequence[Entry]]) -> Callable[[Sequence[Entry]], lis
     return solve
 
 
-def _first_inverses(rows: list[dict[int, Value]], left: set[int]) -> dict[int, Value]:
-    """Inverses of the pivots that elimination on each other leaves as they are, at one division.
-
-    Divisions are what bounds a step's speed: the product of all is inverted and multiplied out.
-    """
+def _apart(rows: list[dict[int, Value]], left: set[int]) -> list[int]:
+    """Pivots that elimination on each other leaves as they are."""
     free: list[int] = []
     for i in sorted(left, key=lambda i: _fill(rows, left, i)):
         if all(j not in rows[i] and i not in rows[j] for j in free):
             free.append(i)
-    pivots = [rows[i][i] for i in free]
-    plain = {i: p for i, p in zip(free, pivots, strict=True) if p.is_constant}
-    rest = [i for i in free if i not in plain]
-    found = {i: 1.0 / p for i, p in plain.items()}
+    return free
+
+
+def _inverses(scaled: dict[int, Value], part: Value) -> dict[int, Value]:
+    """Inverses of pivots, which are given times a part of a step, at one division.
+
+    Divisions are what bounds a step's speed: the product of all is inverted and multiplied out.
+    Times the part, pivots are near 1, so that their product is a number in single precision too.
+    """
+    found = {i: part / pivot for i, pivot in scaled.items() if pivot.is_constant}
+    rest = [i for i in scaled if i not in found]
     if not rest:
         return found
-    products = [rows[rest[0]][rest[0]]]
+    products = [scaled[rest[0]]]
     for i in rest[1:]:
-        products.append(products[-1] * rows[i][i])
-    inverse = 1.0 / products[-1]
+        products.append(products[-1] * scaled[i])
+    inverse = part / products[-1]
     for k in range(len(rest) - 1, 0, -1):
         found[rest[k]] = inverse * products[k - 1]
-        inverse = inverse * rows[rest[k]][rest[k]]
+        inverse = inverse * scaled[rest[k]]
     found[rest[0]] = inverse
     return found
 

@@ -130,29 +130,26 @@ class Lane:
         """Address of the number of a lane's job; negative for none."""
         return offset(self.builder, self.jobs, integer(lane), INTEGER)
 
-    def fill(
-        self, lane: Operand, table: Operand, given: dict[int, Operand], spacing: int = 1
-    ) -> None:
-        """Write what is fixed for a span: the table's numbers, and what follows from the given.
+    def tabulate(self, lane: Operand, table: Operand, spacing: int = 1) -> None:
+        """Write what is fixed for a model: the table's numbers.
 
         Args:
             lane: number of the lane.
             table: address of the model's table, numbers in double precision.
-            given: inputs of level HELD.
             spacing: how many numbers lie from one of the table to the next.
         """
-        self.tabulate(lane, table, spacing)
-        self.hold(lane, given)
-
-    def tabulate(self, lane: Operand, table: Operand, spacing: int = 1) -> None:
-        """Write what is fixed for a model: the table's numbers, as `fill`."""
         places = {value.id: i for i, value in enumerate(self.layout.table)}
         for value in self.layout.fixed:
             where = offset(self.builder, table, places[value.id] * spacing)
             self.put(value, lane, self.narrow(self.builder.load(where, typ=DOUBLE)))
 
     def hold(self, lane: Operand, given: dict[int, Operand]) -> None:
-        """Write what follows for a span from the inputs given, once the table is there."""
+        """Write what follows for a span, once the table is there.
+
+        Args:
+            lane: number of the lane.
+            given: inputs of level HELD, by id.
+        """
         known = {value.id: self.get(value, lane) for value in self.layout.fixed} | given
         found = self.one.emit(self.builder, self.layout.held, known)
         for value in self.layout.held:

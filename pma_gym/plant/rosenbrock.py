@@ -1,6 +1,6 @@
 """The integrator: a Rosenbrock method of order 4 with its own error estimate.
 
-    (I - gamma h J) u_i = gamma (h f(y + sum_j a_ij u_j) + sum_j c_ij u_j)
+    (I / (gamma h) - J) u_i = f(y + sum_j a_ij u_j) + sum_j (c_ij / h) u_j
     y_new = y + sum_i m_i u_i,    error = sum_i e_i u_i
 
 J is the exact Jacobian at the step's start, differentiated from the laws themselves. Only linear
@@ -94,9 +94,10 @@ def step(
     """
     values, rates = [s.value for s in states], [s.rate for s in states]
     jacobian = _substituted(derivatives(rates, values), frozen)
-    solve = solver(_matrix(jacobian, method.gamma * size))
+    part = method.gamma * size
+    solve = solver(jacobian, part)
     stages: list[list[Value]] = []
-    changes: list[Value] = []
+    slopes: list[Value] = []
     visited: list[list[Value]] = []
     for coefficients, couplings in zip(method.stages, method.couplings, strict=True):
         if coefficients is not None:
@@ -105,11 +106,11 @@ def step(
                 for i, value in enumerate(values)
             }
             given = {**frozen, **moved} if coefficients else {**frozen, **here}
-            changes = [size * rate for rate in substitute(rates, given)]
+            slopes = substitute(rates, given)
             visited.append([moved[value.id] for value in values])
+        factors = [(method.gamma * coupling) * (1.0 / part) for coupling in couplings]
         right = [
-            method.gamma * _sum(change, couplings, [stage[i] for stage in stages])
-            for i, change in enumerate(changes)
+            _sum(slope, factors, [stage[i] for stage in stages]) for i, slope in enumerate(slopes)
         ]
         stages.append(solve(right))
     across = [[stage[i] for stage in stages] for i in range(len(values))]
@@ -126,18 +127,7 @@ def _substituted(jacobian: list[list[Entry]], given: Mapping[int, Value]) -> lis
     return [[None if entry is None else next(found) for entry in row] for row in jacobian]
 
 
-def _matrix(jacobian: list[list[Entry]], factor: Value) -> list[list[Entry]]:
-    """I - factor J."""
-    rows: list[list[Entry]] = []
-    for i, row in enumerate(jacobian):
-        entries = [None if slope is None else -(factor * slope) for slope in row]
-        own = entries[i]
-        entries[i] = factor.graph.constant(1.0) if own is None else 1.0 + own
-        rows.append(entries)
-    return rows
-
-
-def _sum(start: Value | None, factors: Sequence[float], values: Sequence[Value]) -> Value:
+def _sum(start: Value | None, factors: Sequence[Value | float], values: Sequence[Value]) -> Value:
     total = start
     for factor, value in zip(factors, values, strict=True):
         total = factor * value if total is None else total + factor * value

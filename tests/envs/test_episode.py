@@ -6,6 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import REWARDS
 
@@ -130,6 +131,15 @@ def test_pressures_are_drawn_as_asked(make):
     anything = drawn(pressure_kpa="random", task="rotation")
     assert 275.0 <= min(anything) < 350.0 and 500.0 < max(anything) <= 575.0
     assert drawn(pressure_kpa=333) == pytest.approx([333.0] * 30)
+
+
+def test_pressures_are_the_same_alone_and_among_many(make):
+    seeds = list(range(40))
+    envs = PMAVectorEnv(len(seeds), pressure_kpa="random")
+    envs.reset(seed=seeds)
+    env = make(pressure_kpa="random")
+    alone = [env.reset(seed=seed)[1]["pressure_kpa"] for seed in seeds]
+    assert (envs.engine.pressures * 1e-3).tolist() == alone
 
 
 def test_reset_options_set_the_pressure_of_one_episode(make):

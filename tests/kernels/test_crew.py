@@ -50,6 +50,16 @@ def test_each_part_is_done_once_a_call(crew):
         assert [part[COUNTER] for part in parts] == [calls << k for k in range(4)]
 
 
+def test_what_no_thread_takes_on_is_done_all_the_same(monkeypatch):
+    # As on a machine that is busy with something else: the threads never come.
+    monkeypatch.setattr(threading.Thread, "start", lambda _: None)
+    parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
+    crew = Crew(library().address("add"), parts)
+    for calls in range(1, 4):
+        assert crew.run() == 15
+        assert [part[COUNTER] for part in parts] == [calls << k for k in range(4)]
+
+
 def test_threads_that_sleep_wake_up(crew):
     crew, parts = crew
     before = sys.getswitchinterval()

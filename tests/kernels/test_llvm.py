@@ -177,14 +177,24 @@ def test_strict_code_rounds_twice_and_fused_code_once(run_columns):
         run_columns(outputs, given, 8), (x * y + z, z - x * y, x * y - z), strict=True
     ):
         np.testing.assert_array_equal(found, expected)
-    # A product with one use only is fused; here each has three.
-    for found, sign in zip((outputs[0], outputs[1]), (1, -1), strict=True):
-        (column,) = run_columns([found], given, 8, fused=True)
-        for i in range(64):
-            product = Fraction(x[i]) * Fraction(y[i])
-            assert column[i] == float(Fraction(z[i]) + sign * product)
-    (column,) = run_columns([outputs[2]], given, 1, fused=True)
-    assert column[0] == float(Fraction(x[0]) * Fraction(y[0]) - Fraction(z[0]))
+    signs = ((1, 1), (-1, 1), (1, -1))
+    alone = [run_columns([output], given, 1, fused=True)[0] for output in outputs]
+    # One product in three sums goes into all of them.
+    for columns in (alone, run_columns(outputs, given, 8, fused=True)):
+        for column, (sign, own) in zip(columns, signs, strict=True):
+            for i in range(64):
+                product = Fraction(x[i]) * Fraction(y[i])
+                assert column[i] == float(sign * product + own * Fraction(z[i]))
+
+
+def test_a_product_that_is_asked_for_itself_is_not_fused(run_columns):
+    graph = Graph()
+    a, b, c = (graph.input(name, CHANGING) for name in "abc")
+    given = {name: np.random.default_rng(3).normal(size=64) for name in "abc"}
+    x, y, z = given.values()
+    product, total = run_columns([a * b, a * b + c], given, 8, fused=True)
+    np.testing.assert_array_equal(product, x * y)
+    np.testing.assert_array_equal(total, x * y + z)
 
 
 def test_wide_registers_are_used_where_there_are_some(build_columns):
