@@ -61,13 +61,14 @@ def exponential(value):
     >>> abs(exponential(-8.0) / math.exp(-8.0) - 1.0) < 1e-12
     True
     """
-    z = value * (1.0 / 128.0)
     # By halves (Estrin 1960): products that wait for each other cost more than they are many.
-    z2 = z * z
-    z4 = z2 * z2
-    low = (1.0 + z) + z2 * (1.0 / 2.0 + z * (1.0 / 6.0))
-    high = (1.0 / 24.0 + z * (1.0 / 120.0)) + z2 * (1.0 / 720.0 + z * (1.0 / 5040.0))
-    root = low + z4 * (high + z4 * (1.0 / 40320.0))
+    c = 1.0 / 128.0
+    square = value * value
+    fourth = square * square
+    low = (1.0 + value * c) + square * (c**2 / 2.0 + value * (c**3 / 6.0))
+    middle = c**4 / 24.0 + value * (c**5 / 120.0)
+    high = middle + square * (c**6 / 720.0 + value * (c**7 / 5040.0))
+    root = low + fourth * (high + fourth * (c**8 / 40320.0))
     for _ in range(7):
         root = root * root
     return sloping(root, value, root)
