@@ -35,6 +35,7 @@ from benchmarks.reference import (
     shares,
     simulated,
 )
+from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, Condition, Plant
 from pma_gym.plant.simulation import Run, simulate_all
@@ -57,9 +58,6 @@ STATE_LIMIT, POSITION_LIMIT = 1e-4, 1e-6
 state, and the positions."""
 
 POSITIONS = ("contraction", "angle", "extension", "servo")
-
-EVALUATIONS = 4
-"""Right-hand sides an attempt: three, and the Jacobian counted as one more."""
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,17 @@ SYNC_COUNTS = (64, 1024)
 TOLERANCES = (1000, 500, 230, 50, 15)
 """Tolerances of an internal step, in millionths of the states' scales; 230 is the default."""
 
+EVALUATIONS = 4
+"""Evaluations of the right-hand side in an attempt at an internal step: three stages, and one with
+its Jacobian where the step begins."""
+
+CORE = {
+    "multiply_add": "sums, products, multiply-adds",
+    "divide": "quotients",
+    "square_root": "square roots",
+}
+"""What a core is measured to do alone: operations in lanes, and what readers call them."""
+
 ENVPOOL_MOST = 16384
 """EnvPool's largest batch here: it holds every environment as an object of its own."""
 
@@ -71,7 +82,7 @@ class Row:
 
 def all_rows() -> list[Row]:
     """Every row, in the order of the tables."""
-    parts = (_single(), _same_plant(), _batches(), _tolerances(), _learning(), _once())
+    parts = (_single(), _same_plant(), _batches(), _core(), _tolerances(), _learning(), _once())
     return [row for part in parts for row in part]
 
 
@@ -174,6 +185,12 @@ def _batch(
     name: str, title: str, worker: str, settings: Mapping[str, Any], row: str = "batch", **rest: Any
 ) -> Row:
     return Row(f"batch/{name}/{settings['count']}", title, worker, row, settings, **rest)
+
+
+def _core() -> Iterator[Row]:
+    for operation, title in CORE.items():
+        settings = {"operation": operation}
+        yield Row(f"core/{operation}", title, "own", "core", settings, unit="operations")
 
 
 def _tolerances() -> Iterator[Row]:

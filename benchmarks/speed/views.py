@@ -5,6 +5,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from benchmarks.speed.rows import EVALUATIONS
+
 Row = Mapping[str, Any]
 
 
@@ -34,6 +36,7 @@ def views(document: Mapping[str, Any]) -> list[View]:
         _single(_of(known, "single", "plant")),
         _batches(_of(known, "batch")),
         _right_hand_sides(known),
+        _arithmetic(known),
         _tolerances(_of(known, "tolerances")),
         _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
         _fits(_of(known, "fits")),
@@ -114,6 +117,45 @@ def _right_hand_sides(rows: Sequence[Row]) -> View:
         cells.append([title, number, f"{each:.4g}", rate(each * best["median"]), spread(best)])
     header = ["At its fastest", "Environments", "A step", "Right-hand sides/s", "±"]
     return View("evaluations", "Evaluations of the right-hand side per second", header, cells)
+
+
+_BATCH = "batch/own/1024"
+
+
+def _arithmetic(rows: Sequence[Row]) -> View:
+    """What a control step computes, and how long a core takes for that if nothing else holds it up.
+
+    Operations of the three sorts run beside each other, so the longest of their times is the least
+    that a step can take.
+    """
+    cells: list[list[str]] = []
+    own = next((row for row in rows if row["key"] == _BATCH), None)
+    sorts = _of(rows, "core")
+    if own and own["right_hand_sides_per_step"] and sorts:
+        attempts = own["right_hand_sides_per_step"] / EVALUATIONS
+        least = 0.0
+        for row in sorts:
+            number = row["facts"]["in_attempt"]
+            duration = number * attempts / row["median"]
+            least = max(least, duration)
+            cells.append(
+                [
+                    row["title"],
+                    f"{number}",
+                    rate(number * attempts),
+                    rate(row["median"]),
+                    f"{1e9 * duration:.0f} ns",
+                    "",
+                ]
+            )
+        flops = sorts[0]["facts"]["flops"]
+        step = 1.0 / own["median"]
+        reached = f"{100.0 * least / step:.0f} % of the limit"
+        numbers = [f"{flops}", rate(flops * attempts), rate(flops * attempts / step)]
+        title = "floating-point operations, in the batch of 1024"
+        cells.append([title, *numbers, f"{1e9 * step:.0f} ns", reached])
+    header = ["One thread", "An attempt", "A control step", "Per second", "Time", "Reached"]
+    return View("arithmetic", "Arithmetic, and what one core can do", header, cells)
 
 
 def _tolerances(rows: Sequence[Row]) -> View:

@@ -1,13 +1,14 @@
 """One attempt at a step: how long it is, whether it is good enough, how long the next should be."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from pma_gym.kernels.generic import from_bits, square_root, to_bits, where
 from pma_gym.kernels.graph import CHANGING, FIXED, Value
 from pma_gym.kernels.substitute import substitute
-from pma_gym.plant.compose import Equations, Switch
+from pma_gym.plant.compose import Equations, State, Switch
+from pma_gym.plant.followers import followed, followers
 from pma_gym.plant.rosenbrock import Step, step
 
 SAFETY = 0.8
@@ -75,10 +76,17 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     # Two halves instead of a step and a scrap.
     length = where(left <= size, left, where(left < 2.0 * size, 0.5 * left, size))
     frozen, here = beginning(eq)
-    made = step(eq.states, length, frozen, here)
-    moved = {s.value.id: new for s, new in zip(eq.states, made.states, strict=True)}
+    behind = followers(eq)
+    leading = [s for s in eq.states if all(s is not follower.state for follower in behind)]
+    made = step(leading, length, frozen, here)
+    moved = {s.value.id: new for s, new in zip(leading, made.states, strict=True)}
+    ends = {**frozen, **moved}
+    for follower in behind:
+        new = followed(follower, length, {**frozen, **here}, ends)
+        moved[follower.state.value.id] = new
+    states = [moved[state.value.id] for state in eq.states]
     square = graph.constant(0.0)
-    for state, error in zip(eq.states, made.errors, strict=True):
+    for state, error in zip(leading, made.errors, strict=True):
         if state.scale is None:
             continue
         scale = state.scale * positions.get(state.name, 1.0)
@@ -88,7 +96,7 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     factor = SAFETY * _inverse_eighth_root(square, allowed)
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
     exact = square <= allowed
-    share, missed = _switched(eq, made, length, frozen, here, moved)
+    share, missed = _switched(eq, leading, made, length, frozen, here, moved)
     # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
     factor = where(missed & (exact | (share < factor)), share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
@@ -107,9 +115,7 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
         moved=moved,
         frozen=frozen,
         here=here,
-        states=[
-            where(taken, new, old) for new, old in zip([*made.states, *after], before, strict=True)
-        ],
+        states=[where(taken, new, old) for new, old in zip([*states, *after], before, strict=True)],
         next_size=where(cut, size, where(proposed > LEAST_S, proposed, LEAST_S)),
         # States that are no numbers any more need no small steps to the end of the span.
         next_left=where(taken, where(square < LOST, left - length, 0.0), left),
@@ -181,6 +187,7 @@ _ONE_BITS = 1023 << 52
 
 def _switched(
     eq: Equations,
+    leading: Sequence[State],
     made: Step,
     length: Value,
     frozen: dict[int, Value],
@@ -214,7 +221,7 @@ def _switched(
         rate = where(passed, sign * speed, rate)
         end = where(passed, sign * at_end, end)
         if switch.turning and frozen:
-            twice = _turned_twice(eq, switch, made, length, frozen)
+            twice = _turned_twice(eq, leading, switch, made, length, frozen)
     slope = rate * length
     bend = end - start - slope
     inside = slope * slope - 4.0 * bend * start
@@ -233,10 +240,15 @@ def _switched(
 
 
 def _turned_twice(
-    eq: Equations, switch: Switch, made: Step, length: Value, frozen: dict[int, Value]
+    eq: Equations,
+    leading: Sequence[State],
+    switch: Switch,
+    made: Step,
+    length: Value,
+    frozen: dict[int, Value],
 ) -> Value:
     """Whether the slide turned on the way although it moves on as before at the end."""
-    at = next(i for i, state in enumerate(eq.states) if state.value is switch.value)
+    at = next(i for i, state in enumerate(leading) if state.value is switch.value)
     turned = eq.graph.constant(False, "truth")
     for states in made.visited:
         back = -frozen[eq["direction"].id] * states[at]

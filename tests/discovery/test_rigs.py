@@ -176,10 +176,11 @@ def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
 
 def test_dry_friction_is_found_at_one_and_two_kilohertz():
     rates = enumerate((1000, 2000))
-    logs = [driven_slide(12.0, lanes=2, seconds=1.5, rate=rate)[k] for k, rate in rates]
+    # Half as long, they do not tell the force from the speed at which it falls.
+    logs = [driven_slide(12.0, lanes=2, seconds=3.0, rate=rate)[k] for k, rate in rates]
     found = diagnose(logs, DRIVEN, propose=False)
     assert named(found) == ["coulomb_friction"], found.sentence
-    assert found.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.1)
+    assert found.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.05)
 
 
 def test_nothing_is_claimed_of_a_muscle_that_lifts_weights():

@@ -9,13 +9,10 @@ import gymnasium as gym
 import numpy as np
 
 from benchmarks.speed.loops import ACTIONS, Missing, Prepared
+from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.envs.engine import Engine
 from pma_gym.plant.plant import Plant
-
-EVALUATIONS = 4
-"""Evaluations of the right-hand side in an attempt at an internal step: three stages, and one with
-its Jacobian where the step begins."""
 
 WATCHED = 64
 """Control steps over which evaluations are counted, fewer of large batches."""

@@ -17,6 +17,7 @@ from benchmarks.accuracy import (
     error_ladder,
     simulated,
 )
+from benchmarks.speed.core import core
 from benchmarks.speed.loops import ACTIONS, BATCHES, Missing, Prepared, single, vector
 from benchmarks.speed.workers import hooks
 from pma_gym.plant.plant import Plant
@@ -98,6 +99,7 @@ def _evaluations(environment: Any) -> dict[str, float]:  # noqa: ANN401 - of eit
 
 
 ROWS = {
+    "core": core,
     "one": one,
     "kernel": kernel,
     "batch": batch,
