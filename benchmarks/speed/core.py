@@ -118,7 +118,7 @@ def counted() -> tuple[Counter[str], int]:
     return found, sum(found[sort] for sort in OPERATIONS) + names["llvm.fma"]
 
 
-def _name(instruction: ir.Instruction) -> str:
+def _name(instruction: Operand) -> str:
     if isinstance(instruction, ir.CallInstr):
         return instruction.callee.name.rpartition(".")[0]
     return instruction.opname
