@@ -54,8 +54,10 @@ def test_a_parameter_that_hides_behind_others_is_named():
     assert abs(value - given) < error
     assert few.paths == (INTERCEPT,)
     value, error = few.estimate(INTERCEPT)
-    assert abs(value - 1.2 * given) < 2.0 * error and abs(value - given) > 4.5 * error
-    assert value == pytest.approx(1.2 * given, abs=2.5 * error)
+    # A change of a fifth is 4.3 errors of it; these trials happen to show 5.0.
+    assert abs(value - given) > 4.5 * error
+    assert value == pytest.approx(1.2 * given, abs=2.0 * error)
+    assert error < 0.5 * free.estimate(INTERCEPT)[1]
 
 
 def test_what_is_off_is_estimated_more_surely_where_nothing_else_is_free():
