@@ -9,6 +9,7 @@ import ctypes
 from collections import Counter
 from collections.abc import Callable
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
@@ -63,7 +64,8 @@ def core(operation: str) -> Prepared:
     Args:
         operation: a name in `OPERATIONS`.
     """
-    library = compiled(["core", operation, __file__], lambda: _module(operation), "core")
+    own = Path(__file__).read_text(encoding="utf-8")
+    library = compiled(["core", operation, own], lambda: _module(operation), "core")
     run = library.function("run", [ctypes.c_int64, ctypes.c_void_p])
     numbers = np.linspace(1.0, 2.0, (CHAINS + 2) * WIDTH)
     # A contraction for the multiply-adds, so that no number leaves the usual range.

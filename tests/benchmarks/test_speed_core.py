@@ -34,7 +34,7 @@ def test_every_sort_is_measured():
 
 
 @pytest.mark.parametrize("operation", OPERATIONS)
-def test_a_core_works_on_numbers_of_the_usual_range(operation):
+def test_a_core_counts_all_lanes_of_all_chains(operation):
     prepared = core(operation)
     assert prepared.chunk() == prepared.chunk() == REPEATS * CHAINS * WIDTH
     assert prepared.facts()["in_attempt"] == counted()[0][operation]
