@@ -16,10 +16,10 @@ from pma_gym.kernels.text import python_text
 from pma_gym.kernels.trace import live_inputs
 from pma_gym.plant.attempt import beginning
 from pma_gym.plant.compose import COMMANDS, ZERO
+from pma_gym.plant.exponential import Step, step
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
-from pma_gym.plant.rosenbrock import VELDHUIZEN, Method, step
 
 SMOOTH = {
     "coulomb_friction.static_n": 0.0,
@@ -27,7 +27,7 @@ SMOOTH = {
     "damping.high_slope_n_s_per_mm_per_kpa": 0.0,
 }
 
-SIZES_S = (8e-4, 4e-4, 2e-4, 1e-4)
+SIZES_S = (4e-3, 2e-3, 1e-3, 5e-4)
 """Sizes of the steps that the order is read from (s)."""
 
 
@@ -36,17 +36,17 @@ class FixedStep:
 
     Args:
         plant: the plant.
-        method: the Rosenbrock method.
+        method: what makes the step.
 
     Attributes:
         text: the function as Python.
     """
 
-    def __init__(self, plant: Plant, method: Method = VELDHUIZEN) -> None:
+    def __init__(self, plant: Plant, method: Callable[..., Step] = step) -> None:
         self.plant = plant
         eq = plant.program.ramped.equations
         frozen, here = beginning(eq)
-        made = step(eq.states, eq.graph.input("step_size", CHANGING), frozen, here, method)
+        made = method(eq.states, eq.graph.input("step_size", CHANGING), frozen, here)
         moved = {s.value.id: new for s, new in zip(eq.states, made.states, strict=True)}
         after = substitute([path.after for path in eq.paths], {**frozen, **moved})
         names = [entry.name for entry in (*eq.states, *eq.paths)]

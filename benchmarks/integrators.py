@@ -1,10 +1,10 @@
 """What other methods of integration would cost at equal error: right-hand sides a control step.
 
-The station is told the trials of `reference`. Rosenbrock methods run compiled, in the plant's own
-march; the others are prototypes in Python with the same memory of the way travelled, the same ends
-of steps at kinks, and the same choice of size from the error. Counted are evaluations of the
-right-hand side in a control step of 10 ms, a Jacobian as one more, and operations: an exponential
-method takes few evaluations and much arithmetic between them.
+The station is told the trials of `reference`. The plant's own method and Rosenbrock methods run
+compiled, in the plant's own march; the others are prototypes in Python with the same memory of the
+way travelled, ends of steps at the same switches, and the same choice of size from the error.
+Counted are evaluations of the right-hand side in a control step of 10 ms, a Jacobian as one more,
+and operations: an exponential method takes few evaluations and much arithmetic between them.
 
 Multirate methods evaluate the muscle's force, which changes slowly, more seldom than the cable and
 the slide. The least that one can cost is bounded: Dormand-Prince's evaluations, which follow cable
@@ -14,7 +14,7 @@ of size and the search for kinks, which those of Rosenbrock methods contain.
 
 import csv
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from io import StringIO
 from pathlib import Path
 
@@ -28,28 +28,33 @@ from benchmarks.files import write_text
 from benchmarks.methods import DORMAND_PRINCE, EXPRB43, GRK4T, RK4, RODAS4, ROS4L, Stepper
 from benchmarks.prototype import Prototype, operations, slow_share
 from benchmarks.reference import TRIALS, Commands, reference, shares
+from benchmarks.rosenbrock import VELDHUIZEN, Method
+from benchmarks.rosenbrock import step as rosenbrock_step
+from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.kernels.lanes import rebind
 from pma_gym.kernels.native import compiled
 from pma_gym.plant.attempt import attempt
 from pma_gym.plant.compose import Equations
+from pma_gym.plant.exponential import step
 from pma_gym.plant.march import Layout
 from pma_gym.plant.model import PLANTS, Model, load_model
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import Program, structure, table
-from pma_gym.plant.rosenbrock import VELDHUIZEN, Method, step
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.plant.system import System
 
 MODEL, PRESSURE, CONTROL_STEPS = "station", 350e3, 60
 TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 SIZES_S = (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5)
-ROSENBROCK: dict[str, tuple[Method, int]] = {
+COMPILED: dict[str, tuple[Method | None, int]] = {
+    "exponential, quotients": (None, EVALUATIONS),
     "van Veldhuizen": (VELDHUIZEN, 4),
     "GRK4T": (GRK4T, 4),
     "ROS4 (L-stable)": (ROS4L, 4),
     "Rodas4": (RODAS4, 7),
 }
-"""Methods and the right-hand sides of an attempt, the Jacobian counted as one more."""
+"""Methods and the right-hand sides of an attempt, the Jacobian counted as one more; None is the
+plant's own."""
 
 PROTOTYPES: dict[str, tuple[Stepper, tuple[float, ...]]] = {
     "classical RK4, fixed steps": (RK4, SIZES_S),
@@ -88,15 +93,15 @@ class Point:
 
 
 class MethodProgram(Program):
-    """A plant's compiled functions with another Rosenbrock method.
+    """A plant's compiled functions with its own method or a Rosenbrock method.
 
     Args:
         model: the model.
-        method: the method.
+        method: the Rosenbrock method; None for the plant's own.
         name: its name.
     """
 
-    def __init__(self, model: Model, method: Method, name: str) -> None:
+    def __init__(self, model: Model, method: Method | None, name: str) -> None:
         self.model, self.method = model, method
         parts = ["integrators", name, *structure(model)]
         self.library = compiled(parts, self._build, f"plant {model.name}, {name}")
@@ -109,7 +114,8 @@ class MethodProgram(Program):
         equations = Equations(self.model.effects, self.model.parameters, ramped=True)
         plant.write_equations(equations)
         equations.finish()
-        own = rebind(attempt, {"step": lambda *given: step(*given, method=self.method)})
+        made_by = step if self.method is None else partial(rosenbrock_step, method=self.method)
+        own = rebind(attempt, {"step": made_by})
         made = own(equations, plant.POSITIONS)
         return System(equations, made, Layout.of(made))
 
@@ -129,7 +135,7 @@ def curves(steps: int = CONTROL_STEPS) -> list[Point]:
     start = plant.settle(0.0, PRESSURE)
     programs = {
         name: MethodProgram(load_model(MODEL), method, name)
-        for name, (method, _) in ROSENBROCK.items()
+        for name, (method, _) in COMPILED.items()
     }
     prototype = Prototype(plant)
     fast = 1.0 - slow_share(plant)
@@ -150,7 +156,7 @@ def curves(steps: int = CONTROL_STEPS) -> list[Point]:
             position = max(away[name] for name in POSITIONS if name in away)
             return Point(trial, method, setting, *costs, max(away.values()), position)
 
-        for name, (_, each) in ROSENBROCK.items():
+        for name, (_, each) in COMPILED.items():
             for tolerance in TOLERANCES:
                 states, made = _compiled(programs[name], tolerance, start, commands)
                 price = programs[name].operations

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from pma_gym.plant.rosenbrock import Method
+from benchmarks.rosenbrock import Method
 
 Vector = NDArray[np.float64]
 Rates = Callable[[Vector], Vector]

@@ -20,9 +20,9 @@ SYNC_COUNTS = (64, 1024)
 TOLERANCES = (1000, 500, 230, 50, 15)
 """Tolerances of an internal step, in millionths of the states' scales; 230 is the default."""
 
-EVALUATIONS = 4
-"""Evaluations of the right-hand side in an attempt at an internal step: three stages, and one with
-its Jacobian where the step begins."""
+EVALUATIONS = 3
+"""Evaluations of the right-hand side in an attempt at an internal step: where the step begins, with
+its Jacobian as one more, and at the stage."""
 
 CORE = {
     "multiply_add": "sums, products, multiply-adds",

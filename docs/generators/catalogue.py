@@ -52,6 +52,10 @@ def _effect(effect: Effect, common: str) -> str:
         parts.append(f"Its memory, by the way travelled: {_law(effect.path)}")
     if effect.switch:
         parts.append(f"Steps end where this is 0: {_law(effect.switch)}")
+    if effect.bend:
+        parts.append(f"Steps end about where this is 0: {_law(effect.bend)}")
+    if effect.path_bend:
+        parts.append(f"Steps end about this far on: {_law(effect.path_bend)}")
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]

@@ -50,12 +50,24 @@ def bearing_rate(spin, memory, p):
     return share * p.force * spin, share * abs(spin)
 
 
+def bearing_turn(spin):
+    """Where the pulley turns, the friction goes another way.
+
+    Args:
+        spin: rate of the pulley's angle (rad/s).
+    Returns:
+        The same (rad/s).
+    """
+    return spin
+
+
 BEARING_FRICTION = Effect(
     name="bearing_friction",
     port="drive_ripple",
     parameters=BearingFriction,
     law=bearing_drag,
     rate=bearing_rate,
+    bend=bearing_turn,
     signature=(
         "load cell reads less while the motor winds in than while it lets go, at the same voltage, "
         "by the same force at every speed and load; friction at the slide shows in the position"

@@ -62,6 +62,18 @@ def tightness(stretch, p):
     return stretch - p.slack
 
 
+def full_damping(stretch, p):
+    """How far the cable is wound in beyond where all of its damper acts; the tension bends at 0.
+
+    Args:
+        stretch: cable wound in less the way of the slide (m).
+        p: Cable.
+    Returns:
+        Way (m), negative while some of the damper is missing.
+    """
+    return stretch - p.slack - 2.0 * TIGHT_FORCE / p.stiffness
+
+
 CABLE = Effect(
     name="cable",
     port="cable",
@@ -69,5 +81,6 @@ CABLE = Effect(
     held=("damping",),
     law=tension,
     switch=tightness,
+    bend=full_damping,
     signature="potentiometer minus LVDT proportional to tension; dead travel at low tension",
 )

@@ -10,6 +10,11 @@ BREAKAWAY_SHARE = 0.7
 """Share of the sliding force below which the bristle is elastic: our assumption."""
 
 
+STRIBECK_SPEEDS = 3.0
+"""Speed, in Stribeck speeds, at which a step ends: the force's fall is too short to be seen from
+beyond."""
+
+
 class CoulombFriction(NamedTuple):
     """Parameters of `friction_force`."""
 
@@ -67,8 +72,37 @@ def friction_path(memory, travel, direction, p):
     )
     reached = begun + direction * travel / p.presliding
     slip = clip((reached - BREAKAWAY_SHARE) * (1.0 / slipping), 0.0, 2.0)
-    elastic = where(reached < BREAKAWAY_SHARE, reached, BREAKAWAY_SHARE)
+    # A step that goes on beyond where it turns is refused, but what it says of there shall be sane.
+    elastic = clip(reached, -1.5, BREAKAWAY_SHARE)
     return direction * (elastic + slipping * slip * (1.0 - 0.25 * slip))
+
+
+def friction_bend(memory, direction, p):
+    """Way to where the deflection begins to bend over, or, from there, to where all bristles slip.
+
+    Args:
+        memory: z where the travel begins.
+        direction: 1 where the slide moves in the direction of contraction, else -1.
+        p: CoulombFriction.
+    Returns:
+        Way (m), 0 where all slip.
+    """
+    start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
+    rest = positive(1.0 - start) * (1.0 / slipping)
+    left = where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
+    return p.presliding * left
+
+
+def stribeck_bend(velocity, p):
+    """Speed beyond that at which nine tenths of what static exceeds dynamic are gone.
+
+    Args:
+        velocity: rate of contraction (m/s).
+        p: CoulombFriction.
+    Returns:
+        Speed (m/s), negative while the force still falls.
+    """
+    return abs(velocity) - STRIBECK_SPEEDS * p.stribeck_speed
 
 
 COULOMB_FRICTION = Effect(
@@ -78,6 +112,8 @@ COULOMB_FRICTION = Effect(
     held=("presliding",),
     law=friction_force,
     path=friction_path,
+    path_bend=friction_bend,
+    bend=stribeck_bend,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "
         "under small changes of load. Stribeck: static over dynamic, the step is higher within "

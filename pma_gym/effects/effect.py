@@ -35,7 +35,11 @@ class Effect:
         path: law of a memory that depends on the way travelled alone, not on time: its value after
             `travel` without turning, from `memory`, `travel`, `direction` and `p`. Exact, so it
             costs the integrator nothing; instead of `rate`.
+        path_bend: way (m) from where a travel begins, by `memory`, `direction` and `p`, to where
+            the path law curves otherwise; not above 0 where it does so nowhere. Steps end about
+            there.
         switch: a signal at whose zero the law has a kink; steps end there.
+        bend: a signal at whose zero the law curves otherwise; steps end about there.
         signature: what sets the effect apart in measured data.
         memories: how many numbers the memory has. Of more than one, laws get `memory` as a tuple,
             and the rate law returns a (source, decay) for each.
@@ -50,7 +54,9 @@ class Effect:
     law: Callable | None = None
     rate: Callable | None = None
     path: Callable | None = None
+    path_bend: Callable | None = None
     switch: Callable | None = None
+    bend: Callable | None = None
     signature: str = ""
     memory_scale: float = 1.0
     memories: int = 1
@@ -205,8 +211,8 @@ class Effect:
         )
 
     def laws(self) -> Iterator[Callable]:
-        """The law and the rate law, where there are any."""
-        every = (self.law, self.rate, self.path, self.switch)
+        """The law and those beside it, where there are any."""
+        every = (self.law, self.rate, self.path, self.path_bend, self.switch, self.bend)
         yield from (law for law in every if law is not None)
 
 

@@ -2,6 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
+from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -34,17 +35,20 @@ def hysteresis_force(memory, p):
     return -p.force * memory
 
 
-def hysteresis_rate(velocity, memory, p):
-    """Rate of the hysteretic state: z' = (x' - |x'| z) / distance.
+def hysteresis_path(memory, travel, direction, p):
+    """Z after the slide has travelled on without turning.
+
+    It solves z' = (x' - |x'| z) / distance: z goes to the direction of motion over the distance.
 
     Args:
-        velocity: rate of contraction x' (m/s).
-        memory: z.
+        memory: z where the travel began.
+        travel: displacement since then (m), in the direction of contraction.
+        direction: 1 where the slide moves in the direction of contraction, else -1.
         p: Hysteresis.
     Returns:
-        (source, decay) with z' = source - decay * z (1/s).
+        z after it.
     """
-    return velocity / p.distance, abs(velocity) / p.distance
+    return direction + (memory - direction) * exponential(-direction * travel / p.distance)
 
 
 HYSTERESIS = Effect(
@@ -52,7 +56,7 @@ HYSTERESIS = Effect(
     port="muscle_force",
     parameters=Hysteresis,
     law=hysteresis_force,
-    rate=hysteresis_rate,
+    path=hysteresis_path,
     signature=(
         "loops whose area does not depend on rate, with nested minor loops; the force lags behind "
         "the way over some millimetres after a turn, where dry friction turns at once"

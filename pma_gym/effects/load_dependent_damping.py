@@ -49,6 +49,19 @@ def load_factor(pressure, cable_tension, p):
     return positive(1.0 + share * (p.linear + p.quadratic * share))
 
 
+def load_bend(pressure, cable_tension, p):
+    """How far the share of the muscle's force is from where it bends over to 1.
+
+    Args:
+        pressure: gauge pressure (Pa).
+        cable_tension: load of the muscle (N).
+        p: LoadDependentDamping.
+    Returns:
+        Share, negative while it bends over.
+    """
+    return abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - BEND
+
+
 LOAD_DEPENDENT_DAMPING = Effect(
     name="load_dependent_damping",
     port="damping_factor",
@@ -58,5 +71,6 @@ LOAD_DEPENDENT_DAMPING = Effect(
         "force_intercept",
     ),
     law=load_factor,
+    bend=load_bend,
     signature="force proportional to speed, by a factor that depends on the load",
 )

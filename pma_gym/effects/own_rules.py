@@ -89,7 +89,9 @@ def _arguments(effect: Effect, _module: ModuleType) -> str:
         (effect.law, (*place, *memory)),
         (effect.rate, (*EVERYTHING, "memory")),
         (effect.path, path),
+        (effect.path_bend, ("memory", "direction")),
         (effect.switch, (*STATES, "stretch")),
+        (effect.bend, (*STATES, "stretch")),
     ]
     for law, names in known:
         unknown = [name for name in signals(law) if name not in (*names, "p")] if law else []

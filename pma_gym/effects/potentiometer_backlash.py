@@ -52,15 +52,27 @@ def play_rate(spin, memory, p):
     return pace, where(pace * memory > 0.0, abs(pace * memory) * square, 0.0)
 
 
+def play_turn(spin):
+    """Where the pulley turns, the place in the play goes another way.
+
+    Args:
+        spin: rate of the pulley's angle (rad/s).
+    Returns:
+        The same (rad/s).
+    """
+    return spin
+
+
 POTENTIOMETER_BACKLASH = Effect(
     name="potentiometer_backlash",
     port="sensor:rotation",
     parameters=PotentiometerBacklash,
     law=play,
     rate=play_rate,
+    bend=play_turn,
     signature=(
         "measured rotation stands still after every turn, over the same angle at every load and "
         "rate, while LVDT and load cell go on"
     ),
-    memory_scale=0.1,
+    memory_scale=1.0,
 )

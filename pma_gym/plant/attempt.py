@@ -1,32 +1,34 @@
 """One attempt at a step: how long it is, whether it is good enough, how long the next should be."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pma_gym.kernels.generic import from_bits, square_root, to_bits, where
+from pma_gym.kernels.generic import from_bits, to_bits, where
 from pma_gym.kernels.graph import CHANGING, FIXED, Value
 from pma_gym.kernels.substitute import substitute
-from pma_gym.plant.compose import Equations, State, Switch
+from pma_gym.plant.compose import Equations
+from pma_gym.plant.exponential import step
 from pma_gym.plant.followers import followed, followers
-from pma_gym.plant.rosenbrock import Step, step
+from pma_gym.plant.kinks import ahead, passed, turns
 
 SAFETY = 0.8
-SHRINK, GROW = 0.1, 4.0
+SHRINK, GROW = 0.1, 6.0
 """How much smaller or larger the next attempt is than this one, at most."""
 
 LEAST_S = 1e-7
 """A step of this length (s) is taken whatever its error."""
 
+SHORTER = 0.999
+"""Whatever is not taken is tried again at this share of its length at most, or it would be tried
+for ever."""
+
 LOST = 1e20
 """A step of the least length with such an error, or one that is no number, ends the span: what the
 states are then says that the trial was lost."""
 
-AIMED = 0.995
-"""Share of a step behind which a switch has been aimed at."""
-
-BEYOND = 1.001
-"""How far a step goes on to be surely past a switch, as a factor."""
+LANDED_S = 1.2e-4
+"""First step after a switch (s), at most: friction turns within some hundredths of a millimetre."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,11 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     # Two halves instead of a step and a scrap.
     length = where(left <= size, left, where(left < 2.0 * size, 0.5 * left, size))
     frozen, here = beginning(eq)
+    found, landing = ahead(eq, size, frozen, here), graph.constant(False, "truth")
+    if found is not None:
+        sooner = found.length < length
+        landing = found.landing & sooner
+        length = where(sooner, found.length, length)
     behind = followers(eq)
     leading = [s for s in eq.states if all(s is not follower.state for follower in behind)]
     made = step(leading, length, frozen, here)
@@ -96,14 +103,16 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     factor = SAFETY * _inverse_eighth_root(square, allowed)
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
     exact = square <= allowed
-    share, missed = _switched(eq, leading, made, length, frozen, here, moved)
+    share, missed = passed(eq, leading, made, length, frozen, here, moved)
     # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
+    share = where(share < SHORTER, share, SHORTER)
     factor = where(missed & (exact | (share < factor)), share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
     proposed = length * factor
     # A step cut short by the end of the span says little against the size before.
     cut = taken & (length < size) & (proposed < size)
     after = substitute([path.after for path in eq.paths], {**frozen, **moved})
+    landed = where(size < LANDED_S, size, LANDED_S)
     before = [state.value for state in eq.states] + [path.value for path in eq.paths]
     return Attempt(
         size=size,
@@ -116,7 +125,11 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
         frozen=frozen,
         here=here,
         states=[where(taken, new, old) for new, old in zip([*states, *after], before, strict=True)],
-        next_size=where(cut, size, where(proposed > LEAST_S, proposed, LEAST_S)),
+        next_size=where(
+            landing & taken,
+            landed,
+            where(cut, size, where(proposed > LEAST_S, proposed, LEAST_S)),
+        ),
         # States that are no numbers any more need no small steps to the end of the span.
         next_left=where(taken, where(square < LOST, left - length, 0.0), left),
     )
@@ -129,13 +142,13 @@ def first_size(size: Any, jump: Any) -> Any:  # noqa: ANN401
         size: size that the attempts before had come to (s).
         jump: how far the command jumps (V).
     Returns:
-        The same, but 0.33 ms at most after a jump of 1 V, and less with its fourth root.
+        The same, but 1 ms at most after a jump of 1 V, and less with its fourth root.
     """
     most = JUMP_S * _inverse_eighth_root(jump * jump, 1.0)
     return where(size < most, size, most)
 
 
-JUMP_S = 3.3e-4
+JUMP_S = 1e-3
 """First attempt after a jump of 1 V (s): of the random steps of 3 V, one in fifty is too large."""
 
 
@@ -145,14 +158,15 @@ def beginning(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
         return {}, {}
     way, speed = eq.travelled
     here = {path.after.id: path.value for path in eq.paths}
-    (rate,) = substitute([_rate_of(eq, speed)], here)
-    still = where(rate < 0.0, -1.0, 1.0)
-    direction = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, still))
+    if eq.travel is not None:
+        here[eq.travel.id] = eq.graph.constant(0.0)
+    (rate,) = substitute([eq.rate_of(speed)], here)
+    onwards = where(rate < 0.0, -1.0, 1.0)
+    direction = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, onwards))
+    for switch in eq.switches:
+        if switch.turning:
+            direction = where(turns(switch, speed, rate), onwards, direction)
     return {eq["origin"].id: way, eq["direction"].id: direction}, here
-
-
-def _rate_of(eq: Equations, value: Value) -> Value:
-    return next(state.rate for state in eq.states if state.value is value)
 
 
 def _allowed(eq: Equations) -> Value:
@@ -164,11 +178,12 @@ def _allowed(eq: Equations) -> Value:
         return eq.graph.constant(1.0)
     share = eq.travelled[1] * (1.0 / SWIFT_M_PER_S)
     square = share * share
-    return 1.0 + where(square < 1e6, square, 1e6)
+    return 1.0 + where(square < SWIFTEST, square, SWIFTEST)
 
 
-SWIFT_M_PER_S = 0.075
-"""Speed of the slide at which twice the squared error is allowed (m/s)."""
+SWIFT_M_PER_S, SWIFTEST = 0.075, 36.0
+"""Speed of the slide at which twice the squared error is allowed (m/s), and the most that is added
+to it: an error of a step stays a thousandth of a thousandth of the range."""
 
 
 def _inverse_eighth_root(square: Any, allowed: Any) -> Any:  # noqa: ANN401
@@ -183,74 +198,3 @@ def _inverse_eighth_root(square: Any, allowed: Any) -> Any:  # noqa: ANN401
 
 _ONE_BITS = 1023 << 52
 """Bits of 1.0."""
-
-
-def _switched(
-    eq: Equations,
-    leading: Sequence[State],
-    made: Step,
-    length: Value,
-    frozen: dict[int, Value],
-    here: dict[int, Value],
-    moved: dict[int, Value],
-) -> tuple[Value, Value]:
-    """Share of the step at which a switch is passed, and whether it may not be missed.
-
-    The share is that of the last of the switches that are passed; the others come in turn.
-    """
-    graph = eq.graph
-    missed = twice = graph.constant(False, "truth")
-    start = rate = end = graph.constant(1.0)
-    for switch in eq.switches:
-        at_end, at_start, speed = (
-            *substitute([switch.value], {**frozen, **moved}),
-            switch.value,
-            *substitute([switch.rate], {**frozen, **here}),
-        )
-        sign = where(
-            at_start > 0.0, 1.0, where(at_start < 0.0, -1.0, where(speed < 0.0, -1.0, 1.0))
-        )
-        beyond = -sign * at_end
-        # Way beyond the point of turning, or penetration times its share of the step, by the speed
-        # at which the parabola through both ends comes there.
-        over = beyond * beyond * (0.5 * length if switch.turning else 1.0)
-        coming = 2.0 * (at_end - at_start) - speed * length
-        passed = (beyond > 0.0) & (over > switch.overshoot * abs(coming))
-        missed = missed | passed
-        start = where(passed, sign * at_start, start)
-        rate = where(passed, sign * speed, rate)
-        end = where(passed, sign * at_end, end)
-        if switch.turning and frozen:
-            twice = _turned_twice(eq, leading, switch, made, length, frozen)
-    slope = rate * length
-    bend = end - start - slope
-    inside = slope * slope - 4.0 * bend * start
-    root = square_root(where(inside > 0.0, inside, 0.0))
-    # The form of the solution that adds what has one sign: where a switch first moves off, from as
-    # good as zero, the difference of root and slope has no digit that is right, and may be zero.
-    off = slope > 0.0
-    share = where(off, root + slope, 2.0 * start) / where(off, -2.0 * bend, root - slope)
-    # What lies in the last bit of the step has been aimed at: no step aims twice.
-    aimed = share >= AIMED
-    missed = (missed & ~aimed) | twice
-    # From rest the way back may begin at once: 0 / 0, which is no share above 0.05. Whatever is
-    # not taken is tried again shorter, or it would be tried for ever.
-    share = where((end < 0.0) & ~aimed, where(share > 0.05, BEYOND * share, 0.05), 0.5)
-    return share, missed
-
-
-def _turned_twice(
-    eq: Equations,
-    leading: Sequence[State],
-    switch: Switch,
-    made: Step,
-    length: Value,
-    frozen: dict[int, Value],
-) -> Value:
-    """Whether the slide turned on the way although it moves on as before at the end."""
-    at = next(i for i, state in enumerate(leading) if state.value is switch.value)
-    turned = eq.graph.constant(False, "truth")
-    for states in made.visited:
-        back = -frozen[eq["direction"].id] * states[at]
-        turned = turned | (back * (0.25 * length) > 10.0 * switch.overshoot)
-    return turned

@@ -49,7 +49,7 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 
-POSITIONS: dict[str, float] = {"extension": 0.3, "servo": 0.3}
+POSITIONS: dict[str, float] = {"extension": 0.003, "servo": 0.01}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 SCALES: dict[str, float] = {

@@ -19,7 +19,7 @@ from pma_gym.kernels.trace import trace
 COMMANDS = ("motor_voltage", "regulator_voltage")
 """What a plant is told (V)."""
 
-LAG_SHARE = 10.0
+LAG_SHARE = 5.0
 """Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
 
 ZERO = "zero_contraction"
@@ -106,6 +106,19 @@ class Switch:
     turning: bool = False
 
 
+@dataclass(frozen=True)
+class Bend:
+    """A value at whose zero a law curves otherwise: a step ends about there.
+
+    Attributes:
+        value: the value.
+        rate: its time derivative.
+    """
+
+    value: Value
+    rate: Value
+
+
 class Equations:
     """A plant's right-hand side.
 
@@ -122,8 +135,11 @@ class Equations:
         states: the states that have rates, in the order of the state vector.
         paths: the memories of the way travelled, which follow them there.
         switches: where steps end.
+        bends: where they end about.
+        ways: how far the way of a step may go before a memory of it bends (m), where it begins.
         outputs: true outputs by name.
         travelled: the state whose way they remember, and its rate.
+        travel: its way since the step began; None where nothing remembers it.
     """
 
     def __init__(
@@ -146,7 +162,10 @@ class Equations:
         self.states: list[State] = []
         self.paths: list[Path] = []
         self.switches: list[Switch] = []
+        self.bends: list[Bend] = []
+        self.ways: list[Value] = []
         self.travelled: tuple[Value, Value] | None = None
+        self.travel: Value | None = None
         self.outputs: dict[str, Value] = {}
 
     def finish(self) -> None:
@@ -193,9 +212,12 @@ class Equations:
                 return path.after
         assert self.travelled is not None
         start, parameters = self[name], self.parameters[effect.name]
-        travel = self.travelled[0] - self["origin"]
-        after = trace(effect.path, start, travel, self["direction"], parameters)
+        direction = self["direction"]
+        self.travel = self.travelled[0] - self["origin"]
+        after = trace(effect.path, start, self.travel, direction, parameters)
         self.paths.append(Path(name, start, after, effect.memory_scale))
+        if effect.path_bend:
+            self.ways.append(trace(effect.path_bend, start, direction, parameters))
         return after
 
     def let(self, name: str, value: Value) -> Value:
@@ -266,12 +288,24 @@ class Equations:
 
     def add_switch(self, name: str, value: Value, overshoot: float, turning: bool = False) -> None:
         """Add a value at whose zero steps end; all states must have been added."""
+        self.switches.append(Switch(name, value, self._slope(value), overshoot, turning))
+
+    def add_bend(self, value: Value) -> None:
+        """Add a value at whose zero a law bends; all states must have been added."""
+        self.bends.append(Bend(value, self._slope(value)))
+
+    def rate_of(self, value: Value) -> Value:
+        """Rate of a state."""
+        return next(state.rate for state in self.states if state.value is value)
+
+    def _slope(self, value: Value) -> Value:
+        """Time derivative of a value."""
         slopes = derivative(value, [state.value for state in self.states])
         rate = self.graph.constant(0.0)
         for slope, state in zip(slopes, self.states, strict=True):
             if slope is not None:
                 rate = rate + slope * state.rate
-        self.switches.append(Switch(name, value, rate, overshoot, turning))
+        return rate
 
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, by what an error of its output is counted against.

@@ -60,7 +60,9 @@ def _is_followed(eq: Equations, state: State) -> bool:
     others = [other.rate for other in eq.states if other is not state]
     paths = [path.after for path in eq.paths]
     switches = [value for switch in eq.switches for value in (switch.value, switch.rate)]
-    return any(value is state.value for value in live_inputs([*others, *paths, *switches]))
+    bends = [value for bend in eq.bends for value in (bend.value, bend.rate)]
+    known = live_inputs([*others, *paths, *switches, *bends])
+    return any(value is state.value for value in known)
 
 
 def followed(

@@ -77,3 +77,6 @@ class Notation(Equations):
 
     def add_switch(self, *_: Any, **__: Any) -> None:
         """Nothing: where steps end is no part of the equations."""
+
+    def add_bend(self, *_: Any) -> None:
+        """Nothing, as for switches."""

@@ -45,7 +45,7 @@ friction turns an error of 1 nm into one of a ten-thousandth of its force."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
-    "velocity": 0.1,
+    "velocity": 0.4,
     "angle": 1.0,
     "spin": 4.0,
     "pressure": 500e3,
@@ -137,3 +137,6 @@ def _write_states(eq: Equations) -> None:
         if effect.switch:
             name = effect.switch.__name__
             eq.add_switch(name, eq.call(effect, effect.switch), TIGHTENING_M)
+    for effect in eq.effects.values():
+        if effect.bend:
+            eq.add_bend(eq.call(effect, effect.bend))

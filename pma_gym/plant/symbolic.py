@@ -69,7 +69,7 @@ class _Expressions(Notation):
         speed, travel = self.travelled[1], sympy.Symbol("travel", real=True)
         direction = sympy.Piecewise((-1, speed < 0), (1, True))
         # Choices as such: the derivative of Max or Min is a step function.
-        choices = {"where": self._arithmetic["where"]}
+        choices = {name: self._arithmetic[name] for name in ("where", "exponential")}
         rates = {}
         for name, effect in self.roads.items():
             path = rebind(effect.path, choices)  # pyright: ignore[reportArgumentType]

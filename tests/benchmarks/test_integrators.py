@@ -23,7 +23,7 @@ def test_the_report_has_every_method_in_every_trial(tmp_path):
     assert len(rows) == len(points)
     methods = {point.method for point in points}
     assert methods == {
-        *integrators.ROSENBROCK,
+        *integrators.COMPILED,
         *integrators.PROTOTYPES,
         integrators.MULTIRATE,
     }

@@ -64,7 +64,7 @@ def test_a_random_policy_takes_few_attempts():
         columns = (told.time, told.motor, told.regulator)
         run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
         attempts += simulate_all(plant.program, [run])
-    assert attempts / (3 * steps) < 25.0
+    assert attempts / (3 * steps) < 15.0
 
 
 @pytest.mark.parametrize("model", ["serres2008", "station"])
@@ -101,7 +101,7 @@ def test_the_reference_ends_its_spans_at_kinks():
 
 def test_energy_stays_where_nothing_dissipates():
     # In half a second of swinging at 180 Hz, as a share of what moves about.
-    drifts = [energy_drift(tolerance, 0.5) for tolerance in (DEFAULT_TOLERANCE, 1e-5, 1e-7)]
+    drifts = [energy_drift(tolerance, 0.5) for tolerance in (DEFAULT_TOLERANCE, 1e-6, 1e-8)]
     assert drifts[0] < 5e-6
     assert drifts[1] < 1e-7
     assert drifts[2] < 1e-9

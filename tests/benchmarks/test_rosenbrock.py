@@ -1,15 +1,13 @@
-"""The Rosenbrock method: its coefficients, its order, and its stability."""
+"""The Rosenbrock methods to compare with: their coefficients, their order, and their stability."""
 
 import numpy as np
 import pytest
 
-from benchmarks.convergence import FixedStep, orders, smooth_plant
 from benchmarks.methods import GRK4T, RODAS4, ROS4L
+from benchmarks.rosenbrock import VELDHUIZEN, step
 from pma_gym.kernels.graph import CHANGING, Graph
 from pma_gym.kernels.text import evaluate
 from pma_gym.plant.compose import State
-from pma_gym.plant.elimination import solver
-from pma_gym.plant.rosenbrock import VELDHUIZEN, step
 
 METHODS = {
     "van Veldhuizen": VELDHUIZEN,
@@ -145,45 +143,3 @@ def test_what_is_linear_decays_whatever_its_rate(rate):
     (after,) = evaluate(made.states, {"x": 1.0, "size": 0.1})
     assert float(after) == pytest.approx(growth(VELDHUIZEN, -0.1 * rate).real, abs=1e-10)
     assert abs(float(after)) <= 1.0
-
-
-@pytest.mark.parametrize("damping", [0.05, 2.9, 14.5])
-def test_order_four_on_the_plant(damping):
-    # 14.5 N s/mm is 29 000 1/s of damping over mass: 23 times these steps, and no loss of order.
-    errors, found = orders(damping, np.array([8e-4, 4e-4, 2e-4]))
-    assert np.all((3.8 < found) & (found < 4.2))
-    assert errors[0].max() < 1e-8
-
-
-def test_the_plants_estimate_is_of_order_three():
-    plant = smooth_plant(2.9)
-    rest, regulator = plant.settle(4.0, 400e3), plant.regulator_voltage(400e3)
-    fixed = FixedStep(plant)
-    estimates = []
-    for size in 4e-4 * 0.5 ** np.arange(4):
-        _, errors = fixed(rest.state, (4.5, 0.0), (regulator, 0.0), rest.zero_contraction, size)
-        estimates.append(abs(errors[plant.states.index("spin")]))
-    found = np.log2(np.divide(estimates[:-1], estimates[1:]))
-    assert np.all((3.8 < found) & (found < 4.5))
-
-
-def test_elimination_solves_what_numpy_solves():
-    generator = np.random.default_rng(2)
-    for _ in range(20):
-        graph, count = Graph(), 7
-        part = float(10.0 ** generator.uniform(-7.0, 0.0))
-        numbers = 0.3 * generator.standard_normal((count, count)) / count / part
-        full = generator.uniform(size=(count, count)) < 0.4
-        jacobian = [
-            [graph.input(f"{i},{j}", CHANGING) if full[i, j] else None for j in range(count)]
-            for i in range(count)
-        ]
-        right = [graph.input(f"{i}", CHANGING) if i % 3 else None for i in range(count)]
-        solution = solver(jacobian, graph.input("part", CHANGING))(right)
-        values = generator.standard_normal(count)
-        given = {f"{i},{j}": numbers[i, j] for i in range(count) for j in range(count)}
-        given |= {f"{i}": values[i] for i in range(count)} | {"part": part}
-        matrix = np.eye(count) / part - np.where(full, numbers, 0.0)
-        expected = np.linalg.solve(matrix, np.where(np.arange(count) % 3 > 0, values, 0.0))
-        found = [float(v) for v in evaluate(solution, given)]
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14 * part)

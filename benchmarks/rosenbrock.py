@@ -1,11 +1,11 @@
-"""The integrator: a Rosenbrock method of order 4 with its own error estimate.
+"""Rosenbrock methods with their own error estimates, to compare with the plant's integrator.
 
     (I / (gamma h) - J) u_i = f(y + sum_j a_ij u_j) + sum_j (c_ij / h) u_j
     y_new = y + sum_i m_i u_i,    error = sum_i e_i u_i
 
-J is the exact Jacobian at the step's start, differentiated from the laws themselves. Only linear
-equations are solved, so what is fast and damped (a bristle in sliding friction, a sensor's lag, the
-servo's 13 428 1/s) costs no small steps, and each trial chooses its own step from the error.
+J is the exact Jacobian at the step's start, differentiated from the laws themselves. The plant was
+integrated with van Veldhuizen's coefficients until `pma_gym.plant.exponential` took half as many
+attempts at the same errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,7 +15,8 @@ from pma_gym.kernels.derivative import derivatives
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.substitute import substitute
 from pma_gym.plant.compose import State
-from pma_gym.plant.elimination import Entry, solver
+from pma_gym.plant.elimination import solver
+from pma_gym.plant.exponential import Step, substituted, total
 
 
 @dataclass(frozen=True)
@@ -51,29 +52,11 @@ VELDHUIZEN = Method(
 )
 """Order 4(3), three evaluations of the rates, A(89.4 deg)-stable.
 
-Beside GRK4T (Kaps and Rentrop 1979) errors of most trials are 10 to 20 % smaller at as many
-attempts; the default tolerance makes fewer attempts at the same errors of it.
-
 Source: M. van Veldhuizen 1984, "D-stability and Kaps-Rentrop methods", Computing 32. The paper was
 not at hand: the digits are those of public solvers that have the method in the form which needs no
 product with the Jacobian (E. Hairer and G. Wanner's ROS4, OrdinaryDiffEq.jl's Veldd4), and a test
 holds the conditions of order.
 """
-
-
-@dataclass(frozen=True)
-class Step:
-    """One step, as values.
-
-    Attributes:
-        states: states at its end.
-        errors: estimated error of each state.
-        visited: states at the stages on the way.
-    """
-
-    states: list[Value]
-    errors: list[Value]
-    visited: list[list[Value]]
 
 
 def step(
@@ -93,7 +76,7 @@ def step(
         method: the method.
     """
     values, rates = [s.value for s in states], [s.rate for s in states]
-    jacobian = _substituted(derivatives(rates, values), frozen)
+    jacobian = substituted(derivatives(rates, values), frozen)
     part = method.gamma * size
     solve = solver(jacobian, part)
     stages: list[list[Value]] = []
@@ -102,7 +85,7 @@ def step(
     for coefficients, couplings in zip(method.stages, method.couplings, strict=True):
         if coefficients is not None:
             moved = {
-                value.id: _sum(value, coefficients, [stage[i] for stage in stages])
+                value.id: total(value, coefficients, [stage[i] for stage in stages])
                 for i, value in enumerate(values)
             }
             given = {**frozen, **moved} if coefficients else {**frozen, **here}
@@ -110,26 +93,12 @@ def step(
             visited.append([moved[value.id] for value in values])
         factors = [(method.gamma * coupling) * (1.0 / part) for coupling in couplings]
         right = [
-            _sum(slope, factors, [stage[i] for stage in stages]) for i, slope in enumerate(slopes)
+            total(slope, factors, [stage[i] for stage in stages]) for i, slope in enumerate(slopes)
         ]
         stages.append(solve(right))
     across = [[stage[i] for stage in stages] for i in range(len(values))]
     return Step(
-        states=[_sum(v, method.weights, u) for v, u in zip(values, across, strict=True)],
-        errors=[_sum(None, method.errors, u) for u in across],
+        states=[total(v, method.weights, u) for v, u in zip(values, across, strict=True)],
+        errors=[total(None, method.errors, u) for u in across],
         visited=visited[1:],
     )
-
-
-def _substituted(jacobian: list[list[Entry]], given: Mapping[int, Value]) -> list[list[Entry]]:
-    present = [entry for row in jacobian for entry in row if entry is not None]
-    found = iter(substitute(present, given))
-    return [[None if entry is None else next(found) for entry in row] for row in jacobian]
-
-
-def _sum(start: Value | None, factors: Sequence[Value | float], values: Sequence[Value]) -> Value:
-    total = start
-    for factor, value in zip(factors, values, strict=True):
-        total = factor * value if total is None else total + factor * value
-    assert total is not None
-    return total
