@@ -12,8 +12,9 @@ from pma_gym.kernels.graph import FIXED, HELD, Value
 from pma_gym.kernels.substitute import substitute
 from pma_gym.kernels.text import python_text
 from pma_gym.kernels.trace import live_inputs, operation_counts
-from pma_gym.plant.attempt import BEYOND, GROW, LEAST_S, SAFETY, SHRINK
+from pma_gym.plant.attempt import GROW, LEAST_S, SAFETY, SHRINK
 from pma_gym.plant.compose import COMMANDS, ZERO, State
+from pma_gym.plant.kinks import BEYOND
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import FIRST_S, parameter_names
 from pma_gym.plant.station import POSITIONS, TIGHTENING_M, TURNING_M

@@ -41,6 +41,10 @@ memory together."""
 LEAST_PART = 1e-6
 """Share of a probe's change that parameters must leave, or it is one of theirs."""
 
+LEAST_CHANGE = 1e-3
+"""Root mean square of a probe's change in standard deviations of the noise, at least: what is less
+may be steps of the integrator that rounding made fall otherwise."""
+
 
 @dataclass(frozen=True)
 class Look:
@@ -150,6 +154,7 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
     across = np.zeros((size - 1, len(suspect.probes)))
     whole = np.zeros(len(suspect.probes))
     along, own = [], []
+    readings = sum(part[0].size for part in changes)
     for logged, ours, theirs in zip(
         baseline.evidence.logged, baseline.columns, changes, strict=True
     ):
@@ -162,7 +167,8 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
             found.append(np.add.reduceat(slopes, edges, axis=1))
     weights = baseline.inverse @ across
     strengths = whole - np.sum(across * weights, axis=0)
-    strengths = np.where(strengths > LEAST_PART * np.maximum(whole, 1e-12), strengths, 0.0)
+    seen = (strengths > LEAST_PART * whole) & (whole > LEAST_CHANGE**2 * readings)
+    strengths = np.where(seen, strengths, 0.0)
     slopes = np.concatenate(along, axis=1) - weights.T @ np.concatenate(own, axis=1)
     return _Probed(slopes, strengths, _changes(baseline, changes, weights))
 

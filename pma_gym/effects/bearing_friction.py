@@ -2,6 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
+from pma_gym.effects.arithmetic import where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -50,15 +51,17 @@ def bearing_rate(spin, memory, p):
     return share * p.force * spin, share * abs(spin)
 
 
-def bearing_turn(spin):
+def bearing_turn(spin, p):
     """Where the pulley turns, the friction goes another way.
 
     Args:
         spin: rate of the pulley's angle (rad/s).
+        p: BearingFriction.
     Returns:
-        The same (rad/s).
+        The same (rad/s); 1 where there is no friction.
     """
-    return spin
+    there = where(p.force > 0.0, 1.0, 0.0)
+    return there * spin + (1.0 - there)
 
 
 BEARING_FRICTION = Effect(

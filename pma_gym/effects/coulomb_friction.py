@@ -85,12 +85,12 @@ def friction_bend(memory, direction, p):
         direction: 1 where the slide moves in the direction of contraction, else -1.
         p: CoulombFriction.
     Returns:
-        Way (m), 0 where all slip.
+        Way (m), 0 where all slip or nothing rubs.
     """
     start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
     rest = positive(1.0 - start) * (1.0 / slipping)
     left = where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
-    return p.presliding * left
+    return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * left
 
 
 def stribeck_bend(velocity, p):
@@ -100,9 +100,11 @@ def stribeck_bend(velocity, p):
         velocity: rate of contraction (m/s).
         p: CoulombFriction.
     Returns:
-        Speed (m/s), negative while the force still falls.
+        Speed (m/s), negative while the force still falls; 1 where it does not fall.
     """
-    return abs(velocity) - STRIBECK_SPEEDS * p.stribeck_speed
+    above = abs(velocity) - STRIBECK_SPEEDS * p.stribeck_speed
+    falls = where(p.static > p.dynamic, 1.0, 0.0)
+    return falls * above + (1.0 - falls)
 
 
 COULOMB_FRICTION = Effect(

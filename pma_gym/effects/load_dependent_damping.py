@@ -2,7 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
-from pma_gym.effects.arithmetic import clip, positive
+from pma_gym.effects.arithmetic import clip, positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
@@ -57,9 +57,11 @@ def load_bend(pressure, cable_tension, p):
         cable_tension: load of the muscle (N).
         p: LoadDependentDamping.
     Returns:
-        Share, negative while it bends over.
+        Share, negative while it bends over; 1 where the effect is absent.
     """
-    return abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - BEND
+    away = abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - BEND
+    there = where(abs(p.linear) + abs(p.quadratic) > 0.0, 1.0, 0.0)
+    return there * away + (1.0 - there)
 
 
 LOAD_DEPENDENT_DAMPING = Effect(

@@ -52,15 +52,17 @@ def play_rate(spin, memory, p):
     return pace, where(pace * memory > 0.0, abs(pace * memory) * square, 0.0)
 
 
-def play_turn(spin):
+def play_turn(spin, p):
     """Where the pulley turns, the place in the play goes another way.
 
     Args:
         spin: rate of the pulley's angle (rad/s).
+        p: PotentiometerBacklash.
     Returns:
-        The same (rad/s).
+        The same (rad/s); 1 where there is no play.
     """
-    return spin
+    there = where(p.width > 0.0, 1.0, 0.0)
+    return there * spin + (1.0 - there)
 
 
 POTENTIOMETER_BACKLASH = Effect(

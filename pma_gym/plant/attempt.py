@@ -20,8 +20,8 @@ LEAST_S = 1e-7
 """A step of this length (s) is taken whatever its error."""
 
 SHORTER = 0.999
-"""Whatever is not taken is tried again at this share of its length at most, or it would be tried
-for ever."""
+"""Largest share of its length at which a step that passed a switch is tried again: where no smaller
+one is found it is halved, or it would be tried for ever."""
 
 LOST = 1e20
 """A step of the least length with such an error, or one that is no number, ends the span: what the
@@ -105,7 +105,7 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     exact = square <= allowed
     share, missed = passed(eq, leading, made, length, frozen, here, moved)
     # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
-    share = where(share < SHORTER, share, SHORTER)
+    share = where(share < SHORTER, share, 0.5)
     factor = where(missed & (exact | (share < factor)), share, factor)
     taken = (exact & ~missed) | (length <= LEAST_S)
     proposed = length * factor

@@ -290,9 +290,12 @@ class Equations:
         """Add a value at whose zero steps end; all states must have been added."""
         self.switches.append(Switch(name, value, self._slope(value), overshoot, turning))
 
-    def add_bend(self, value: Value) -> None:
-        """Add a value at whose zero a law bends; all states must have been added."""
-        self.bends.append(Bend(value, self._slope(value)))
+    def add_bends(self) -> None:
+        """Add the bends of the effects' laws; all states must have been added."""
+        for effect in self.effects.values():
+            if effect.bend:
+                value = self.call(effect, effect.bend)
+                self.bends.append(Bend(value, self._slope(value)))
 
     def rate_of(self, value: Value) -> Value:
         """Rate of a state."""

@@ -78,5 +78,5 @@ class Notation(Equations):
     def add_switch(self, *_: Any, **__: Any) -> None:
         """Nothing: where steps end is no part of the equations."""
 
-    def add_bend(self, *_: Any) -> None:
+    def add_bends(self) -> None:
         """Nothing, as for switches."""

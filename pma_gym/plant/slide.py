@@ -61,6 +61,7 @@ def write_equations(equations: Equations) -> None:
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)
     eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
+    eq.add_bends()
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:

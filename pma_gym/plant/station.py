@@ -137,6 +137,4 @@ def _write_states(eq: Equations) -> None:
         if effect.switch:
             name = effect.switch.__name__
             eq.add_switch(name, eq.call(effect, effect.switch), TIGHTENING_M)
-    for effect in eq.effects.values():
-        if effect.bend:
-            eq.add_bend(eq.call(effect, effect.bend))
+    eq.add_bends()

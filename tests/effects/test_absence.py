@@ -8,7 +8,6 @@ from pma_gym.effects import CATALOGUE
 
 WITHOUT_MEMORY = (
     "passive_stretch",
-    "load_dependent_damping",
     "drive_dead_zone",
     "drive_saturation",
     "torque_ripple",
@@ -23,6 +22,7 @@ WITHOUT_MEMORY = (
     "potentiometer_error",
 )
 WITH_A_STATE_OR_A_COUPLING = (
+    "load_dependent_damping",
     "creep",
     "slow_creep",
     "drive_lag",
@@ -32,7 +32,8 @@ WITH_A_STATE_OR_A_COUPLING = (
     "potentiometer_backlash",
     "filling",
 )
-"""Effects that change the linear equations of a step, whose rounding then differs."""
+"""Effects that change the linear equations of a step, or, by a bend, what else is made of the
+cable's tension: rounding then differs."""
 
 EVERY = (*WITHOUT_MEMORY, *WITH_A_STATE_OR_A_COUPLING)
 

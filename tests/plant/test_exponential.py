@@ -68,7 +68,7 @@ def test_it_is_stable_up_to_84_degrees_and_damps_what_is_fast():
         assert np.abs(growth(sizes * direction)).max() <= 1.0
     assert abs(growth(-1e12)) == pytest.approx(0.457, abs=1e-3)
     # An oscillation without any damping is let grow by steps that are too long for it.
-    assert 1.04 < np.abs(growth(1j * sizes)).max() < 1.08
+    assert 1.2 < np.abs(growth(1j * sizes)).max() < 1.3
 
 
 def test_the_stage_overshoots_nothing_that_is_fast():

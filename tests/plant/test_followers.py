@@ -29,7 +29,7 @@ def swing() -> Any:
         State("v", v, -(FREQUENCY**2) * x, 1.0),
         State("y", y, d * x - d * y, 1.0),
     ]
-    equations: Any = SimpleNamespace(graph=graph, states=states, paths=[], switches=[])
+    equations: Any = SimpleNamespace(graph=graph, states=states, paths=[], switches=[], bends=[])
     (follower,) = followers(equations)
     assert follower.state.name == "y"
     return followed(follower, size, {}, {x.id: end_x, v.id: end_v})
