@@ -73,6 +73,7 @@ def ahead(
     if not eq.switches and not eq.bends and not eq.ways:
         return None
     graph, begin = eq.graph, {**frozen, **here}
+    along = graph.constant(1.0)
     if eq.travelled is not None:
         # By the speed alone, which is there at once: it is wrong only where the slide turns, and
         # how long a step may be is waited for by all else.

@@ -148,7 +148,8 @@ def test_an_oscillation_is_exact_to_order_six():
         given = {"x": 1.0, "v": 0.0, "size": length}
         place, speed = (float(value) for value in evaluate(made.states, given))
         errors.append(np.hypot(place - np.cos(length), speed + np.sin(length)))
-        estimates.append(np.hypot(*(float(e) for e in evaluate(made.errors, given))))
+        there, faster = (float(error) for error in evaluate(made.errors, given))
+        estimates.append(np.hypot(there, faster))
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(7.0, abs=0.2)
     assert np.log2(np.divide(estimates[:-1], estimates[1:])) == pytest.approx(TERMS, abs=0.4)
     assert LINEAR_SHARE < 1.0 and np.all(np.array(errors) < estimates)
