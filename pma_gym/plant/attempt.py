@@ -149,7 +149,7 @@ def first_size(size: Any, jump: Any) -> Any:  # noqa: ANN401
 
 
 JUMP_S = 1e-3
-"""First attempt after a jump of 1 V (s): of the random steps of 3 V, one in fifty is too large."""
+"""First attempt after a jump of 1 V (s): longer ones are refused more often than they save."""
 
 
 def beginning(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:

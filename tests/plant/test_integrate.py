@@ -56,7 +56,7 @@ def test_a_random_policy_against_scipy(model):
 
 
 def test_a_random_policy_takes_few_attempts():
-    # 26 in 10 ms where a refused step is made anew beyond the turning that it has passed.
+    # 23 in 10 ms with a Rosenbrock method that foresees nothing, 14 now.
     attempts, steps = 0, 100
     for pressure in (200e3, 350e3, 550e3):
         plant = Plant("station")
