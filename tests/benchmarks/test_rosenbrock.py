@@ -8,6 +8,7 @@ from benchmarks.rosenbrock import VELDHUIZEN, step
 from pma_gym.kernels.graph import CHANGING, Graph
 from pma_gym.kernels.text import evaluate
 from pma_gym.plant.compose import State
+from tests.plant import smooth
 
 METHODS = {
     "van Veldhuizen": VELDHUIZEN,
@@ -95,44 +96,17 @@ def test_it_is_stable_up_to_89_4_degrees_and_damps_what_is_fast():
     assert 1.02 < on_axis < 1.03
 
 
-def predator_and_prey():
-    """A smooth system without a closed form: prey, predators, and their first integral."""
-    graph = Graph()
-    x, y, size = (graph.input(name, CHANGING) for name in ("x", "y", "size"))
-    states = [State("x", x, x * (1.0 - y), 1.0), State("y", y, y * (x - 1.0), 1.0)]
-    return step(states, size, {}, {}), size
-
-
-def marched(made, state, duration, count):
-    for _ in range(count):
-        given = {"x": state[0], "y": state[1], "size": duration / count}
-        state = [float(v) for v in evaluate(made.states, given)]
-    return np.array(state)
-
-
 def test_order_four_on_predator_and_prey():
-    made, _ = predator_and_prey()
-    start, duration = [2.0, 1.5], 2.0
-    exact = marched(made, start, duration, 2048)
-    errors = [np.abs(marched(made, start, duration, n) - exact).max() for n in (16, 32, 64, 128)]
-    found = np.log2(np.divide(errors[:-1], errors[1:]))
+    found = smooth.orders(smooth.predator_and_prey(step))
     assert np.all((3.7 < found) & (found < 4.5))
 
 
 def test_the_estimate_is_the_error_of_order_three():
-    made, _ = predator_and_prey()
-    sizes = 0.2 * 0.5 ** np.arange(5)
-    estimates, truths = [], []
-    for size in sizes:
-        given = {"x": 2.0, "y": 1.5, "size": size}
-        estimates.append(max(abs(float(e)) for e in evaluate(made.errors, given)))
-        fine = marched(made, [2.0, 1.5], size, 64)
-        own = np.array([float(v) for v in evaluate(made.states, given)])
-        truths.append(np.abs(own - fine).max())
+    estimates, truths = smooth.in_one_step(smooth.predator_and_prey(step))
     # In one step: h^4 of the method of order 3, h^5 of order 4.
-    assert np.log2(np.divide(estimates[:-1], estimates[1:]))[-2:] == pytest.approx(4.0, abs=0.1)
-    assert np.log2(np.divide(truths[:-1], truths[1:]))[-2:] == pytest.approx(5.0, abs=0.4)
-    assert np.all(np.array(truths) < estimates)
+    assert np.log2(estimates[:-1] / estimates[1:])[-2:] == pytest.approx(4.0, abs=0.1)
+    assert np.log2(truths[:-1] / truths[1:])[-2:] == pytest.approx(5.0, abs=0.4)
+    assert np.all(truths < estimates)
 
 
 @pytest.mark.parametrize("rate", [1.0, 1e3, 1e8])

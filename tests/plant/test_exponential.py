@@ -21,6 +21,7 @@ from pma_gym.plant.exponential import (
     TERMS,
     step,
 )
+from tests.plant import smooth
 
 POLE = float(GAMMA)
 
@@ -78,52 +79,25 @@ def test_the_stage_overshoots_nothing_that_is_fast():
     assert Fraction(0) < STAGE < 1
 
 
-def predator_and_prey():
-    """A smooth system without a closed form: prey, predators, and their first integral."""
-    graph = Graph()
-    x, y, size = (graph.input(name, CHANGING) for name in ("x", "y", "size"))
-    states = [State("x", x, x * (1.0 - y), 1.0), State("y", y, y * (x - 1.0), 1.0)]
-    return step(states, size, {}, {})
-
-
-def marched(made, state, duration, count):
-    for _ in range(count):
-        given = {"x": state[0], "y": state[1], "size": duration / count}
-        state = [float(v) for v in evaluate(made.states, given)]
-    return np.array(state)
-
-
 def test_order_four_on_predator_and_prey():
-    made = predator_and_prey()
-    start, duration = [2.0, 1.5], 2.0
-    exact = marched(made, start, duration, 2048)
-    errors = [np.abs(marched(made, start, duration, n) - exact).max() for n in (16, 32, 64, 128)]
-    found = np.log2(np.divide(errors[:-1], errors[1:]))
+    found = smooth.orders(smooth.predator_and_prey(step))
     assert np.all((3.7 < found) & (found < 4.5))
 
 
 def test_the_estimate_is_of_order_two_and_larger_than_the_error():
-    made = predator_and_prey()
-    sizes = 0.2 * 0.5 ** np.arange(5)
-    estimates, truths = [], []
-    for size in sizes:
-        given = {"x": 2.0, "y": 1.5, "size": size}
-        estimates.append(max(abs(float(e)) for e in evaluate(made.errors, given)))
-        fine = marched(made, [2.0, 1.5], size, 64)
-        own = np.array([float(v) for v in evaluate(made.states, given)])
-        truths.append(np.abs(own - fine).max())
+    estimates, truths = smooth.in_one_step(smooth.predator_and_prey(step))
     # In one step: h^3 of what is not linear, h^5 of order 4.
-    assert np.log2(np.divide(estimates[:-1], estimates[1:]))[-2:] == pytest.approx(3.0, abs=0.1)
-    assert np.log2(np.divide(truths[:-1], truths[1:]))[-2:] == pytest.approx(5.0, abs=0.4)
-    assert np.all(5.0 * np.array(truths) < estimates)
+    assert np.log2(estimates[:-1] / estimates[1:])[-2:] == pytest.approx(3.0, abs=0.1)
+    assert np.log2(truths[:-1] / truths[1:])[-2:] == pytest.approx(5.0, abs=0.4)
+    assert np.all(5.0 * truths < estimates)
 
 
 def test_half_a_step_is_known_on_the_way():
-    made = predator_and_prey()
+    made = smooth.predator_and_prey(step)
     errors = []
     for size in (0.1, 0.05, 0.025):
         half = evaluate(made.visited[0], {"x": 2.0, "y": 1.5, "size": size})
-        truth = marched(made, [2.0, 1.5], 0.5 * size, 64)
+        truth = smooth.marched(made, 0.5 * size, 64)
         errors.append(np.abs(np.array([float(v) for v in half]) - truth).max())
     # Without what is not linear: h^3.
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(3.0, abs=0.2)
