@@ -36,7 +36,7 @@ def hysteresis_force(memory, p):
 
 
 def hysteresis_path(memory, travel, direction, p):
-    """Z after the slide has travelled on without turning.
+    """Hysteretic state after the slide has travelled on without turning.
 
     It solves z' = (x' - |x'| z) / distance: z goes to the direction of motion over the distance.
 

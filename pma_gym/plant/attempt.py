@@ -183,7 +183,7 @@ def _allowed(eq: Equations) -> Value:
 
 SWIFT_M_PER_S, SWIFTEST = 0.075, 36.0
 """Speed of the slide at which twice the squared error is allowed (m/s), and the most that is added
-to it: an error of a step stays a thousandth of a thousandth of the range."""
+to it: the error of one step stays about a millionth of the range of a position."""
 
 
 def _inverse_eighth_root(square: Any, allowed: Any) -> Any:  # noqa: ANN401

@@ -49,7 +49,8 @@ HALF_TERMS = 5
 
 BENT_SHARE, LINEAR_SHARE = 0.6, 0.6
 """How much of what D changes, and of the last term of phi1, counts as a step's error. Both are of
-lower order than the method: true errors are a hundredth to a tenth of them."""
+lower order than the method. Under random actions true errors of steps were an eighth of it in the
+median, a thirtieth to a half in eight of ten."""
 
 
 def series(order: int, share: Fraction, terms: int) -> list[float]:
