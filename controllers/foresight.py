@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.program import WIDTH
 from pma_gym.plant.trial_kernel import JOB
 
-PLANS = WIDTH
-"""How many plans are tried at once: the lanes of the compiled plant."""
+PLANS = 16
+"""How many plans are tried at once: a whole number of registers of any processor."""
 
 
 class Commands(NamedTuple):

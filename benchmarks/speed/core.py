@@ -18,7 +18,6 @@ from llvmlite import ir
 
 from benchmarks.speed.loops import Prepared
 from benchmarks.speed.rows import DISPLACEMENT
-from pma_gym.envs.engine import WIDTH
 from pma_gym.envs.kernel_writer import Writer
 from pma_gym.kernels.control import (
     DOUBLE,
@@ -32,12 +31,12 @@ from pma_gym.kernels.control import (
     offset,
 )
 from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import compiled
+from pma_gym.kernels.native import compiled, simd_lanes
 from pma_gym.plant.march import FUSED, memory
 
-CHAINS = 6
-"""Vectors of all lanes that wait for nothing but themselves: enough to hide how long each takes,
-few enough for the registers."""
+CHAINS = 12
+"""Registers of numbers that wait for nothing but themselves: enough to hide how long each takes,
+few enough for the registers that there are."""
 
 REPEATS = 20_000
 """Rounds of a call."""
@@ -67,20 +66,26 @@ def core(operation: str) -> Prepared:
     own = Path(__file__).read_text(encoding="utf-8")
     library = compiled(["core", operation, own], lambda: _module(operation), "core")
     run = library.function("run", [ctypes.c_int64, ctypes.c_void_p])
-    numbers = np.linspace(1.0, 2.0, (CHAINS + 2) * WIDTH)
+    width = register()
+    numbers = np.linspace(1.0, 2.0, (CHAINS + 2) * width)
     # A contraction for the multiply-adds, so that no number leaves the usual range.
-    numbers[-2 * WIDTH : -WIDTH], numbers[-WIDTH:] = 0.9, 0.1
+    numbers[-2 * width : -width], numbers[-width:] = 0.9, 0.1
 
     def chunk() -> int:
         run(REPEATS, numbers.ctypes.data)
-        return REPEATS * CHAINS * WIDTH
+        return REPEATS * CHAINS * width
 
     counts, flops = counted()
     return Prepared(chunk, lambda: {"in_attempt": counts[operation], "flops": flops})
 
 
+def register() -> int:
+    """Numbers in double precision in a register of this processor: 8 of AVX-512, else 4."""
+    return min(simd_lanes(), 8)
+
+
 def _module(operation: str) -> ir.Module:
-    module, lanes = ir.Module(), Lanes(WIDTH)
+    module, lanes = ir.Module(), Lanes(register())
     b, (count, numbers) = function(module, "run", [("count", INTEGER), ("numbers", POINTER)])
     loaded = [lanes.load(b, numbers, i) for i in range(CHAINS + 2)]
     chains = [memory(b, lanes.real) for _ in range(CHAINS)]
@@ -104,7 +109,7 @@ def counted() -> tuple[Counter[str], int]:
         Instructions by sort; floating-point operations, of which a multiply-add is two.
     """
     environments: Any = gym.make_vec(
-        DISPLACEMENT, num_envs=WIDTH, vectorization_mode="vector_entry_point"
+        DISPLACEMENT, num_envs=simd_lanes(), vectorization_mode="vector_entry_point"
     ).unwrapped
     writer = Writer(environments.engine.kernel)
     b, (given,) = function(ir.Module(), "attempt", [("given", POINTER)])

@@ -22,13 +22,11 @@ from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START, Record
 from pma_gym.kernels.crew import Crew
+from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.tasks import Events, Task
-
-WIDTH = 16
-"""Environments that share a block, one lane each."""
 
 
 class Engine:
@@ -49,6 +47,7 @@ class Engine:
         count: how many environments.
         record: places of an environment's numbers.
         table: the observation's entries.
+        width: environments that share a block, one lane each.
         told: the nominal model that controllers are told.
         nominal: the Plant of the nominal model, with what `disturbances` need.
         models: the Model of every environment's episode.
@@ -84,7 +83,7 @@ class Engine:
         self._check_prescription(self.wanted)
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
-        self.width = 1 if count == 1 else WIDTH
+        self.width = 1 if count == 1 else simd_lanes(single)
         program = self.nominal.program
         self.kernel = Kernel(program, self.record, self.table, self.width, single)
         self.models = [self.nominal.model] * count

@@ -250,15 +250,12 @@ class Writer(BlockMemory):
             for name in ("sample", *(f"sum_{phase.name}" for phase in phases)):
                 known[graph.input(f"record.{name}", 2).id] = lane.vector(name)
             known |= self._exact_times(b, one, known)
-            outputs = [one.due, one.position, one.sample, *one.sums]
+            # Most lanes of most attempts pass no sample: they compute none, and look nothing up.
+            known = lanes.emit(b, [one.due], known)
+            leave_if(b.not_(lanes.any(b, known[one.due.id])))
             if one.ideal is not None:
-                # Whoever passes no sample looks nothing up.
-                known = lanes.emit(b, [one.due], known)
-                leave_if(b.not_(lanes.any(b, known[one.due.id])))
                 known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
-            taken = lanes.emit(b, outputs, known)
-            if one.ideal is None:
-                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
+            taken = lanes.emit(b, [one.position, one.sample, *one.sums], known)
             if self.traces:
                 number = known[graph.input("record.sample", 2).id]
                 index = b.fptoui(number, INTEGER)

@@ -44,7 +44,8 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         task: name of a task, or a Task; as `PMAEnv`.
         autoreset_mode: NEXT_STEP (default), SAME_STEP or DISABLED (then `reset` takes the option
             `reset_mask`).
-        threads: how many threads step them, at most one for every 16 environments.
+        threads: how many threads step them, at most one for every block
+            of environments: 16 with AVX-512, else 4 (8 in single precision).
         precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.

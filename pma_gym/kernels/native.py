@@ -157,6 +157,21 @@ def host() -> tuple[str, str]:
     return llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
+def simd_lanes(single: bool = False) -> int:
+    """How many lanes kernels for many plants have: the fastest measured on such a processor.
+
+    One register of AVX2, whose 16 registers are too few for more: of 4, 8 and 16 lanes 16 took 1.4
+    times as long as 4 (EPYC, Zen 3). Two registers of AVX-512, of which there are 32. No bit
+    depends on it.
+
+    Args:
+        single: for single precision.
+    """
+    if "+avx512f" in host()[1].split(","):
+        return 16
+    return 8 if single else 4
+
+
 def _machine_key() -> tuple[str, ...]:
     versions = llvmlite.__version__, str(llvm.llvm_version_info), str(_OPTIMISATION)
     return (*versions, llvm.get_process_triple(), *host())

@@ -25,7 +25,7 @@ from pma_gym.kernels.control import (
 )
 from pma_gym.kernels.graph import FIXED, Value
 from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import compiled
+from pma_gym.kernels.native import compiled, simd_lanes
 from pma_gym.kernels.substitute import substitute
 from pma_gym.kernels.trace import live_inputs
 from pma_gym.plant.compose import COMMANDS, ZERO, Equations
@@ -33,9 +33,6 @@ from pma_gym.plant.march import memory
 from pma_gym.plant.model import PLANTS, Model
 from pma_gym.plant.system import System, at_rest, rates, static_force, system
 from pma_gym.plant.trial_kernel import write_simulate
-
-WIDTH = 16
-"""Lanes of the kernels for many plants: two registers of AVX-512, the fastest measured."""
 
 FIRST_S = 7e-4
 """First attempt at a step from rest (s)."""
@@ -113,7 +110,7 @@ class Program:
         self.derivative = get("derivative", [whole, *[pointer] * 3, whole, pointer])
         self.observe = get("observe", [whole, pointer, real, pointer, pointer])
         self.simulate_one = get("simulate_1", [whole, pointer, pointer])
-        self.simulate_many = get(f"simulate_{WIDTH}", [whole, pointer, pointer])
+        self.simulate_many = get(f"simulate_{simd_lanes()}", [whole, pointer, pointer])
         if self.model.plant == "station":
             self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
         self.table_size = int(get("table_size", [], whole)())
@@ -125,7 +122,7 @@ class Program:
         self._observe(module)
         if self.model.plant == "station":
             self._balance(module)
-        for width in (1, WIDTH):
+        for width in (1, simd_lanes()):
             write_simulate(module, self.ramped, width)
         return module
 

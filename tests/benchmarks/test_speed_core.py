@@ -3,12 +3,12 @@
 import gymnasium as gym
 import pytest
 
-from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted
+from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted, register
 from benchmarks.speed.rows import CORE, EVALUATIONS
 from benchmarks.speed.views import views
-from pma_gym.envs.engine import WIDTH
 from pma_gym.envs.kernel_writer import Writer
 from pma_gym.kernels.graph import CHANGING
+from pma_gym.kernels.native import simd_lanes
 from pma_gym.kernels.trace import order
 
 
@@ -36,14 +36,14 @@ def test_every_sort_is_measured():
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_a_core_counts_all_lanes_of_all_chains(operation):
     prepared = core(operation)
-    assert prepared.chunk() == prepared.chunk() == REPEATS * CHAINS * WIDTH
+    assert prepared.chunk() == prepared.chunk() == REPEATS * CHAINS * register()
     assert prepared.facts()["in_attempt"] == counted()[0][operation]
 
 
 def test_the_instructions_are_the_graphs_operations():
     env = gym.make_vec(
         "pma_gym/IsokineticDisplacement-v0",
-        num_envs=WIDTH,
+        num_envs=simd_lanes(),
         vectorization_mode="vector_entry_point",
     )
     writer = Writer(env.unwrapped.engine.kernel)

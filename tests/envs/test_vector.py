@@ -28,6 +28,17 @@ def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
     assert both.ends[0].sum() > 2 * count
 
 
+@pytest.mark.parametrize("width", [4, 8, 16])
+def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragile, width):
+    monkeypatch.setattr("pma_gym.envs.engine.simd_lanes", lambda single: width)
+    both = twins(18, model=fragile, randomisation="varied")
+    assert both.batch.engine.width == width
+    both.reset(seed=4)
+    for _ in range(2 * EPISODE):
+        both.step()
+    assert both.ends[0].sum() > 18
+
+
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 @pytest.mark.parametrize("task", TASKS)
 def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, task):
