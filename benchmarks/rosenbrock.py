@@ -95,7 +95,7 @@ def step(
         right = [
             total(slope, factors, [stage[i] for stage in stages]) for i, slope in enumerate(slopes)
         ]
-        stages.append(solve(right))
+        stages.append(solve([part * slope for slope in right]))
     across = [[stage[i] for stage in stages] for i in range(len(values))]
     return Step(
         states=[total(v, method.weights, u) for v, u in zip(values, across, strict=True)],

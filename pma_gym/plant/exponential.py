@@ -110,14 +110,14 @@ def step(
     jacobian = substituted(derivatives(rates, values), {**frozen, **here})
     first = substitute(rates, {**frozen, **here})
     part = float(GAMMA) * size
-    inverse, solve = 1.0 / part, solver(jacobian, part)
+    solve = solver(jacobian, part)
 
     def next_term(term: list[Value]) -> list[Value]:
-        """S times a term; what solves for I / part - J solves for part W."""
-        return [u * inverse - old for u, old in zip(solve(term), term, strict=True)]
+        """S times a term."""
+        return [u - old for u, old in zip(solve(term), term, strict=True)]
 
     # gamma S^k W h f(y), by k.
-    terms = [solve(first)]
+    terms = [solve([part * rate for rate in first])]
     while len(terms) < TERMS:
         terms.append(next_term(terms[-1]))
     across = list(zip(*terms, strict=True))
@@ -125,9 +125,9 @@ def step(
     stage = [value + change for value, change in zip(values, moved, strict=True)]
     there = {value.id: new for value, new in zip(values, stage, strict=True)}
     second = substitute(rates, {**frozen, **there})
-    # W D = W (f(U) - f(y) - (U - y) / part) + (U - y) / part needs no product with J.
+    # gamma W h D = W (gamma h (f(U) - f(y)) - (U - y)) + (U - y) needs no product with J.
     triples = zip(second, first, moved, strict=True)
-    bent = solve([after - before - change * inverse for after, before, change in triples])
+    bent = solve([part * (after - before) - change for after, before, change in triples])
     bends = [[u + change for u, change in zip(bent, moved, strict=True)]]
     while len(bends) < BENT_TERMS:
         bends.append(next_term(bends[-1]))
