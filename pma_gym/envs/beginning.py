@@ -84,7 +84,7 @@ _KEPT: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {
 
 
 def settled_at_no_load(
-    nominal: Plant,
+    rest: settle.NoLoad,
     models: Sequence[Model],
     pressures: NDArray[np.float64],
     regulator: NDArray[np.float64],
@@ -93,7 +93,7 @@ def settled_at_no_load(
     """Stations at rest with 0 V on the motor.
 
     Args:
-        nominal: the plant of the nominal model.
+        rest: finds stations of the nominal plant at rest.
         models: each station's model.
         pressures: gauge pressures (Pa), shape (m,).
         regulator: regulator voltages that hold them (V), shape (m,).
@@ -101,9 +101,10 @@ def settled_at_no_load(
     Raises:
         ValueError: no contraction balances the drive's load.
     """
-    found = settle.at_no_load(nominal, pressures, vectors)
+    found = rest(pressures, vectors)
     if found is not None:
         return found
+    nominal = rest.plant
     numbers = np.tile(nominal.vector, (len(models), 1)) if vectors is None else vectors
     keys = [
         (nominal.program, row.tobytes(), volts)

@@ -230,6 +230,12 @@ class Circuit:
         outputs = {name: found[f"true_{name}"] for name in TRUTH}
         return position_of(self.equations, self.record.task, outputs)
 
+    def first_score(self, found: Mapping[str, Value]) -> dict[str, Value]:
+        """The score's numbers once the first sample, that of the beginning, is taken."""
+        phase = self.record.task.protocol.phases[0]
+        error = self.position(found) - float(phase.reference(0.0))
+        return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
+
     def reward(self, found: Mapping[str, Value]) -> Value:
         """Reward of a step; the action's change stands where the reward will."""
         task, options = self.record.task, self.record.options

@@ -16,7 +16,7 @@ _AT_REST = {
     "lag_lvdt": "zero",
     "lag_pressure_transducer": "pressure",
 }
-"""States that are not 0 where the cable hangs slack; see `pma_gym.plant.settle.at_no_load`."""
+"""States that are not 0 where the cable hangs slack; see `pma_gym.plant.settle.NoLoad`."""
 
 
 class BeginWriter(ThreadMemory):
@@ -76,10 +76,7 @@ class BeginWriter(ThreadMemory):
         real = {name: found[what] for name, what in _AT_REST.items()}
         real |= {"zero_contraction": zero, "size": ir.Constant(DOUBLE, FIRST_S)}
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
-        real |= {"sample": ir.Constant(DOUBLE, 1.0), **self._asked_before(b, regulator)}
-        # At rest the position is 0 exactly.
-        initial = float(self.record.task.protocol.phases[0].reference(0.0))
-        real[self.sums[0]] = ir.Constant(DOUBLE, initial * initial)
+        real |= self._asked_before(b, regulator)
         whole = {"episode": episode, "count": integer(0)}
         for name in self.places:
             if name in whole:

@@ -129,7 +129,7 @@ class DeviceEngine:
             # Refuses what the regulator does not reach.
             regulator_voltage(self.nominal.model, float(pressure))
         between = np.linspace(pressures.min(), pressures.max(), 64)
-        return settle.at_no_load(self.nominal, between) is not None
+        return settle.NoLoad(self.nominal)(between) is not None
 
     def _allocate(self, pressures: NDArray[np.float64]) -> None:
         made, kernel, n = self._device, self.kernel, self.count

@@ -26,7 +26,10 @@ from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
+from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
+
+_FIRST, _LAST = ARGUMENTS.index("first"), ARGUMENTS.index("last")
 
 
 class Engine:
@@ -80,6 +83,7 @@ class Engine:
         # The very same model where nothing is added: its plant is known by that.
         self.nominal = Plant(rig_model(task, replace(options, model=self.told)))
         self.rest_motor = motor_at_rest(self.told, task)
+        self._rest = NoLoad(self.nominal)
         self._check_prescription(self.wanted)
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
@@ -90,6 +94,8 @@ class Engine:
         self.pressures = np.zeros(count)
         self._allocate()
         self._address = self._arguments.ctypes.data
+        self._beginning = self._arguments.copy()
+        self._begin_address = self._beginning.ctypes.data
         self._crew = Crew(self.kernel.library.address("step"), self._parts(threads))
 
     def _allocate(self) -> None:
@@ -159,7 +165,7 @@ class Engine:
         edges = np.linspace(0, self.blocks, threads + 1).round().astype(int)
         parts = [self._arguments.copy() for _ in range(threads)]
         for k, part in enumerate(parts):
-            part[ARGUMENTS.index("first")], part[ARGUMENTS.index("last")] = edges[k : k + 2]
+            part[_FIRST], part[_LAST] = edges[k : k + 2]
             part[ARGUMENTS.index("attempts")] += 64 * k
         return parts
 
@@ -172,12 +178,6 @@ class Engine:
     def counts(self) -> NDArray[np.int64]:
         """Control steps of every episode so far, shape (n,)."""
         return self.integers[:, self.record.places["count"], :].reshape(-1)[: self.count].copy()
-
-    def _set(self, indices: NDArray[np.int64], name: str, values: ArrayLike) -> None:
-        block, lane = np.divmod(indices, self.width)
-        whole = self.record.kind(name) == "integer"
-        array = self.integers if whole else self.records
-        array[block, self.record.places[name], lane] = values
 
     # -- episodes ----------------------------------------------------------------------------------
 
@@ -208,11 +208,9 @@ class Engine:
         states, zero = self._settled(indices, pressures, regulator, vectors)
         self.pressures[indices] = pressures
         self._fill(indices, states, zero, regulator)
-        arguments = self._arguments.copy()
         self._indices[: len(indices)] = indices
-        arguments[ARGUMENTS.index("last")] = len(indices)
-        self.kernel.begin(arguments.ctypes.data)
-        self._score_first_sample(indices)
+        self._beginning[_LAST] = len(indices)
+        self.kernel.begin(self._begin_address)
 
     def _check_prescription(self, wanted: Sequence[Pressure]) -> None:
         """Refuse pressures at which an exercise's device cannot give what is prescribed."""
@@ -263,7 +261,7 @@ class Engine:
     ) -> Settled:
         models = [self.models[i] for i in indices.tolist()]
         if not self.rest_motor:
-            return settled_at_no_load(self.nominal, models, pressures, regulator, vectors)
+            return settled_at_no_load(self._rest, models, pressures, regulator, vectors)
         held = self.rest_motor, regulator, pressures, vectors
         states, zero = settled_under_load(self.nominal, *held)
         if self.task.exercise:
@@ -278,24 +276,24 @@ class Engine:
         zero: NDArray[np.float64],
         regulator: NDArray[np.float64],
     ) -> None:
-        rows = np.zeros((len(indices), self.record.size))
+        places, size = self.record.places, self.record.size
+        rows = np.zeros((len(indices), size))
         wholes = rows.view(np.int64)
 
         def put(name: str, values: ArrayLike) -> None:
-            array = wholes if self.record.kind(name) == "integer" else rows
-            array[:, self.record.places[name]] = values
+            rows[:, places[name]] = values
 
-        for i, name in enumerate(self.record.states):
-            put(name, states[:, i])
+        rows[:, : len(self.record.states)] = states
         put("size", FIRST_S)
         put("zero_contraction", zero)
         put("regulator_voltage", regulator)
         put("rest_regulator", regulator)
         for i in range(2):
-            put(f"key_{i}", self._keys[indices, i])
-        put("episode", self._episodes[indices])
+            wholes[:, places[f"key_{i}"]] = self._keys[indices, i]
+        wholes[:, places["episode"]] = self._episodes[indices]
+        held = np.maximum(np.minimum(0.2 * regulator - 1.0, 1.0), -1.0)
         volts: list[ArrayLike] = [0.0, regulator]
-        actions: list[ArrayLike] = [-1.0, np.clip(0.2 * regulator - 1.0, -1.0, 1.0)]
+        actions: list[ArrayLike] = [-1.0, held]
         if self.task.actuator == "regulator":
             for name in ("motor_voltage", "rest_motor"):
                 put(name, self.rest_motor)
@@ -342,27 +340,6 @@ class Engine:
     def events(self, index: int = 0) -> Events:
         """What disturbs the episode of an environment, each of shape (events,)."""
         return Events(*(row[0] for row in self._events(np.array([index]))))
-
-    def _score_first_sample(self, indices: NDArray[np.int64]) -> None:
-        phase = self.task.protocol.phases[0]
-        block, lane = np.divmod(indices, self.width)
-        quantity = self.task.protocol.quantity
-        true = {
-            name: self.records[block, self.record.places[name], lane]
-            for name in ("zero_contraction", "true_contraction", "true_rotation", START)
-            if name in self.record.places
-        }
-        position = true["true_rotation"]
-        if quantity == "extension":
-            position = true["zero_contraction"] - true["true_contraction"]
-        elif quantity == "contraction":
-            position = true["true_contraction"] - true[START]
-        elif quantity == "excess":
-            position = self.records[block, self.record.places["excess_nm"], lane]
-        self._set(indices, f"sum_{phase.name}", (position - float(phase.reference(0.0))) ** 2)
-        self._set(indices, "sample", 1.0)
-        if self.width == 1:
-            self.trace[0] = position[0]
 
     def park(self, indices: NDArray[np.int64]) -> None:
         """Put stations that broke a limit at rest until they are reset."""

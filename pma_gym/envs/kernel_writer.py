@@ -70,8 +70,11 @@ class Writer(BlockMemory):
         self.sensed = self.circuit.sense(count + 1, first=False)
         self.sensed["reward"] = self.circuit.reward(self.sensed)
         self.begun = self.circuit.sense(count, first=True)
+        self.begun |= self.circuit.first_score(self.begun)
+        self.first_position = self.circuit.position(self.begun)
         self.tare = self.circuit.read(TARE, self.eq.graph.input("reading", 2, "integer"))
-        later = [*self.sensed.values(), *self.begun.values(), *self.tare, *self._more()]
+        begun = [*self.begun.values(), self.first_position]
+        later = [*self.sensed.values(), *begun, *self.tare, *self._more()]
         fixed = {v.id: v for v in [*layout.fixed, *split(later, FIXED)]}
         self.fixed = [fixed[i] for i in sorted(fixed)]
         self.layout = Layout(layout.changing, layout.outputs, layout.held, layout.fixed, self.fixed)
@@ -250,12 +253,15 @@ class Writer(BlockMemory):
             for name in ("sample", *(f"sum_{phase.name}" for phase in phases)):
                 known[graph.input(f"record.{name}", 2).id] = lane.vector(name)
             known |= self._exact_times(b, one, known)
-            # Most lanes of most attempts pass no sample: they compute none, and look nothing up.
-            known = lanes.emit(b, [one.due], known)
-            leave_if(b.not_(lanes.any(b, known[one.due.id])))
+            outputs = [one.due, one.position, one.sample, *one.sums]
             if one.ideal is not None:
+                # Whoever passes no sample looks nothing up.
+                known = lanes.emit(b, [one.due], known)
+                leave_if(b.not_(lanes.any(b, known[one.due.id])))
                 known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
-            taken = lanes.emit(b, [one.position, one.sample, *one.sums], known)
+            taken = lanes.emit(b, outputs, known)
+            if one.ideal is None:
+                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
             if self.traces:
                 number = known[graph.input("record.sample", 2).id]
                 index = b.fptoui(number, INTEGER)
@@ -392,7 +398,7 @@ class Writer(BlockMemory):
     ) -> None:
         options = self.record.options
         entries = self.circuit.observation(self.kernel.observed, self.begun)
-        values = [*self.begun.values(), *entries]
+        values = [*self.begun.values(), self.first_position, *entries]
         known = self._known(b, lanes, values, records, tables, lane)
         for ahead in range(options.preview + 1):
             known[self.circuit.reference(ahead).id] = self._references(
@@ -400,4 +406,6 @@ class Writer(BlockMemory):
             )
         found = lanes.emit(b, values, known)
         self._store(b, lanes, found, self.begun, records, lane)
+        if self.traces:
+            b.store(widened(b, found[self.first_position.id]), given["trace"])
         self._put_observation(b, lanes, given, found, entries, index)

@@ -245,7 +245,8 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if waiting is not None:
             self._given[waiting] = 0.0
         finite = np.isfinite(self._given)
-        if not finite.all():
+        # Looked for as a byte: `all` takes three times as long as what it is asked about.
+        if b"\0" in finite.tobytes():
             row = int(np.flatnonzero(~finite.all(axis=1))[0])
             raise ValueError(
                 f"{self._rule()}, all of them finite; environment {row} got "

@@ -55,43 +55,62 @@ def all_at_rest(
     return search.state, search.zero
 
 
-def at_no_load(
-    plant: "Plant", pressures: np.ndarray, vectors: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray] | None:
+class NoLoad:
     """Stations at rest with 0 V on the motor, many at once.
 
     Args:
         plant: a plant of their structure.
-        pressures: gauge pressures (Pa), shape (n,).
-        vectors: parameters of each, shape (n, numbers); the plant's own if not given.
-    Returns:
-        State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the cable
-        does not hang slack at 0 V, a muscle finds no balance, sensors do not rest at the truth, or
-        the regulator's command has a memory: `Plant.settle` knows those.
+
+    Attributes:
+        plant: the same.
     """
-    if plant.model.plant != "station":
-        return None
-    effects = plant.model.effects.values()
-    if any(effect.port.startswith("sensor:") and effect.law for effect in effects):
-        return None
-    if any(effect.port == "regulator_delay" for effect in effects):
-        return None
-    limits, drive = (effect_parameters(plant, vectors, effect) for effect in ("limits", "drive"))
-    zero = balances(plant, pressures, np.zeros(len(pressures)), vectors)
-    low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
-    inside = (zero > low + 1e-6) & (zero < high - 1e-6)
-    if not (np.all(inside) and np.all(drive["offset"] <= 0.0)):
-        return None
-    states = np.zeros((len(pressures), len(plant.states)))
-    for name, value in {
-        "contraction": zero,
-        "pressure": pressures,
-        "lag_lvdt": zero,
-        "lag_pressure_transducer": pressures,
-    }.items():
-        if name in plant.states:
-            states[:, plant.states.index(name)] = value
-    return states, zero
+
+    def __init__(self, plant: "Plant") -> None:
+        self.plant = plant
+        effects = plant.model.effects.values()
+        sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
+        delayed = any(effect.port == "regulator_delay" for effect in effects)
+        self._is_known = plant.model.plant == "station" and not sensed and not delayed
+        self._common = self._ends(None) if self._is_known else None
+        self._contractions, self._pressures = (
+            [i for i, name in enumerate(plant.states) if name in names]
+            for names in (("contraction", "lag_lvdt"), ("pressure", "lag_pressure_transducer"))
+        )
+
+    def _ends(self, vectors: np.ndarray | None) -> tuple[np.ndarray, np.ndarray, bool]:
+        """Contractions between which a balance counts (m), and whether no drive pulls at 0 V."""
+        plant = self.plant
+        limits, drive = (
+            effect_parameters(plant, vectors, effect) for effect in ("limits", "drive")
+        )
+        low, high = -2.0 * limits["stretch"] + 1e-6, 2.0 * limits["contraction"] - 1e-6
+        return low, high, bool((drive["offset"] <= 0.0).all())
+
+    def __call__(
+        self, pressures: np.ndarray, vectors: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """Their states.
+
+        Args:
+            pressures: gauge pressures (Pa), shape (n,).
+            vectors: parameters of each, shape (n, numbers); the plant's own if not given.
+        Returns:
+            State vectors, shape (n, states), and contractions x0 (m), shape (n,); None where the
+            cable does not hang slack at 0 V, a muscle finds no balance, sensors do not rest at the
+            truth, or the regulator's command has a memory: `Plant.settle` knows those.
+        """
+        if self._common is None:
+            return None
+        low, high, slack = self._common if vectors is None else self._ends(vectors)
+        zero = balances(self.plant, pressures, np.zeros(len(pressures)), vectors)
+        if not slack or not ((zero > low) & (zero < high)).all():
+            return None
+        states = np.zeros((len(pressures), len(self.plant.states)))
+        for i in self._contractions:
+            states[:, i] = zero
+        for i in self._pressures:
+            states[:, i] = pressures
+        return states, zero
 
 
 def _search(

@@ -114,7 +114,7 @@ def balances(
     Returns:
         Shape (n,); an end of the bracket of twice the limits where nothing balances.
     """
-    pressures, loads = (np.ascontiguousarray(a, float) for a in (pressures, loads))
+    pressures, loads = np.ascontiguousarray(pressures, float), np.ascontiguousarray(loads, float)
     numbers = plant.vector if vectors is None else np.ascontiguousarray(vectors, float)
     stride = 0 if vectors is None else numbers.shape[1]
     out = np.empty(len(pressures))

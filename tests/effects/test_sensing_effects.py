@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant.settle import all_at_rest, at_no_load
+from pma_gym.plant.settle import NoLoad, all_at_rest
 
 
 def pressures(plant, step, dense):
@@ -70,7 +70,7 @@ def test_a_wrong_sensor_reads_a_line_of_the_truth(name, quantity, gain, offset, 
 @pytest.mark.parametrize(("name", "quantity", "gain", "offset"), LINES)
 def test_many_wrong_sensors_begin_at_rest(name, quantity, gain, offset, station_with):
     plant = station_with(name)
-    assert at_no_load(plant, np.array([300e3])) is None
+    assert NoLoad(plant)(np.array([300e3])) is None
     voltages = np.full(2, plant.regulator_voltage(300e3))
     states, zero = all_at_rest(plant, np.array([0.0, 2.0]), voltages)
     for motor, state, x0 in zip((0.0, 2.0), states, zero, strict=True):

@@ -9,6 +9,7 @@ from benchmarks.training.stations import Stations
 from pma_gym.envs import PMAVectorEnv, beginning
 from pma_gym.envs.beginning import holding_voltages, settled_at_no_load
 from pma_gym.plant.plant import Plant, vector
+from pma_gym.plant.settle import NoLoad
 
 PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
 
@@ -28,7 +29,7 @@ def nothing_kept(monkeypatch):
 def begun(nominal, models, pressures=PRESSURES):
     numbers = np.array([vector(model, nominal.tolerance) for model in models])
     return settled_at_no_load(
-        nominal, models, pressures, holding_voltages(models, pressures), numbers
+        NoLoad(nominal), models, pressures, holding_voltages(models, pressures), numbers
     )
 
 
