@@ -33,7 +33,7 @@ def solver(
     steps: list[tuple[int, Value, dict[int, Value], dict[int, Value]]] = []
     left, ready = set(range(len(rows))), dict[int, Value]()
     while left and not (len(left) == 2 and not ready and _coupled(rows, left)):
-        ready = ready or inverses({i: rows[i][i] for i in _apart(rows, left)})
+        ready = ready or _inverses({i: rows[i][i] for i in _apart(rows, left)})
         pivot = min(sorted(ready), key=lambda i: _fill(rows, left, i))
         left.discard(pivot)
         inverse = ready.pop(pivot)
@@ -70,7 +70,7 @@ def solver(
     return solve
 
 
-def inverses(pivots: Mapping[int, Value]) -> dict[int, Value]:
+def _inverses(pivots: Mapping[int, Value]) -> dict[int, Value]:
     """One over each number, at one division: the product of all is inverted and multiplied out.
 
     A division takes as long as eight multiplications or more.
