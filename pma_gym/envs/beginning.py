@@ -132,6 +132,21 @@ def settled_at_no_load(
     return np.array(states), np.array(zeros)
 
 
+def hangs_slack(rest: settle.NoLoad, low: float, high: float) -> bool:
+    """Whether the cable hangs slack at 0 V, and muscles balance, at all pressures of a range.
+
+    Args:
+        rest: finds stations at rest.
+        low: lowest gauge pressure (Pa).
+        high: highest.
+    """
+    return rest(np.linspace(low, high, LOOKED_AT)) is not None
+
+
+LOOKED_AT = 64
+"""Pressures of a range at which a balance is looked for."""
+
+
 def settled_under_load(
     nominal: Plant,
     motor: float,

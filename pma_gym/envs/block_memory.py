@@ -12,7 +12,16 @@ from pma_gym.envs.circuit import Circuit
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.record import Record
 from pma_gym.envs.scoring import Sampling
-from pma_gym.kernels.control import DOUBLE, INTEGER, POINTER, Builder, Operand, integer, offset
+from pma_gym.kernels.control import (
+    DOUBLE,
+    FLOAT,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    integer,
+    offset,
+)
 from pma_gym.kernels.graph import Kind, Value
 from pma_gym.kernels.llvm import Lanes
 from pma_gym.kernels.trace import live_inputs
@@ -24,9 +33,11 @@ from pma_gym.plant.program import Program
 ARGUMENTS = (
     *("first", "last", "count", "records", "tables", "table_stride", "references"),
     *("actions", "observations", "rewards", "terminated", "truncated", "trace", "indices"),
-    *("attempts", "voltages", "ideals"),
+    *("attempts", "voltages", "ideals", "settles", "pressures"),
 )
-"""Entries of a call's arguments: numbers of blocks and environments, then addresses."""
+"""Entries of a call's arguments: numbers of blocks and environments, then addresses.
+
+With settles other than 0 a beginning draws pressures, from two numbers each, and settles there."""
 
 
 class Plan(Protocol):
@@ -37,6 +48,7 @@ class Plan(Protocol):
     observed: ObservationTable
     width: int
     single: bool
+    draws: bool
 
 
 class BlockMemory:
@@ -66,7 +78,7 @@ class BlockMemory:
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
         found = {}
-        numbers = ("first", "last", "count", "table_stride")
+        numbers = ("first", "last", "count", "table_stride", "settles")
         for i, name in enumerate(ARGUMENTS):
             value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
             found[name] = value if name in numbers else b.inttoptr(value, POINTER)
@@ -83,6 +95,11 @@ class BlockMemory:
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
         """How many numbers of a block lie before those of a place, or before one lane's."""
         return integer(self.places[name] * self.width + lane)
+
+    def _cell(self, b: Builder, records: Operand, name: str, lane: Operand | int) -> Operand:
+        """Address of a number of one lane of a block."""
+        at = b.add(self._row(b, name), integer(lane))
+        return offset(b, records, at, self.element)
 
     def _lanes(self, width: int) -> Lanes:
         """Lanes for what is not the march."""
@@ -159,6 +176,52 @@ class BlockMemory:
         """Addresses of a block's records and tables."""
         records = offset(b, given["records"], b.mul(block, integer(self.record.size * self.width)))
         return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
+
+    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
+        if lanes.width == 1:
+            return numbers[0]
+        vector = ir.Constant(lanes.real, ir.Undefined)
+        for k, number in enumerate(numbers):
+            vector = lanes.insert(b, vector, number, k)
+        return vector
+
+    def _references(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        records: Operand,
+        lane: Operand | int,
+        ahead: int,
+        later: int,
+    ) -> Operand:
+        """References so many steps ahead, for a block or one lane."""
+        found = []
+        for k in range(lanes.width):
+            index = self._row(b, "count", k)
+            if lanes.width == 1:
+                index = b.add(index, integer(lane))
+            steps = self._count(b, offset(b, records, index, self.element))
+            row = b.add(steps, integer(ahead + later))
+            where = offset(b, given["references"], row, self.element)
+            found.append(b.load(where, typ=self.element))
+        return self._gathered(b, lanes, found)
+
+    def _put_observation(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        found: dict[int, Operand],
+        entries: Sequence[Value],
+        first: Operand,
+    ) -> None:
+        for i, entry in enumerate(entries):
+            for k in range(lanes.width):
+                number = lanes.extract(b, found[entry.id], k)
+                row = b.mul(b.add(first, integer(k)), integer(len(entries)))
+                where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
+                b.store(narrowed(b, number, FLOAT), where)
 
 
 def narrowed(b: Builder, number: Operand, element: ir.Type) -> Operand:

@@ -91,7 +91,7 @@ class CudaKernel:
         self.own_tables, self.draws, self.ranged = own_tables, draws, ranged
         self.element: type[np.floating] = np.float32 if single else np.float64
         self.whole: type[np.signedinteger] = np.int32 if single else np.int64
-        self._writer = ThreadWriter(self, own_tables, draws, ranged)
+        self._writer = ThreadWriter(self, own_tables, ranged)
         self.places = self._writer.places
         library = compiled(
             ["table", *self._key()], lambda: self._writer.table, "tables of environments"

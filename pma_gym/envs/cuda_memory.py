@@ -6,15 +6,11 @@ other.
 
 from pma_gym.envs.block_memory import Plan, narrowed
 from pma_gym.envs.kernel_writer import Writer
-from pma_gym.envs.record import DRAW
 from pma_gym.kernels.control import DOUBLE, FLOAT, INDEX, INTEGER, Builder, Operand, integer, offset
 from pma_gym.kernels.graph import Kind, Value
 from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.random import philox, uniform
-from pma_gym.kernels.substitute import substitute
 from pma_gym.kernels.trace import live_inputs
 from pma_gym.plant.march import FUSED
-from pma_gym.plant.system import static_force
 
 
 class ThreadMemory(Writer):
@@ -23,7 +19,6 @@ class ThreadMemory(Writer):
     Args:
         kernel: the record, the observation, whether in single precision.
         own_tables: whether every environment has a table of its own.
-        draws: whether threads begin episodes by themselves: a station whose cable hangs slack.
         ranged: whether they draw from a range of pressures, else from several.
 
     Attributes:
@@ -31,27 +26,15 @@ class ThreadMemory(Writer):
         places: place of every number that is kept; fewer than the processor keeps.
     """
 
-    def __init__(self, kernel: Plan, own_tables: bool, draws: bool, ranged: bool) -> None:
-        self.own_tables, self.draws, self.ranged = own_tables, draws, ranged
+    def __init__(self, kernel: Plan, own_tables: bool, ranged: bool) -> None:
+        self.own_tables, self.ranged = own_tables, ranged
         super().__init__(kernel)
 
-    def _more(self) -> list[Value]:
+    def _prepare(self) -> None:
         self.traces = False
         self.element = FLOAT if self.kernel.single else DOUBLE
         self.real = "float" if self.kernel.single else "double"
         self._find_places()
-        if not self.draws:
-            return []
-        eq = self.eq
-        (self.force,) = substitute([static_force(eq)], {})
-        limits, line = eq.parameters["limits"], eq.parameters["regulator_line"]
-        self.reach = [limits.stretch, limits.contraction]
-        self.line = [line.gain, line.offset]
-        nothing = eq.graph.constant(0, "integer")
-        keys = self.circuit.slot("key_0"), self.circuit.slot("key_1")
-        stream = self.circuit.slot("episode") * 4 + DRAW
-        self.share = uniform(philox((nothing, stream, nothing, nothing), keys)[0])
-        return [self.force, *self.reach, *self.line]
 
     def _find_places(self) -> None:
         """Keep what some part reads, and the score."""
@@ -123,8 +106,5 @@ class ThreadMemory(Writer):
                 known[value.id] = narrowed(b, self._given[f"fixed_{i}"], lanes.element)
         return known
 
-    def _cell(self, b: Builder, records: Operand, name: str) -> Operand:
-        return offset(b, records, self._row(b, name), self.element)
-
     def _number(self, b: Builder, records: Operand, name: str) -> Operand:
-        return b.load(self._cell(b, records, name), typ=self.element)
+        return b.load(self._cell(b, records, name, 0), typ=self.element)

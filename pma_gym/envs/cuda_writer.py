@@ -72,7 +72,7 @@ class ThreadWriter(BeginWriter):
         """An entry of an action; the last one again, and a sign of it, where it is not finite."""
         asked = super()._action(b, given, index, i)
         records, _ = self._block(b, given, index)
-        before = b.load(self._cell(b, records, f"action_{i}"), typ=self.element)
+        before = b.load(self._cell(b, records, f"action_{i}", 0), typ=self.element)
         # Zero times a number that is not finite is none.
         nothing = b.fmul(asked, ir.Constant(self.element, 0.0))
         wrong = b.fcmp_unordered("uno", nothing, nothing)
@@ -103,7 +103,7 @@ class ThreadWriter(BeginWriter):
                     cells.put(value, self._number(b, records, name))
                 period = self.record.options.period
                 cells.put(made.left, ir.Constant(self.element, period))
-                count = b.uitofp(self._count(b, self._cell(b, records, "count")), DOUBLE)
+                count = b.uitofp(self._count(b, self._cell(b, records, "count", 0)), DOUBLE)
                 time = b.fmul(count, ir.Constant(DOUBLE, period))
                 cells.put_vector("clock", narrowed(b, time, self.element))
                 b.store(time, self._clock)
@@ -118,9 +118,9 @@ class ThreadWriter(BeginWriter):
         def end() -> None:
             records, _ = self._block(b, given, b.load(job, typ=INTEGER))
             for name in ("sample", *self.sums):
-                b.store(cells.vector(name), self._cell(b, records, name))
+                b.store(cells.vector(name), self._cell(b, records, name, 0))
             for name, value in kept.items():
-                b.store(cells.get(value), self._cell(b, records, name))
+                b.store(cells.get(value), self._cell(b, records, name, 0))
             b.store(turns.following(b.load(job, typ=INTEGER)), job)
             begin()
 

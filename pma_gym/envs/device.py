@@ -11,6 +11,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.envs.beginning import hangs_slack
 from pma_gym.envs.cuda_kernel import THREADS, CudaKernel, Name
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.observation import ObservationTable
@@ -125,11 +126,11 @@ class DeviceEngine:
 
     def _hangs_slack(self, pressures: NDArray[np.float64]) -> bool:
         """Whether stations at rest are what `begin` takes them for."""
-        for pressure in (pressures.min(), pressures.max()):
+        low, high = float(pressures.min()), float(pressures.max())
+        for pressure in (low, high):
             # Refuses what the regulator does not reach.
-            regulator_voltage(self.nominal.model, float(pressure))
-        between = np.linspace(pressures.min(), pressures.max(), 64)
-        return settle.NoLoad(self.nominal)(between) is not None
+            regulator_voltage(self.nominal.model, pressure)
+        return hangs_slack(settle.NoLoad(self.nominal), low, high)
 
     def _allocate(self, pressures: NDArray[np.float64]) -> None:
         made, kernel, n = self._device, self.kernel, self.count

@@ -10,6 +10,7 @@ from pma_gym.envs.beginning import (
     Settled,
     drawn_events,
     drawn_pressures,
+    hangs_slack,
     holding_voltages,
     settled_at_no_load,
     settled_under_load,
@@ -24,12 +25,14 @@ from pma_gym.envs.record import START, Record
 from pma_gym.kernels.crew import Crew
 from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import Plant
+from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
 
-_FIRST, _LAST = ARGUMENTS.index("first"), ARGUMENTS.index("last")
+_FIRST, _LAST, _SETTLES = (ARGUMENTS.index(name) for name in ("first", "last", "settles"))
+
+_DRAWN_BY = "key_0", "key_1", "episode"
 
 
 class Engine:
@@ -93,6 +96,7 @@ class Engine:
         self.models = [self.nominal.model] * count
         self.pressures = np.zeros(count)
         self._allocate()
+        self._settling = self._slack_range()
         self._address = self._arguments.ctypes.data
         self._beginning = self._arguments.copy()
         self._begin_address = self._beginning.ctypes.data
@@ -126,6 +130,7 @@ class Engine:
         self._ideals = self.task.ideals(samples if moves else 1)
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)
+        self._ranges = np.zeros((max(self.count, 1), 2))
         self._attempts = np.zeros((256, 8), np.int64)
         self._episodes = np.full(self.count, -1, np.int64)
         self._keys = np.zeros((self.count, 2), np.int64)
@@ -149,6 +154,8 @@ class Engine:
             "attempts": self._attempts.ctypes.data,
             "voltages": self.voltages.ctypes.data,
             "ideals": self._ideals.ctypes.data,
+            "settles": 0,
+            "pressures": self._ranges.ctypes.data,
         }
         self._arguments[:] = [given[name] for name in ARGUMENTS]
         self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
@@ -175,6 +182,11 @@ class Engine:
         """A number of every environment by its place's name, shape (n,); a copy."""
         return self.records[:, self.record.places[name], :].reshape(-1)[: self.count].copy()
 
+    def _of(self, name: str, indices: NDArray[np.int64]) -> NDArray[np.float64]:
+        """A number of some environments."""
+        block, lane = np.divmod(indices, self.width)
+        return self.records[block, self.record.places[name], lane]
+
     def counts(self) -> NDArray[np.int64]:
         """Control steps of every episode so far, shape (n,)."""
         return self.integers[:, self.record.places["count"], :].reshape(-1)[: self.count].copy()
@@ -187,6 +199,9 @@ class Engine:
             if seed is not None or self._episodes[index] < 0 and not self._keys[index].any():
                 self._keys[index] = np.random.SeedSequence(seed).generate_state(2)
                 self._episodes[index] = -1
+                block, lane = divmod(index, self.width)
+                for name, number in zip(_DRAWN_BY, (*self._keys[index], -1), strict=True):
+                    self.integers[block, self.record.places[name], lane] = number
 
     def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
         """Begin an episode: draw pressure and station, settle, zero the sensors.
@@ -200,17 +215,53 @@ class Engine:
         """
         if wanted is not None:
             self._check_prescription(wanted)
+        count = len(indices)
         self._episodes[indices] += 1
         asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
+        settles = self._settles(asked)
+        if not settles:
+            self._begin_drawn(indices, asked)
+        self._indices[:count] = indices
+        self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
+        self.kernel.begin(self._begin_address)
+        if settles:
+            self.pressures[indices] = self._of("pressure", indices)
+
+    def _settles(self, asked: Sequence[Pressure]) -> bool:
+        """Write ranges of pressures for compiled beginnings; whether they find a rest in all."""
+        lowest, highest = self._settling
+        for row, one in zip(self._ranges, asked, strict=False):
+            if isinstance(one, str):
+                low, high = self.task.starts
+            elif isinstance(one, Sequence):
+                return False
+            else:
+                low = high = 1e3 * float(one)
+            if not (lowest <= low and high <= highest):
+                return False
+            row[0], row[1] = low, high
+        return True
+
+    def _slack_range(self) -> tuple[float, float]:
+        """Pressures at which compiled beginnings find a rest (Pa), none if the first is larger."""
+        low, high = self.task.starts
+        if not self.kernel.draws:
+            return np.inf, -np.inf
+        try:
+            for pressure in (low, high):
+                regulator_voltage(self.nominal.model, pressure)
+        except ValueError:
+            return np.inf, -np.inf
+        return (low, high) if hangs_slack(self._rest, low, high) else (np.inf, -np.inf)
+
+    def _begin_drawn(self, indices: NDArray[np.int64], asked: Sequence[Pressure]) -> None:
+        """Write down where stations rest that are drawn, disturbed or under load."""
         pressures = drawn_pressures(self.task, self._keys[indices], self._episodes[indices], asked)
         vectors = self._drawn_models(indices)
         regulator = holding_voltages([self.models[i] for i in indices.tolist()], pressures)
         states, zero = self._settled(indices, pressures, regulator, vectors)
         self.pressures[indices] = pressures
         self._fill(indices, states, zero, regulator)
-        self._indices[: len(indices)] = indices
-        self._beginning[_LAST] = len(indices)
-        self.kernel.begin(self._begin_address)
 
     def _check_prescription(self, wanted: Sequence[Pressure]) -> None:
         """Refuse pressures at which an exercise's device cannot give what is prescribed."""

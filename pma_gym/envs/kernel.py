@@ -7,6 +7,7 @@ from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.record import Record
 from pma_gym.kernels.native import Library, compiled
 from pma_gym.plant.program import Program, structure
+from pma_gym.plant.settle import hangs_by_itself
 
 
 class Kernel:
@@ -18,6 +19,10 @@ class Kernel:
         table: the observation's entries.
         width: lanes of a block; records lie as [block, place, lane].
         single: whether the march runs in single precision.
+
+    Attributes:
+        draws: whether `begin` can draw pressures and settle by itself: one station, undisturbed,
+            that pulls on no load.
     """
 
     def __init__(
@@ -30,6 +35,9 @@ class Kernel:
     ) -> None:
         self.program, self.record, self.observed = program, record, table
         self.width, self.single = width, single
+        task, alone = record.task, record.options.randomisation == "none" and not record.events
+        pulls_none = task.actuator == "motor" and task.exercise is None
+        self.draws = alone and pulls_none and hangs_by_itself(program.model)
         self.library: Library = compiled(self._key(), lambda: Writer(self).module, "environment")
         get = self.library.function
         self.step = get("step", [ctypes.c_void_p], ctypes.c_int64)
@@ -42,7 +50,7 @@ class Kernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, options.safety, self.width, self.single),
+            *(options.regulator_action, options.safety, self.width, self.single, self.draws),
             *(record.task.structure, record.events),
         )
         return ["environment", *structure(self.program.model), *map(str, said)]

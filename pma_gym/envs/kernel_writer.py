@@ -1,17 +1,15 @@
-"""Writes the control step of environments: command, march, sensors, reward, and the beginning."""
+"""Writes the control step of environments: command, march, sensors, reward."""
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import Protocol
 
 from llvmlite import ir
 
-from pma_gym.envs.block_memory import BlockMemory, Plan, narrowed, widened
-from pma_gym.envs.record import TARE
+from pma_gym.envs.beginning_writer import BeginningWriter
+from pma_gym.envs.block_memory import Plan, narrowed, widened
 from pma_gym.envs.scoring import COURSE, Course, course, sampling
 from pma_gym.kernels.control import (
     DOUBLE,
-    FLOAT,
     INTEGER,
     POINTER,
     Builder,
@@ -23,15 +21,12 @@ from pma_gym.kernels.control import (
     repeat,
 )
 from pma_gym.kernels.generic import to_real
-from pma_gym.kernels.graph import FIXED, HELD, Value
+from pma_gym.kernels.graph import FIXED, HELD
 from pma_gym.kernels.llvm import Lanes
 from pma_gym.kernels.trace import split
 from pma_gym.plant.attempt import attempt
 from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
 from pma_gym.plant.model import PLANTS
-
-TARE_READINGS = 192
-"""Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""
 
 BAD_ACTION = 4
 """What `step` returns where an action is no finite number; nothing has happened then."""
@@ -49,40 +44,28 @@ class Numbers(Protocol):
         ...
 
 
-class Writer(BlockMemory):
-    """Writes a kernel's module.
-
-    Attributes:
-        traces: whether it writes down a single environment's course.
-    """
+class Writer(BeginningWriter):
+    """Writes a kernel's module."""
 
     def __init__(self, kernel: Plan) -> None:
         super().__init__(kernel)
-        self.traces = kernel.width == 1
-        self.module = ir.Module()
         self.attempt = attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
         self.course: Course = course(self.eq, self.attempt, kernel.record.task)
         extra = [*self.course.values, self.attempt.taken, self.attempt.length]
         layout = Layout.of(self.attempt, extra)
         self.extra = extra
         self.commanded = self.circuit.command()
-        count = self.circuit.slot("count")
-        self.sensed = self.circuit.sense(count + 1, first=False)
+        self.sensed = self.circuit.sense(self.circuit.slot("count") + 1, first=False)
         self.sensed["reward"] = self.circuit.reward(self.sensed)
-        self.begun = self.circuit.sense(count, first=True)
-        self.begun |= self.circuit.first_score(self.begun)
-        self.first_position = self.circuit.position(self.begun)
-        self.tare = self.circuit.read(TARE, self.eq.graph.input("reading", 2, "integer"))
-        begun = [*self.begun.values(), self.first_position]
-        later = [*self.sensed.values(), *begun, *self.tare, *self._more()]
+        later = [*self.sensed.values(), *self._trace_beginning()]
+        self._prepare()
         fixed = {v.id: v for v in [*layout.fixed, *split(later, FIXED)]}
         self.fixed = [fixed[i] for i in sorted(fixed)]
         self.layout = Layout(layout.changing, layout.outputs, layout.held, layout.fixed, self.fixed)
         self._write()
 
-    def _more(self) -> list[Value]:
-        """What else is computed, for its part of the table."""
-        return []
+    def _prepare(self) -> None:
+        """Decide what follows from all that is computed."""
 
     def _write(self) -> None:
         self._table()
@@ -123,14 +106,6 @@ class Writer(BlockMemory):
     def _action(self, b: Builder, given: dict[str, Operand], index: Operand, i: int) -> Operand:
         at = b.add(b.mul(index, integer(self.record.actions)), integer(i))
         return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
-
-    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
-        if lanes.width == 1:
-            return numbers[0]
-        vector = ir.Constant(lanes.real, ir.Undefined)
-        for k, number in enumerate(numbers):
-            vector = lanes.insert(b, vector, number, k)
-        return vector
 
     def _actions(
         self, b: Builder, lanes: Lanes, given: dict[str, Operand], block: Operand, i: int
@@ -284,28 +259,6 @@ class Writer(BlockMemory):
 
     # -- what comes of it --------------------------------------------------------------------------
 
-    def _references(
-        self,
-        b: Builder,
-        lanes: Lanes,
-        given: dict[str, Operand],
-        records: Operand,
-        lane: Operand | int,
-        ahead: int,
-        later: int,
-    ) -> Operand:
-        """References so many steps ahead, for a block or one lane."""
-        found = []
-        for k in range(lanes.width):
-            index = self._row(b, "count", k)
-            if lanes.width == 1:
-                index = b.add(index, integer(lane))
-            steps = self._count(b, offset(b, records, index, self.element))
-            row = b.add(steps, integer(ahead + later))
-            where = offset(b, given["references"], row, self.element)
-            found.append(b.load(where, typ=self.element))
-        return self._gathered(b, lanes, found)
-
     def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
         lanes = self._lanes(self.width)
         records, tables = self._block(b, given, block)
@@ -337,75 +290,3 @@ class Writer(BlockMemory):
         any_end = b.zext(lanes.any(b, found[truncated.id]), INTEGER)
         both = b.or_(any_over, b.shl(any_end, integer(1)))
         b.store(b.or_(b.load(ended, typ=INTEGER), both), ended)
-
-    def _put_observation(
-        self,
-        b: Builder,
-        lanes: Lanes,
-        given: dict[str, Operand],
-        found: dict[int, Operand],
-        entries: Sequence[Value],
-        first: Operand,
-    ) -> None:
-        for i, entry in enumerate(entries):
-            for k in range(lanes.width):
-                number = lanes.extract(b, found[entry.id], k)
-                row = b.mul(b.add(first, integer(k)), integer(len(entries)))
-                where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
-                b.store(narrowed(b, number, FLOAT), where)
-
-    def _begin(self) -> None:
-        """Begin trials of environments whose states, key and episode are set: zero the sensors."""
-        b, (arguments,) = function(self.module, "begin", [("arguments", POINTER)])
-        given = self._arguments(b, arguments)
-        lanes = Lanes(1, fused=FUSED)
-        with loop(b, given["last"], given["first"]) as row:
-            index = b.load(offset(b, given["indices"], row, INTEGER), typ=INTEGER)
-            lane = b.srem(index, integer(self.width))
-            records, tables = self._block(b, given, b.sdiv(index, integer(self.width)))
-            self._zero_sensors(b, lanes, records, tables, lane)
-            self._first(b, lanes, given, records, tables, lane, index)
-        b.ret_void()
-
-    def _zero_sensors(
-        self, b: Builder, lanes: Lanes, records: Operand, tables: Operand, lane: Operand
-    ) -> None:
-        readings = TARE_READINGS if self.record.options.noise else 1
-        known = self._known(b, lanes, self.tare, records, tables, lane)
-        totals = [memory(b, DOUBLE) for _ in range(2)]
-        for total in totals:
-            b.store(ir.Constant(DOUBLE, 0.0), total)
-        with loop(b, readings) as k:
-            known[self.eq.graph.input("reading", 2, "integer").id] = k
-            found = lanes.emit(b, self.tare, known)
-            for total, value in zip(totals, self.tare[:2], strict=True):
-                reading = widened(b, found[value.id])
-                b.store(b.fadd(b.load(total, typ=DOUBLE), reading), total)
-        for total, name in zip(totals, ("tare_contraction", "tare_rotation"), strict=True):
-            mean = b.fmul(b.load(total, typ=DOUBLE), ir.Constant(DOUBLE, 1.0 / readings))
-            at = b.add(self._row(b, name), lane)
-            b.store(narrowed(b, mean, self.element), offset(b, records, at, self.element))
-
-    def _first(
-        self,
-        b: Builder,
-        lanes: Lanes,
-        given: dict[str, Operand],
-        records: Operand,
-        tables: Operand,
-        lane: Operand,
-        index: Operand,
-    ) -> None:
-        options = self.record.options
-        entries = self.circuit.observation(self.kernel.observed, self.begun)
-        values = [*self.begun.values(), self.first_position, *entries]
-        known = self._known(b, lanes, values, records, tables, lane)
-        for ahead in range(options.preview + 1):
-            known[self.circuit.reference(ahead).id] = self._references(
-                b, lanes, given, records, lane, ahead, 0
-            )
-        found = lanes.emit(b, values, known)
-        self._store(b, lanes, found, self.begun, records, lane)
-        if self.traces:
-            b.store(widened(b, found[self.first_position.id]), given["trace"])
-        self._put_observation(b, lanes, given, found, entries, index)

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pma_gym.plant.model import Model
 from pma_gym.plant.rest_search import Search, effect_parameters
 from pma_gym.plant.station_rest import balances, settle_station
 
@@ -55,6 +56,17 @@ def all_at_rest(
     return search.state, search.zero
 
 
+def hangs_by_itself(model: Model) -> bool:
+    """Whether a model at rest with a slack cable is known by its muscle's balance alone.
+
+    It is where sensors rest at the truth, and the regulator's command has no memory.
+    """
+    effects = model.effects.values()
+    sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
+    delayed = any(effect.port == "regulator_delay" for effect in effects)
+    return model.plant == "station" and not sensed and not delayed
+
+
 class NoLoad:
     """Stations at rest with 0 V on the motor, many at once.
 
@@ -67,11 +79,7 @@ class NoLoad:
 
     def __init__(self, plant: "Plant") -> None:
         self.plant = plant
-        effects = plant.model.effects.values()
-        sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
-        delayed = any(effect.port == "regulator_delay" for effect in effects)
-        self._is_known = plant.model.plant == "station" and not sensed and not delayed
-        self._common = self._ends(None) if self._is_known else None
+        self._common = self._ends(None) if hangs_by_itself(plant.model) else None
         self._contractions, self._pressures = (
             [i for i, name in enumerate(plant.states) if name in names]
             for names in (("contraction", "lag_lvdt"), ("pressure", "lag_pressure_transducer"))
