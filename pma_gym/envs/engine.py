@@ -2,10 +2,12 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pma_gym.envs.advance import BOUND
 from pma_gym.envs.beginning import (
     Settled,
     drawn_events,
@@ -22,6 +24,7 @@ from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START, Record
+from pma_gym.kernels.builtin import builtin
 from pma_gym.kernels.crew import Crew
 from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model, load_model
@@ -422,10 +425,27 @@ class Engine:
         """End the threads."""
         self._crew.close()
 
-    @property
-    def call(self) -> tuple[Callable[[int], int], int]:
-        """The compiled step and the address of its arguments, to be called without any check."""
-        return self.kernel.step, self._address
+    def advance(self, copy: Callable[[], Any]) -> Callable[[], Any]:
+        """The step of a single environment, as fast as Python can call it, without any check.
+
+        Args:
+            copy: makes the observation that is handed out.
+        Returns:
+            What gives observation, reward, False, False and info, or, where the episode ended or an
+            action was not finite, what `step` of the kernel returns: 1 if it was terminated, 2 if
+            truncated, or BAD_ACTION.
+        """
+        keys = self.record.info
+        bound = {
+            "arguments": self._address,
+            "infos": dict.fromkeys(keys),
+            "keys": tuple(keys),
+            "copy": copy,
+            "no": False,
+            "yes": True,
+        }
+        address = self.kernel.library.address("advance")
+        return builtin(address, "advance", tuple(bound[name] for name in BOUND))
 
     @property
     def attempts(self) -> int:

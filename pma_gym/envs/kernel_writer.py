@@ -5,6 +5,7 @@ from typing import Protocol
 
 from llvmlite import ir
 
+from pma_gym.envs.advance import write_advance
 from pma_gym.envs.beginning_writer import BeginningWriter
 from pma_gym.envs.block_memory import Plan, narrowed, widened
 from pma_gym.envs.scoring import COURSE, Course, course, sampling
@@ -71,6 +72,8 @@ class Writer(BeginningWriter):
         self._table()
         self._step()
         self._begin()
+        if self.width == 1:
+            write_advance(self.module, self.record)
 
     def _table(self) -> None:
         b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])

@@ -9,6 +9,7 @@ import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.envs.advance import TRUTHS
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.kernel_writer import BAD_ACTION
@@ -22,7 +23,7 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
-from pma_gym.envs.summary import exercise_places, exercise_summaries, info_maker, summary
+from pma_gym.envs.summary import exercise_places, exercise_summaries, summary
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task, limit_in_words
 
@@ -214,13 +215,12 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         # The record holds a reading's parts side by side.
         heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
         self._heard = slice(heard, heard + len(PARTS))
-        self._info = info_maker(record.info)
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         # Writing a number through it is the fastest way into an array.
         self._entry: Any = memoryview(self._given)
         self._shape = self._given.shape
-        self._run, self._arguments = self._engine.call
+        self._advance = self._engine.advance(self._observed.copy)
         self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
         self._idle: str | None = NOT_BEGUN
@@ -247,7 +247,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._idle = self.ended_by = None
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
-        return self._observed.copy(), self._info(*self._tail.tolist())
+        return self._observed.copy(), self._info()
 
     def step(
         self, action: NDArray[np.floating]
@@ -267,23 +267,27 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 self._given[:] = action
         else:
             self._given[:] = self._commands.checked(action)
-        ended = self._run(self._arguments)
-        if ended:
-            if ended & BAD_ACTION:
-                self._commands.checked(action)
-            return self._last(bool(ended & 1))
-        numbers = self._tail.tolist()
-        return self._observed.copy(), numbers[-1], False, False, self._info(*numbers)
+        made = self._advance()
+        if type(made) is tuple:
+            return made
+        if made & BAD_ACTION:
+            self._commands.checked(action)
+        return self._last(bool(made & 1))
 
     def _last(
         self, terminated: bool
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """What the step that ends an episode returns."""
-        code, *_, reward = numbers = self._tail.tolist()
+        code, *_, reward = self._tail.tolist()
         self.ended_by = limit_in_words(self._engine.models[0], code, self.task.exercise)
         self._idle = f"the episode ended at {self.time:g} s"
-        info = self._info(*numbers) | self.episode_summary()
+        info = self._info() | self.episode_summary()
         return self._observed.copy(), reward, terminated, not terminated, info
+
+    def _info(self) -> dict[str, Any]:
+        """Numbers of the last step or reset; what compiled code makes in between."""
+        found = dict(zip(self._engine.record.info, self._tail[1:-1].tolist(), strict=True))
+        return found | {name: found[name] != 0.0 for name in TRUTHS}
 
     def _require_episode(self, wanted: str) -> None:
         if self._idle:

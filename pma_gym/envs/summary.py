@@ -1,7 +1,7 @@
 """What an episode was worth: RMSE by phase, from the sums that were kept while it ran."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,52 +11,6 @@ from pma_gym.envs.record import PEAKS, WORK
 from pma_gym.metrics import percent_of_range
 from pma_gym.tasks import PACE, Task
 from pma_gym.units import SI_FACTORS
-
-
-def info_maker(keys: Sequence[str]) -> Callable[..., dict[str, Any]]:
-    """A function that makes a step's info from the record's last numbers.
-
-    Args:
-        keys: the info's keys, `Record.info`.
-    Returns:
-        A function of what stands there: the limit broken, the info's numbers, the reward.
-    """
-    k0, k1, k2, k3, k4, k5, k6, k7, k8, k9 = keys[:10]
-    more = keys[10:]
-
-    # Written out: this runs in every step, and a loop would take three times as long.
-    def made(
-        ended: float,
-        v0: float,
-        v1: float,
-        v2: float,
-        v3: float,
-        v4: float,
-        v5: float,
-        v6: float,
-        v7: float,
-        v8: float,
-        v9: float,
-        reward: float,
-    ) -> dict[str, Any]:
-        return {
-            k0: v0,
-            k1: v1,
-            k2: v2,
-            k3: v3,
-            k4: v4,
-            k5: v5,
-            k6: v6,
-            k7: v7,
-            k8: v8,
-            k9: v9 != 0.0,
-        }
-
-    def exercised(*numbers: float) -> dict[str, Any]:
-        common = made(*numbers[:11], numbers[-1])  # type: ignore[call-arg]
-        return common | dict(zip(more, numbers[11:-1], strict=True))
-
-    return exercised if more else made
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:

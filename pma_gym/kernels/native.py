@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import llvmlite
 import llvmlite.binding as llvm
 
+from pma_gym.kernels.builtin import addresses
 from pma_gym.kernels.cache import digest, keep, load, source_digest
 
 if TYPE_CHECKING:
@@ -59,6 +60,8 @@ class Library:
         # The number is there because a process may have several libraries of one name.
         self._unit = f"{name}.{next(_numbers)}"
         parts = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+        for function, address in addresses().items():
+            parts.import_symbol(function, address)
         _alive.append(parts.link(_jit(), self._unit))
 
     def address(self, name: str) -> int:

@@ -51,7 +51,7 @@ def single_kernel(name: str) -> Prepared:
     environment: Any = gym.make(name).unwrapped
     environment.reset(seed=0)
     engine: Engine = environment._engine
-    run, arguments = engine.call
+    run, arguments = engine.kernel.step, engine._address
     entry = memoryview(engine.actions[0])
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, ACTIONS).tolist()
 

@@ -1,0 +1,76 @@
+"""What a step returns is made in compiled code: as Python would make it, and nobody else's."""
+
+import gc
+import sys
+
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAEnv
+from pma_gym.envs.engine import Engine
+from pma_gym.envs.options import parse_options
+from pma_gym.tasks import EVERY_TASK, TASKS
+
+
+@pytest.mark.parametrize("task", EVERY_TASK)
+def test_a_step_returns_what_the_record_holds(task):
+    env = PMAEnv(task)
+    _, begun = env.reset(seed=1)
+    entries = env.action_space.shape
+    seen = []
+    for k in range(3):
+        made = env.step(np.full(entries, 0.01 * k, np.float32))
+        observation, reward, terminated, truncated, info = made
+        assert type(made) is tuple and type(info) is dict
+        assert terminated is False and truncated is False
+        assert list(info) == list(begun) == env._engine.record.info
+        assert info == env._info()
+        assert {type(value) for name, value in info.items() if name != "extrapolated"} == {float}
+        assert type(info["extrapolated"]) is bool
+        assert type(reward) is float and reward == env._engine.rewards[0]
+        np.testing.assert_array_equal(observation, env._observed)
+        assert observation.base is None
+        seen.append((observation, info["time_s"]))
+    # None is written over by the next.
+    assert [time for _, time in seen] == [0.01, 0.02, 0.03]
+    assert not np.array_equal(seen[0][0], seen[1][0])
+
+
+def test_a_pressure_that_the_trials_did_not_have_is_told():
+    env = PMAEnv("rotation", pressure_kpa=150)
+    env.reset(seed=0)
+    assert env.step(np.zeros(1, np.float32))[4]["extrapolated"] is True
+
+
+def test_steps_keep_nothing_and_take_no_reference_that_is_not_theirs():
+    env = PMAEnv("displacement")
+    env.reset(seed=0)
+    action = np.zeros(1, np.float32)
+    keys = env._engine.record.info
+    held = [False, True, *keys, env._observed]
+    env.step(action)
+    gc.collect()
+    before, objects = [sys.getrefcount(one) for one in held], len(gc.get_objects())
+    for _ in range(100):
+        _, _, _, _, info = env.step(action)
+        assert all(sys.getrefcount(value) <= 4 for value in info.values() if type(value) is float)
+        del info
+    after = [sys.getrefcount(one) for one in held]
+    assert np.abs(np.subtract(after, before)).max() <= 5
+    gc.collect()
+    assert abs(len(gc.get_objects()) - objects) <= 5
+
+
+def test_what_goes_wrong_while_it_is_made_is_raised():
+    engine = Engine(TASKS["displacement"], parse_options({}))
+    engine.seed(np.array([0]), [0])
+    engine.reset(np.array([0]))
+
+    def fail():
+        raise MemoryError("no room for an observation")
+
+    with pytest.raises(MemoryError, match="no room"):
+        engine.advance(fail)()
+    # The step itself was made.
+    assert engine.counts().tolist() == [1]
+    assert engine.advance(lambda: "seen")()[0] == "seen"
