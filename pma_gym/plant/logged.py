@@ -24,6 +24,7 @@ class Logged:
         regulator: regulator voltage (V), shape (rows,).
         measured: readings (m, rad, N, Pa), 0 where missing, shape (4, rows).
         missing: rows without a reading that counts, by output.
+        counts: 1 where a reading counts, else 0, shape (4, rows).
         measures: whether there is any that does, by output.
     """
 
@@ -32,6 +33,7 @@ class Logged:
     regulator: Array
     measured: Array
     missing: list[NDArray[np.int64]]
+    counts: Array
     measures: list[bool]
 
     @classmethod
@@ -59,6 +61,7 @@ class Logged:
             regulator,
             np.where(absent, 0.0, measured),
             [np.flatnonzero(row) for row in absent],
+            np.where(absent, 0.0, 1.0),
             [not row.all() for row in absent],
         )
 

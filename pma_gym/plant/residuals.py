@@ -19,6 +19,7 @@ from pma_gym.plant import beginnings, sensors, settle
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS, Plant
+from pma_gym.plant.products import Signals, products
 from pma_gym.plant.program import FIRST_S, parameter_names, table
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.units import Quantity
@@ -27,10 +28,6 @@ Array = NDArray[np.float64]
 
 MOST_BYTES = 1 << 28
 """Most memory for the states of trials that are simulated together."""
-
-_COLUMNS = 1024
-"""Residuals in one product of matrices: few enough that no BLAS shares it between threads, which
-would make the last bits a matter of their number."""
 
 
 @dataclass(frozen=True)
@@ -116,6 +113,10 @@ class Residuals:
             raise ValueError("a fit needs at least one trial")
         self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
         self.count = sum(logged.count for logged in self._trials)
+        self._weights = [
+            [counts / width for counts, width in zip(logged.counts, self.deviations, strict=True)]
+            for logged in self._trials
+        ]
         self._buffer = np.empty(0)
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
@@ -136,12 +137,13 @@ class Residuals:
         size = len(steps)
         total = np.zeros((size + 1, size + 1))
 
-        def add(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
-            return self._gram(self._differences(logged, states, zeros, vectors, central))
+        def multiply(
+            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
+        ) -> list[Array]:
+            return self._multiplied(block, spaces, zeros, vectors, central)
 
-        tried = _moved(values, steps, central)
-        for gram in self._each(tried, add):
-            total += gram
+        for product in self._by_block(_moved(values, steps, central), multiply):
+            total += product
         widths = np.concatenate([[1.0], steps])
         total /= np.outer(widths, widths)
         if not np.isfinite(total).all() or not self._settled:
@@ -163,10 +165,9 @@ class Residuals:
     def _dense(self, values: Array, steps: Array, central: bool) -> list[Array]:
         def copy(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             found = self._differences(logged, states, zeros, vectors, central)
-            scaled = found / self.deviations[:, None]
-            return scaled[:, :, : len(logged.time)].transpose(0, 2, 1)
+            return (found / self.deviations[:, None]).transpose(0, 2, 1)
 
-        found = list(self._each(_moved(values, steps, central), copy))
+        found = self._each(_moved(values, steps, central), copy)
         if not self._settled:
             raise ValueError("no contraction balances the load at the beginning of a trial")
         return found
@@ -178,6 +179,22 @@ class Residuals:
 
         It gets states of shape (tried, rows, states), x0 of shape (tried,) and their vectors.
         """
+
+        def trials(
+            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
+        ) -> list[Array]:
+            logs = [self._trials[i] for i in block]
+            with ThreadPoolExecutor(self.threads) as pool:
+                # A thread costs more than the work of a small trial does.
+                each = pool.map if self.threads > 1 else map
+                return list(each(work, logs, spaces, zeros, repeat(vectors)))
+
+        return self._by_block(tried, trials)
+
+    def _by_block(
+        self, tried: Array, work: Callable[[list[int], list[Array], Array, Array], list[Array]]
+    ) -> list[Array]:
+        """As `_each`, but `work` gets several trials at once, by their numbers."""
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self._factors[column]
@@ -197,23 +214,19 @@ class Residuals:
         if not self._settled:
             return found
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
-        with ThreadPoolExecutor(self.threads) as pool:
-            # A thread costs more than the work of a small trial does.
-            each = pool.map if self.threads > 1 else map
-            for block in self._blocks(8 * number * count):
-                runs, spaces = [], self._spaces(block, count)
-                for i, space in zip(block, spaces, strict=True):
-                    logged = self._trials[i]
-                    columns = (logged.time, logged.motor, logged.regulator, self.joined)
-                    runs += [
-                        Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
-                        for k in range(count)
-                    ]
-                simulate_all(self.plant.program, runs, self.threads)
-                logs = [self._trials[i] for i in block]
-                if self._begun:
-                    spaces = list(map(self._met, spaces, logs))
-                found += each(work, logs, spaces, zeros[block, : len(tried)], repeat(vectors))
+        for block in self._blocks(8 * number * count):
+            runs, spaces = [], self._spaces(block, count)
+            for i, space in zip(block, spaces, strict=True):
+                logged = self._trials[i]
+                columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                runs += [
+                    Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
+                    for k in range(count)
+                ]
+            simulate_all(self.plant.program, runs, self.threads)
+            if self._begun:
+                spaces = list(map(self._met, spaces, (self._trials[i] for i in block)))
+            found += work(block, spaces, zeros[block, : len(tried)], vectors)
         return found
 
     def _met(self, space: Array, logged: Logged) -> Array:
@@ -269,16 +282,16 @@ class Residuals:
     ) -> Array:
         """Simulated minus measured, then what moving each parameter changes (SI).
 
-        Shape (1 + p, 4, rows and some zeros more).
+        Shape (1 + p, 4, rows).
         """
         held = self._held(states, zeros, vectors)
         count, rows = len(states), len(logged.time)
         moved = (count - 1) // 2 if central else count - 1
-        found = np.zeros((1 + moved, len(OUTPUTS), -(-rows // _COLUMNS) * _COLUMNS))
+        found = np.zeros((1 + moved, len(OUTPUTS), rows))
         for channel, signal in enumerate(held):
             if not logged.measures[channel]:
                 continue
-            there = found[:, channel, :rows]
+            there = found[:, channel]
             np.subtract(signal[0], logged.measured[channel], out=there[0])
             if central:
                 np.subtract(signal[1 : 1 + moved], signal[1 + moved :], out=there[1:])
@@ -299,11 +312,29 @@ class Residuals:
             program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)
         return [states[:, :, at] if at >= 0 else truth[:, :, i] for i, at in enumerate(columns)]
 
-    def _gram(self, differences: Array) -> Array:
-        """Products of all differences with each other, in units of noise, shape (1 + p, 1 + p)."""
-        parts = differences.reshape(*differences.shape[:2], -1, _COLUMNS).transpose(1, 2, 0, 3)
-        products = np.matmul(parts, parts.swapaxes(2, 3)).sum(axis=1)
-        return np.sum(products / (self.deviations**2)[:, None, None], axis=0)
+    def _multiplied(
+        self,
+        block: list[int],
+        spaces: list[Array],
+        zeros: Array,
+        vectors: Array,
+        central: bool,
+    ) -> list[Array]:
+        """Products of all differences with each other, in units of noise, (1 + p, 1 + p) each."""
+        trials = []
+        for number, states, zero in zip(block, spaces, zeros, strict=True):
+            logged, weights = self._trials[number], self._weights[number]
+            channels = [i for i, known in enumerate(logged.measures) if known]
+            held = self._held(states, zero, vectors)
+            trials.append(
+                Signals(
+                    [held[i] for i in channels],
+                    [logged.measured[i] for i in channels],
+                    [weights[i] for i in channels],
+                    central,
+                )
+            )
+        return products(trials, self.threads)
 
 
 def _moved(values: Array, steps: Array, central: bool) -> Array:

@@ -1,13 +1,13 @@
 """Whole trials, many at once: what simulations and fits run."""
 
 import os
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from pma_gym.plant.program import FIRST_S, Program
+from pma_gym.plant.sharing import share
 from pma_gym.plant.trial_kernel import JOB
 
 FEW = 4
@@ -60,19 +60,25 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
     kernel = program.simulate_many if wide else program.simulate_one
     count = len(program.states)
     jobs = np.zeros((len(runs), len(JOB)), np.int64)
-    kept: list[np.ndarray] = []
-    starts = []
-    for run, job in zip(runs, jobs, strict=True):
-        _check(program, run)
-        columns = [np.ascontiguousarray(c, float) for c in (run.time, run.motor, run.regulator)]
-        start = np.concatenate([run.state, [run.size, run.zero_contraction]])
-        if run.states.shape != (len(run.time), count):
-            run.states = np.empty((len(run.time), count))
-        arrays = [*columns, run.table, start, run.states]
-        kept += arrays
-        starts.append(start)
-        job[:] = [len(run.time), run.joined, *(array.ctypes.data for array in arrays)]
-        if len(run.time) == 1:
+    starts = np.empty((len(runs), count + 2))
+    known: dict[int, tuple[np.ndarray, int]] = {}
+
+    def address(array: np.ndarray) -> int:
+        """Address of an array's numbers; runs share many, and asking costs more than a step."""
+        if id(array) not in known:
+            numbers = np.ascontiguousarray(array, float)
+            known[id(array)] = numbers, numbers.ctypes.data
+        return known[id(array)][1]
+
+    where, apart = starts.ctypes.data, starts.strides[0]
+    for i, run in enumerate(runs):
+        rows = _rows(program, run)
+        starts[i, :count], starts[i, count:] = run.state, (run.size, run.zero_contraction)
+        if run.states.shape != (rows, count):
+            run.states = np.empty((rows, count))
+        given = map(address, (run.time, run.motor, run.regulator, run.table))
+        jobs[i] = (rows, run.joined, *given, where + i * apart, run.states.ctypes.data)
+        if rows == 1:
             run.states[0] = run.state
     # The longest first, so that the last lanes do not wait for one of them.
     order = np.argsort([-len(run.time) for run in runs], kind="stable")
@@ -80,20 +86,12 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
     parts = [np.ascontiguousarray(long[k::threads]) for k in range(threads)]
     made = np.zeros((threads, 8), np.int64)
 
-    def work(k: int, _: object = None) -> None:
+    def work(k: int) -> None:
         kernel(len(parts[k]), parts[k].ctypes.data, made[k].ctypes.data)
 
-    # The threads hold what they write to, should a second Ctrl-C end this call before them.
-    others = [threading.Thread(target=work, args=(k, kept)) for k in range(1, threads)]
-    for other in others:
-        other.start()
-    try:
-        work(0)
-    finally:
-        for other in others:
-            other.join()
-    for run, start in zip(runs, starts, strict=True):
-        run.size = float(start[count])
+    share(work, threads, (known, starts, runs))
+    for run, size in zip(runs, starts[:, count].tolist(), strict=True):
+        run.size = size
     return int(made[:, 0].sum())
 
 
@@ -102,12 +100,12 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _check(program: Program, run: Run) -> None:
-    rows = {len(column) for column in (run.time, run.motor, run.regulator)}
-    if len(rows) != 1:
-        raise ValueError(
-            f"time, motor and regulator of a run must have one length; got {sorted(rows)}"
-        )
+def _rows(program: Program, run: Run) -> int:
+    """How many rows a run has, if it is one of the program's."""
+    rows, *others = len(run.time), len(run.motor), len(run.regulator)
+    if others != [rows, rows]:
+        found = sorted({rows, *others})
+        raise ValueError(f"time, motor and regulator of a run must have one length; got {found}")
     if run.table.shape != (program.table_size,) or run.state.shape != (len(program.states),):
         raise ValueError(
             f"all runs of one call must be of models of one structure (the same effects): a table "
@@ -115,3 +113,4 @@ def _check(program: Program, run: Run) -> None:
             f"{run.table.size} and {run.state.size}; simulate the other models in a call of "
             "their own"
         )
+    return rows
