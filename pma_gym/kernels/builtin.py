@@ -59,9 +59,9 @@ def builtin(address: int, name: str, bound: object) -> Callable[[], Any]:
         name: its name in messages.
         bound: what it is given.
     """
-    make = ctypes.pythonapi.PyCFunction_NewEx
-    make.restype = ctypes.py_object
-    make.argtypes = [ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p]
+    # Of its own: who else uses ctypes.pythonapi shares the types of what is taken from there.
+    kind = ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
+    make = kind(("PyCFunction_NewEx", ctypes.pythonapi))
     return make(ctypes.addressof(_definition(address, name)), bound, None)
 
 
