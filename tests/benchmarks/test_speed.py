@@ -29,7 +29,7 @@ class StandIn:
     versions = {"python": "3"}
 
     def __init__(self, rates=(), interrupt_after=None):
-        self.rates, self.calls, self.ended = dict(rates), [], False
+        self.rates, self.calls, self.ended = dict(rates), [], 0
         self.interrupt_after = interrupt_after
 
     def prepare(self, key, row, settings):
@@ -43,7 +43,7 @@ class StandIn:
         return {"steps": self.rates[key], "seconds": 1.0, "facts": {"right_hand_sides": 400.0}}
 
     def end(self):
-        self.ended = True
+        self.ended += 1
 
 
 def stand_in(monkeypatch, rates, **options):
@@ -66,6 +66,22 @@ def test_every_round_measures_every_row_once_in_another_order():
         assert len(done) == measurement.work and measurement.complete and made.ended
         orders.append(rounds)
     assert orders[0] == orders[1]
+
+
+def test_single_environments_are_measured_in_a_new_process_each_round():
+    keys = ["single/own", "batch/own/64", "single/CartPole"]
+    workers = []
+
+    def client(peer):
+        workers.append(StandIn(dict.fromkeys(keys, 1.0)))
+        return workers[-1]
+
+    rows = [row for row in all_rows() if row.key in keys]
+    measurement = Measurement(rows, Plan(3, 0.0), client)
+    measurement.run()
+    assert measurement.complete
+    by_keys = {tuple(set(worker.calls)): worker.ended for worker in workers}
+    assert by_keys == {("single/own",): 3, ("batch/own/64",): 1, ("single/CartPole",): 3}
 
 
 def test_missing_peers_are_named(tmp_path, monkeypatch):
