@@ -4,9 +4,11 @@ from llvmlite import ir
 
 from pma_gym.envs.block_memory import ARGUMENTS
 from pma_gym.envs.record import Record
+from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import INTERFACE
 from pma_gym.kernels.control import (
     DOUBLE,
+    FLOAT,
     INDEX,
     INTEGER,
     POINTER,
@@ -14,12 +16,20 @@ from pma_gym.kernels.control import (
     Operand,
     function,
     integer,
+    loop,
     offset,
 )
 
-BOUND = ("arguments", "infos", "keys", "copy", "no", "yes")
+BOUND = (
+    *("arguments", "infos", "keys", "copy", "no", "yes"),
+    *("given", "array", "single", "double"),
+)
 """What `advance` is bound to: address of the step's arguments, a dictionary of the info's keys, the
-keys in order, what copies the observation, False and True."""
+keys in order, what copies the observation, False and True; the array of actions, the type of
+arrays, and the dtypes that are read here, or None for a type that no action has."""
+
+NOT_READ = 8
+"""What `advance` returns for an action that is to be read in Python; nothing has happened then."""
 
 TRUTHS = ("extrapolated",)
 """Keys of an info that are true or false."""
@@ -30,16 +40,24 @@ _TYPES = {"p": POINTER, "i": INTEGER, "n": INDEX, "d": DOUBLE, "v": ir.VoidType(
 def write_advance(module: ir.Module, record: Record) -> None:
     """Write `advance`, which makes a step by the module's own `step`.
 
-    It returns observation, reward, False, False and info, or what `step` returns if that is not 0.
-    Other threads of Python run meanwhile.
+    Its argument is the action: an array of one dimension and of single or double precision with an
+    entry for each action, or the array of actions itself, in which the action stands already. It
+    returns observation, reward, False, False and info, or what `step` returns if that is not 0, or
+    NOT_READ. Other threads of Python run meanwhile.
 
     Args:
         module: where to.
         record: places of a single environment's numbers.
     """
-    b, (bound, _) = function(module, "advance", [("bound", POINTER), ("none", POINTER)], POINTER)
+    b, (bound, action) = function(
+        module, "advance", [("bound", POINTER), ("action", POINTER)], POINTER
+    )
     parts = {name: _call(b, "PyTuple_GetItem", bound, integer(i)) for i, name in enumerate(BOUND)}
     arguments = _call(b, "PyLong_AsVoidPtr", parts["arguments"])
+    with b.if_then(b.icmp_unsigned("!=", action, parts["given"])):
+        at = offset(b, arguments, ARGUMENTS.index("actions"), INTEGER)
+        given = b.inttoptr(b.load(at, typ=INTEGER), POINTER)
+        _read(b, action, parts, given, record.actions)
     thread = _call(b, "PyEval_SaveThread")
     ended = b.call(module.get_global("step"), [arguments])
     _call(b, "PyEval_RestoreThread", thread)
@@ -82,6 +100,42 @@ def write_advance(module: ir.Module, record: Record) -> None:
     for part in (observation, info):
         _call(b, "Py_DecRef", part)
     b.ret(_NULL)
+
+
+def _read(
+    b: Builder, action: Operand, parts: dict[str, Operand], given: Operand, count: int
+) -> None:
+    """Write an action's entries where the step takes them, or return NOT_READ."""
+    unread = b.append_basic_block("unread")
+
+    def member(place: int, type_: ir.Type = POINTER) -> Operand:
+        return b.load(offset(b, action, place, ir.IntType(8)), typ=type_)
+
+    def is_same(pointer: Operand, name: str) -> Operand:
+        return b.icmp_unsigned("==", pointer, parts[name])
+
+    _unless(b, b.not_(is_same(member(arrays.TYPE), "array")), unread)
+    dtype = member(arrays.DTYPE)
+    is_single = is_same(dtype, "single")
+    _unless(b, b.not_(b.or_(is_single, is_same(dtype, "double"))), unread)
+    dimensions = member(arrays.DIMENSIONS, INDEX)
+    _unless(b, b.icmp_signed("!=", dimensions, ir.Constant(INDEX, 1)), unread)
+    size = b.load(member(arrays.SIZES), typ=INTEGER)
+    _unless(b, b.icmp_signed("!=", size, integer(count)), unread)
+    data, stride = member(arrays.DATA), b.load(member(arrays.STRIDES), typ=INTEGER)
+    with b.if_else(is_single) as cases:
+        for case, element in zip(cases, (FLOAT, DOUBLE), strict=True):
+            with case, loop(b, count) as i:
+                at = offset(b, data, b.mul(i, stride), ir.IntType(8))
+                # Wherever it lies: an array may begin at any byte.
+                entry = b.load(at, align=1, typ=element)
+                wide = b.fpext(entry, DOUBLE) if element is FLOAT else entry
+                b.store(wide, offset(b, given, i))
+    read = b.append_basic_block("read")
+    b.branch(read)
+    b.position_at_end(unread)
+    b.ret(_call(b, "PyLong_FromLongLong", integer(NOT_READ)))
+    b.position_at_end(read)
 
 
 _NULL = ir.Constant(POINTER, None)

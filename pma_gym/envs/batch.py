@@ -76,24 +76,28 @@ def wanted_pressures(
     return None
 
 
-def spread(found: Mapping[str, Any], mask: NDArray[np.bool_]) -> dict[str, Any]:
+def spread(
+    found: Mapping[str, Any], mask: NDArray[np.bool_], indices: NDArray[np.int64]
+) -> dict[str, Any]:
     """Values of the environments in a mask as arrays of all, each with a mask of its own.
 
     Args:
         found: arrays by name, one value for each environment in the mask, or dictionaries of such;
             NaN for a value that there is not.
         mask: bool, shape (num_envs,).
+        indices: where it is true.
     """
     info: dict[str, Any] = {}
     for name, values in found.items():
-        own = mask.copy()
+        own, places = mask.copy(), indices
         if isinstance(values, Mapping):
-            info[name], info[f"_{name}"] = spread(values, mask), own
+            info[name], info[f"_{name}"] = spread(values, mask, indices), own
             continue
-        known = ~np.isnan(values) if values.dtype.kind == "f" else np.ones(len(values), np.bool_)
-        if known.any():
-            own[mask] = known
+        if values.dtype.kind == "f" and (unknown := np.isnan(values)).any():
+            own[indices[unknown]] = False
+            places, values = indices[~unknown], values[~unknown]
+        if len(values):
             array = np.full(len(mask), None if values.dtype.kind == "O" else 0, values.dtype)
-            array[own] = values[known]
+            array[places] = values
             info[name], info[f"_{name}"] = array, own
     return info

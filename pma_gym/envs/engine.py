@@ -24,6 +24,7 @@ from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START, Record
+from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import builtin
 from pma_gym.kernels.crew import Crew
 from pma_gym.kernels.native import simd_lanes
@@ -184,6 +185,16 @@ class Engine:
     def numbers(self, name: str) -> NDArray[np.float64]:
         """A number of every environment by its place's name, shape (n,); a copy."""
         return self.records[:, self.record.places[name], :].reshape(-1)[: self.count].copy()
+
+    def row(self, index: int) -> list[float]:
+        """All numbers of an environment, by place."""
+        block, lane = divmod(index, self.width)
+        return self.records[block, :, lane].tolist()
+
+    def rows(self, indices: NDArray[np.int64]) -> NDArray[np.float64]:
+        """All numbers of some environments, shape (m, size of the record); a copy."""
+        block, lane = np.divmod(indices, self.width)
+        return self.records[block, :, lane]
 
     def _of(self, name: str, indices: NDArray[np.int64]) -> NDArray[np.float64]:
         """A number of some environments."""
@@ -425,17 +436,19 @@ class Engine:
         """End the threads."""
         self._crew.close()
 
-    def advance(self, copy: Callable[[], Any]) -> Callable[[], Any]:
-        """The step of a single environment, as fast as Python can call it, without any check.
+    def advance(self, copy: Callable[[], Any], given: NDArray[np.float64]) -> Callable[[Any], Any]:
+        """The step of a single environment, as fast as Python can call it.
 
         Args:
             copy: makes the observation that is handed out.
+            given: the row of `actions`.
         Returns:
-            What gives observation, reward, False, False and info, or, where the episode ended or an
-            action was not finite, what `step` of the kernel returns: 1 if it was terminated, 2 if
-            truncated, or BAD_ACTION.
+            What takes an action, or `given` with the action in it, and gives observation, reward,
+            False, False and info; or, where the episode ended or an action was not finite, what
+            `step` of the kernel returns: 1 if it was terminated, 2 if truncated, or BAD_ACTION; or
+            NOT_READ for an action that is not an array of as many floats, with nothing done.
         """
-        keys = self.record.info
+        keys, known = self.record.info, arrays.are_known()
         bound = {
             "arguments": self._address,
             "infos": dict.fromkeys(keys),
@@ -443,6 +456,10 @@ class Engine:
             "copy": copy,
             "no": False,
             "yes": True,
+            "given": given,
+            "array": np.ndarray if known else None,
+            "single": np.dtype(np.float32),
+            "double": np.dtype(np.float64),
         }
         address = self.kernel.library.address("advance")
         return builtin(address, "advance", tuple(bound[name] for name in BOUND))

@@ -3,13 +3,13 @@
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import gymnasium as gym
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.advance import TRUTHS
+from pma_gym.envs.advance import NOT_READ
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.kernel_writer import BAD_ACTION
@@ -23,9 +23,9 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
-from pma_gym.envs.summary import exercise_places, exercise_summaries, summary
+from pma_gym.envs.summary import episode_summary, step_info
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.tasks import Events, Human, Task, limit_in_words
+from pma_gym.tasks import Events, Human, Task
 
 if TYPE_CHECKING:
     from pma_gym.envs.picture import Picture
@@ -211,19 +211,15 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         record = self._engine.record
         self._places = record.places
         self._row = self._engine.records[0, :, 0]
-        self._tail = self._row[self._places["ended"] :]
         # The record holds a reading's parts side by side.
         heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
         self._heard = slice(heard, heard + len(PARTS))
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
-        # Writing a number through it is the fastest way into an array.
-        self._entry: Any = memoryview(self._given)
-        self._shape = self._given.shape
-        self._advance = self._engine.advance(self._observed.copy)
+        self._made = self._engine.advance(self._observed.copy, self._given)
         self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
-        self._idle: str | None = NOT_BEGUN
+        self._wait(NOT_BEGUN)
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -241,10 +237,11 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         """
         wanted = self._wanted_pressure(options or {})
         super().reset(seed=seed)
-        self._idle = NOT_BEGUN
+        self._wait(NOT_BEGUN)
         self._engine.seed(_FIRST, [seed])
         self._engine.reset(_FIRST, [wanted])
-        self._idle = self.ended_by = None
+        self.ended_by = None
+        self._wait(None)
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
         return self._observed.copy(), self._info()
@@ -258,40 +255,46 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             ValueError: an action of the wrong shape, or not finite.
             gymnasium.error.ResetNeeded: no episode, or one that has ended.
         """
-        if self._idle:
-            self._require_episode("step()")
-        if type(action) is np.ndarray and action.shape == self._shape and action.dtype.kind == "f":
-            if len(self._entry) == 1:
-                self._entry[0] = action.item()
-            else:
-                self._given[:] = action
-        else:
+        made = self._advance(action)
+        return made if type(made) is tuple else self._otherwise(action, made)
+
+    def _otherwise(
+        self, action: NDArray[np.floating], code: int
+    ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """What a step returns that compiled code does not make."""
+        if code == NOT_READ:
             self._given[:] = self._commands.checked(action)
-        made = self._advance()
-        if type(made) is tuple:
-            return made
-        if made & BAD_ACTION:
+            made = self._advance(self._given)
+            if type(made) is tuple:
+                return made
+            code = made
+        if code & BAD_ACTION:
             self._commands.checked(action)
-        return self._last(bool(made & 1))
+        return self._last(bool(code & 1))
 
     def _last(
         self, terminated: bool
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """What the step that ends an episode returns."""
-        code, *_, reward = self._tail.tolist()
-        self.ended_by = limit_in_words(self._engine.models[0], code, self.task.exercise)
-        self._idle = f"the episode ended at {self.time:g} s"
+        self._wait(f"the episode ended at {self.time:g} s")
         info = self._info() | self.episode_summary()
-        return self._observed.copy(), reward, terminated, not terminated, info
+        self.ended_by = info["ended_by"]
+        return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 
     def _info(self) -> dict[str, Any]:
         """Numbers of the last step or reset; what compiled code makes in between."""
-        found = dict(zip(self._engine.record.info, self._tail[1:-1].tolist(), strict=True))
-        return found | {name: found[name] != 0.0 for name in TRUTHS}
+        return step_info(self._engine, 0)
 
-    def _require_episode(self, wanted: str) -> None:
-        if self._idle:
-            raise gym.error.ResetNeeded(f"{self._idle}: call reset() before {wanted}")
+    def _wait(self, why: str | None) -> None:
+        """Let no step be made until `reset`, and say why; None to let them."""
+        self._idle = why
+        self._advance = self._refused if why else self._made
+
+    def _refused(self, _: object) -> NoReturn:
+        raise self._needs_reset("step()")
+
+    def _needs_reset(self, wanted: str) -> gym.error.ResetNeeded:
+        return gym.error.ResetNeeded(f"{self._idle}: call reset() before {wanted}")
 
     def _wanted_pressure(self, options: Mapping[str, Any]) -> Pressure:
         check_known("reset option", options, RESET_OPTIONS)
@@ -466,13 +469,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             None. An exercise has `exercise_summaries` too, and its RMSE in N m where it prescribes
             a moment.
         """
-        sums = {p.name: self._number(f"sum_{p.name}") for p in self.task.protocol.phases}
-        found = summary(self.task, sums, self._number("sample")) | {"ended_by": self.ended_by}
-        if self.task.exercise is None:
-            return found
-        numbers = {name: np.array([self._number(name)]) for name in exercise_places()}
-        other = exercise_summaries(numbers, np.array([self._count]), self.options.period)
-        return found | {name: float(values[0]) for name, values in other.items()}
+        return episode_summary(self._engine, 0)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, shape (400, 800, 3).
@@ -487,7 +484,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             )
             return None
         if self._idle == NOT_BEGUN:
-            self._require_episode("render()")
+            raise self._needs_reset("render()")
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.picture import Picture

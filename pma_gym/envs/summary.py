@@ -1,4 +1,7 @@
-"""What an episode was worth: RMSE by phase, from the sums that were kept while it ran."""
+"""What an episode was worth: RMSE by phase, from the sums that were kept while it ran.
+
+What an agent is told at its end is here too, of one environment among however many.
+"""
 
 import math
 from collections.abc import Mapping
@@ -7,10 +10,35 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.envs.advance import TRUTHS
+from pma_gym.envs.engine import Engine
 from pma_gym.envs.record import PEAKS, WORK
 from pma_gym.metrics import percent_of_range
-from pma_gym.tasks import PACE, Task
+from pma_gym.tasks import PACE, Task, limit_in_words
 from pma_gym.units import SI_FACTORS
+
+
+def step_info(engine: Engine, index: int) -> dict[str, Any]:
+    """Numbers of an environment's last step or reset, by the keys of `PMAEnv`'s info."""
+    keys, first = engine.record.info, engine.record.places["ended"] + 1
+    numbers = engine.row(index)[first : first + len(keys)]
+    found = dict(zip(keys, numbers, strict=True))
+    return found | {name: found[name] != 0.0 for name in TRUTHS}
+
+
+def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
+    """What an environment's episode has come to so far, see `PMAEnv.episode_summary`."""
+    task, places = engine.task, engine.record.places
+    row = engine.row(index)
+    sums = {phase.name: row[places[f"sum_{phase.name}"]] for phase in task.protocol.phases}
+    found = summary(task, sums, row[places["sample"]])
+    code = row[places["ended"]]
+    found["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
+    if task.exercise is None:
+        return found
+    numbers = {name: np.array([row[places[name]]]) for name in exercise_places()}
+    other = exercise_summaries(numbers, engine.counts()[[index]], engine.options.period)
+    return found | {name: float(values[0]) for name, values in other.items()}
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:

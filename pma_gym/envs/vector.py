@@ -9,6 +9,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from pma_gym.envs.advance import TRUTHS
 from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import Engine
@@ -23,7 +24,7 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import PARTS
-from pma_gym.envs.summary import exercise_places, exercise_summaries, summaries
+from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
@@ -171,18 +172,28 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             gymnasium.error.ResetNeeded: `reset` was not called; or, without autoreset, an episode
                 has ended.
         """
+        if self.move(actions):
+            return self._last()
+        engine = self.engine
+        flags = engine.terminated.copy(), engine.truncated.copy()
+        return engine.observations.copy(), engine.rewards.copy(), *flags, {}
+
+    def move(self, actions: NDArray[np.floating]) -> bool:
+        """As `step`, but whoever calls it looks by himself what came of it, in `engine`.
+
+        Episodes that end in it are not begun again with SAME_STEP.
+
+        Returns:
+            Whether an episode ended.
+        """
         waiting = self._waiting
         if self._idle or waiting is not None:
             self._require_episodes()
         self._take(actions, waiting)
-        engine = self.engine
-        ended = engine.step()
+        ended = self.engine.step()
         if waiting is not None:
             ended = self._begin_again(waiting)
-        if ended:
-            return self._last()
-        flags = engine.terminated.copy(), engine.truncated.copy()
-        return engine.observations.copy(), engine.rewards.copy(), *flags, {}
+        return ended != 0
 
     def _require_episodes(self) -> None:
         if self._idle:
@@ -261,28 +272,27 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
 
     def _summaries(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[str, Any]:
         """Last infos of the episodes that ended, in Gymnasium's form: arrays with masks."""
-        engine = self.engine
-        phases = [phase.name for phase in self.task.protocol.phases]
-        sums = {name: engine.numbers(f"sum_{name}")[indices] for name in phases}
-        found = {name: values[indices] for name, values in self.station_info().items()}
-        found |= summaries(self.task, sums, engine.numbers("sample")[indices])
-        if self.task.exercise:
-            numbers = {name: engine.numbers(name)[indices] for name in exercise_places()}
+        engine, task = self.engine, self.task
+        columns = engine.rows(indices).T
+        numbers = {name: columns[place] for name, place in engine.record.places.items()}
+        sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
+        found: dict[str, Any] = {name: numbers[name] for name in engine.record.info}
+        found |= {name: found[name] != 0.0 for name in TRUTHS}
+        found |= summaries(task, sums, numbers["sample"])
+        if task.exercise:
             counts = engine.counts()[indices]
             found |= exercise_summaries(numbers, counts, self.options.period)
-        codes = engine.numbers("ended")[indices].tolist()
-        exercise, pairs = self.task.exercise, zip(indices, codes, strict=True)
-        limits = [limit_in_words(engine.models[i], code, exercise) for i, code in pairs]
+        pairs = zip(indices.tolist(), numbers["ended"].tolist(), strict=True)
+        limits = [limit_in_words(engine.models[i], code, task.exercise) for i, code in pairs]
         found["ended_by"] = np.array(limits, object)
-        return spread(found, over)
+        return spread(found, over, indices)
 
     def station_info(self) -> dict[str, NDArray[Any]]:
         """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
         found: dict[str, NDArray[Any]] = {
             name: self.engine.numbers(name) for name in self.engine.record.info
         }
-        found["extrapolated"] = found["extrapolated"] != 0.0
-        return found
+        return found | {name: found[name] != 0.0 for name in TRUTHS}
 
     def readings(self) -> NDArray[np.float64]:
         """What the sensors say now, as controllers hear it (SI), shape (4, num_envs).

@@ -28,8 +28,8 @@ INTERFACE = {
 """Functions that compiled code may call: types of the result and of the arguments, where p is a
 pointer, i an integer of 64 bits, n one of 32, d a double and v nothing."""
 
-_WITHOUT_ARGUMENTS = 4
-"""METH_NOARGS."""
+_ONE_ARGUMENT = 8
+"""METH_O."""
 
 
 class _Definition(ctypes.Structure):
@@ -50,12 +50,12 @@ def addresses() -> dict[str, int]:
     return {name: ctypes.cast(one, ctypes.c_void_p).value or 0 for name, one in found.items()}
 
 
-def builtin(address: int, name: str, bound: object) -> Callable[[], Any]:
-    """A compiled function as a builtin without arguments.
+def builtin(address: int, name: str, bound: object) -> Callable[[Any], Any]:
+    """A compiled function as a builtin of one argument.
 
     Args:
-        address: of a function of two pointers, `bound` and one that means nothing, which returns a
-            new reference, or none and an exception set. The caller keeps its library in memory.
+        address: of a function of two pointers, `bound` and the argument, which returns a new
+            reference, or none and an exception set. The caller keeps its library in memory.
         name: its name in messages.
         bound: what it is given.
     """
@@ -68,4 +68,4 @@ def builtin(address: int, name: str, bound: object) -> Callable[[], Any]:
 @cache
 def _definition(address: int, name: str) -> _Definition:
     """What says how a function is called; it is read as long as the function lives."""
-    return _Definition(name.encode(), address, _WITHOUT_ARGUMENTS, None)
+    return _Definition(name.encode(), address, _ONE_ARGUMENT, None)

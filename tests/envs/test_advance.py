@@ -9,6 +9,7 @@ import pytest
 from pma_gym.envs import PMAEnv
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.options import parse_options
+from pma_gym.kernels import arrays
 from pma_gym.tasks import EVERY_TASK, TASKS
 
 
@@ -70,7 +71,78 @@ def test_what_goes_wrong_while_it_is_made_is_raised():
         raise MemoryError("no room for an observation")
 
     with pytest.raises(MemoryError, match="no room"):
-        engine.advance(fail)()
+        engine.advance(fail, engine.actions[0])(np.zeros(1))
     # The step itself was made.
     assert engine.counts().tolist() == [1]
-    assert engine.advance(lambda: "seen")()[0] == "seen"
+    assert engine.advance(lambda: "seen", engine.actions[0])(np.zeros(1))[0] == "seen"
+
+
+def _behind_a_byte(values):
+    """An array that begins at an odd address."""
+    room = np.zeros(8 * len(values) + 1, np.uint8)[1:].view(np.float64)
+    room[:] = values
+    return room
+
+
+FORMS = {
+    "single": lambda values: np.array(values, np.float32),
+    "double": lambda values: np.array(values),
+    "every second entry": lambda values: np.repeat(values, 2)[::2],
+    "from behind": lambda values: np.array(values[::-1], np.float32)[::-1],
+    "one number for all": lambda values: np.broadcast_to(np.float32(values[0]), len(values)),
+    "at an odd address": _behind_a_byte,
+    "read-only": lambda values: np.frombuffer(np.array(values).tobytes()),
+    "bytes in the other order": lambda values: np.array(values, ">f4"),
+    "half": lambda values: np.array(values, np.float16),
+    "list": list,
+    "tuple of NumPy's numbers": lambda values: tuple(np.array(values)),
+}
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["read here", "read in Python"])
+@pytest.mark.parametrize("form", FORMS)
+def test_an_action_is_its_numbers_in_whatever_form(monkeypatch, form, known):
+    monkeypatch.setattr(arrays, "are_known", lambda: known)
+    env = PMAEnv("displacement", regulator_action=True)
+    env.reset(seed=1)
+    values = [0.25, 0.25] if form == "one number for all" else [0.25, -0.5]
+    env.step(FORMS[form](values))
+    assert env._given.tolist() == values
+    given = env._engine.records.copy()
+    env.reset(seed=1)
+    env.step(np.array(values))
+    np.testing.assert_array_equal(env._engine.records, given)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.zeros(2),
+        np.zeros((1, 1)),
+        np.float32(0.0),
+        np.zeros(0),
+        np.array(["0.0"]),
+        np.array([None]),
+        None,
+        np.array([np.nan], np.float32),
+        [np.inf],
+    ],
+    ids=repr,
+)
+def test_what_is_no_action_is_refused_and_nothing_has_happened(wrong):
+    env = PMAEnv("displacement")
+    env.reset(seed=1)
+    env.step(np.zeros(1, np.float32))
+    before = env._engine.records.copy()
+    with pytest.raises(ValueError, match="action must have shape"):
+        env.step(wrong)
+    np.testing.assert_array_equal(env._engine.records, before)
+    assert env.step(np.zeros(1, np.float32))[4]["time_s"] == 0.02
+
+
+def test_an_action_may_be_the_array_that_keeps_it():
+    env = PMAEnv("displacement")
+    env.reset(seed=1)
+    env._given[:] = 0.5
+    env.step(env._given)
+    assert env.motor_voltage == 7.5

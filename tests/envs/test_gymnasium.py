@@ -110,3 +110,16 @@ def test_the_default_is_the_identified_station(name):
     env = gym.make(name)
     check_env(env.unwrapped)
     assert env.unwrapped.station.model.name == "station"
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_nothing_stands_between_an_agent_and_an_environment_that_checks_itself(name):
+    env = gym.make(name)
+    assert type(env) is PMAEnv
+    assert env.spec.id == name
+    with pytest.raises(gym.error.ResetNeeded, match=r"call reset\(\) before step\(\)"):
+        env.step(env.action_space.sample())
+    checked = gym.make(name, disable_env_checker=False)
+    checked.reset(seed=1)
+    assert isinstance(checked, gym.wrappers.PassiveEnvChecker)
+    assert len(checked.step(checked.action_space.sample())) == 5

@@ -1,0 +1,45 @@
+"""Where compiled code finds what an array of NumPy holds.
+
+The first members of NumPy's array object have lain where they do since its version 1.0, and every
+compiled extension reads them there. Whether they do is looked at all the same, on arrays that are
+made for it: where they lie elsewhere nobody reads them.
+"""
+
+import ctypes
+from functools import cache
+
+import numpy as np
+
+DIMENSIONS, SIZES, STRIDES, DATA, DTYPE, TYPE = 24, 32, 40, 16, 56, 8
+"""Bytes from an array's beginning to its number of dimensions, their sizes and strides, the address
+of its data, its dtype, and its own type, as 64-bit CPython has them."""
+
+_END = 64
+
+
+@cache
+def are_known() -> bool:
+    """Whether arrays are laid out so."""
+    # No member is looked at beyond an object's end.
+    if np.ndarray.__basicsize__ < _END or ctypes.sizeof(ctypes.c_void_p) != 8:
+        return False
+    return all(map(_is_known, (np.zeros(3), np.zeros((4, 2), np.float32)[::2])))
+
+
+def _is_known(array: np.ndarray) -> bool:
+    begin = id(array)
+
+    def pointer(place: int) -> int | None:
+        return ctypes.c_void_p.from_address(begin + place).value
+
+    if (pointer(TYPE), pointer(DTYPE)) != (id(type(array)), id(array.dtype)):
+        return False
+    if pointer(DATA) != array.ctypes.data:
+        return False
+    if ctypes.c_int.from_address(begin + DIMENSIONS).value != array.ndim:
+        return False
+    found = [pointer(SIZES), pointer(STRIDES)]
+    return None not in found and all(
+        tuple((ctypes.c_int64 * array.ndim).from_address(at or 0)) == told
+        for at, told in zip(found, (array.shape, array.strides), strict=True)
+    )
