@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -262,6 +262,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self, action: NDArray[np.floating], code: int
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """What a step returns that compiled code does not make."""
+        if self._idle:
+            raise self._needs_reset("step()")
         if code == NOT_READ:
             self._given[:] = self._commands.checked(action)
             made = self._advance(self._given)
@@ -288,10 +290,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def _wait(self, why: str | None) -> None:
         """Let no step be made until `reset`, and say why; None to let them."""
         self._idle = why
-        self._advance = self._refused if why else self._made
-
-    def _refused(self, _: object) -> NoReturn:
-        raise self._needs_reset("step()")
+        self._advance = _no_step if why else self._made
 
     def _needs_reset(self, wanted: str) -> gym.error.ResetNeeded:
         return gym.error.ResetNeeded(f"{self._idle}: call reset() before {wanted}")
@@ -495,6 +494,11 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def close(self) -> None:
         """Free the picture."""
         self._picture = None
+
+
+def _no_step(_: object) -> int:
+    """What is called in the place of a step where there is no episode."""
+    return NOT_READ
 
 
 _FIRST = np.zeros(1, np.int64)
