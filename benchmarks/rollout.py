@@ -90,7 +90,6 @@ def make_environment(
     identifier = next(name for name, its in ENVIRONMENTS.items() if its == task)
     environment = gym.make(
         identifier,
-        disable_env_checker=True,
         model=model,
         pressure_kpa=float(pressure_kpa),
         control_rate_hz=control_rate_hz,

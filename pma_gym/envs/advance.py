@@ -26,7 +26,7 @@ BOUND = (
 )
 """What `advance` is bound to: address of the step's arguments, a dictionary of the info's keys, the
 keys in order, what copies the observation, False and True; the array of actions, the type of
-arrays, and the dtypes that are read here, or None for a type that no action has."""
+arrays (None where no action is to be read here), and the dtypes of single and double precision."""
 
 NOT_READ = 8
 """What `advance` returns for an action that is to be read in Python; nothing has happened then."""

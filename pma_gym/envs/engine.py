@@ -105,7 +105,8 @@ class Engine(Episodes):
             What takes an action, or `given` with the action in it, and gives observation, reward,
             False, False and info; or, where the episode ended or an action was not finite, what
             `step` of the kernel returns: 1 if it was terminated, 2 if truncated, or BAD_ACTION; or
-            NOT_READ for an action that is not an array of as many floats, with nothing done.
+            NOT_READ, with nothing done, for an action that is no array of as many numbers in single
+            or double precision.
         """
         keys, known = self.record.info, arrays.are_known()
         bound = {

@@ -119,6 +119,11 @@ class EngineMemory:
         block, lane = divmod(index, self.width)
         return self.records[block, :, lane].tolist()
 
+    def steps(self, index: int) -> int:
+        """Control steps of an environment's episode so far."""
+        block, lane = divmod(index, self.width)
+        return int(self.integers[block, self.record.places["count"], lane])
+
     def rows(self, indices: NDArray[np.int64]) -> NDArray[np.float64]:
         """All numbers of some environments, shape (m, size of the record); a copy."""
         block, lane = np.divmod(indices, self.width)

@@ -23,7 +23,7 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
-from pma_gym.envs.summary import episode_summary, step_info
+from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task
 
@@ -279,7 +279,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """What the step that ends an episode returns."""
         self._wait(f"the episode ended at {self.time:g} s")
-        info = self._info() | self.episode_summary()
+        info = last_info(self._engine, 0)
         self.ended_by = info["ended_by"]
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 

@@ -18,18 +18,30 @@ from pma_gym.tasks import PACE, Task, limit_in_words
 from pma_gym.units import SI_FACTORS
 
 
+def last_info(engine: Engine, index: int) -> dict[str, Any]:
+    """The info of the step that ends an environment's episode: all that there is to tell."""
+    row = engine.row(index)
+    return _step_info(engine, row) | _episode_summary(engine, index, row)
+
+
 def step_info(engine: Engine, index: int) -> dict[str, Any]:
     """Numbers of an environment's last step or reset, by the keys of `PMAEnv`'s info."""
-    keys, first = engine.record.info, engine.record.places["ended"] + 1
-    numbers = engine.row(index)[first : first + len(keys)]
-    found = dict(zip(keys, numbers, strict=True))
-    return found | {name: found[name] != 0.0 for name in TRUTHS}
+    return _step_info(engine, engine.row(index))
 
 
 def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
     """What an environment's episode has come to so far, see `PMAEnv.episode_summary`."""
+    return _episode_summary(engine, index, engine.row(index))
+
+
+def _step_info(engine: Engine, row: list[float]) -> dict[str, Any]:
+    keys, first = engine.record.info, engine.record.places["ended"] + 1
+    found = dict(zip(keys, row[first : first + len(keys)], strict=True))
+    return found | {name: found[name] != 0.0 for name in TRUTHS}
+
+
+def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, Any]:
     task, places = engine.task, engine.record.places
-    row = engine.row(index)
     sums = {phase.name: row[places[f"sum_{phase.name}"]] for phase in task.protocol.phases}
     found = summary(task, sums, row[places["sample"]])
     code = row[places["ended"]]
@@ -37,7 +49,7 @@ def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
     if task.exercise is None:
         return found
     numbers = {name: np.array([row[places[name]]]) for name in exercise_places()}
-    other = exercise_summaries(numbers, engine.counts()[[index]], engine.options.period)
+    other = exercise_summaries(numbers, np.array([engine.steps(index)]), engine.options.period)
     return found | {name: float(values[0]) for name, values in other.items()}
 
 

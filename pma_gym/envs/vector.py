@@ -172,28 +172,18 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             gymnasium.error.ResetNeeded: `reset` was not called; or, without autoreset, an episode
                 has ended.
         """
-        if self.move(actions):
-            return self._last()
-        engine = self.engine
-        flags = engine.terminated.copy(), engine.truncated.copy()
-        return engine.observations.copy(), engine.rewards.copy(), *flags, {}
-
-    def move(self, actions: NDArray[np.floating]) -> bool:
-        """As `step`, but whoever calls it looks by himself what came of it, in `engine`.
-
-        Episodes that end in it are not begun again with SAME_STEP.
-
-        Returns:
-            Whether an episode ended.
-        """
         waiting = self._waiting
         if self._idle or waiting is not None:
             self._require_episodes()
         self._take(actions, waiting)
-        ended = self.engine.step()
+        engine = self.engine
+        ended = engine.step()
         if waiting is not None:
             ended = self._begin_again(waiting)
-        return ended != 0
+        if ended:
+            return self._last()
+        flags = engine.terminated.copy(), engine.truncated.copy()
+        return engine.observations.copy(), engine.rewards.copy(), *flags, {}
 
     def _require_episodes(self) -> None:
         if self._idle:
@@ -213,19 +203,27 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         terminated, truncated = engine.terminated.copy(), engine.truncated.copy()
         over = terminated | truncated
         indices = np.flatnonzero(over)
-        info = self._summaries(over, indices)
         if self.autoreset_mode == AutoresetMode.SAME_STEP:
-            final = np.full(self.num_envs, None, object)
-            for i in indices.tolist():
-                final[i] = engine.observations[i].copy()
-            info = {"final_obs": final, "_final_obs": over, "final_info": info}
-            info["_final_info"] = over.copy()
+            info = self._final(over, indices)
             engine.reset(indices)
         else:
+            info = self._summaries(over, indices)
             self._ended, self._waiting = over, indices
             # With autoreset they are stepped once more: from somewhere harmless.
             engine.park(np.flatnonzero(terminated))
         return engine.observations.copy(), rewards, terminated, truncated, info
+
+    def _final(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[Any, Any]:
+        """What is told of episodes that end before the next ones begin in the same step."""
+        final = np.full(self.num_envs, None, object)
+        for i in indices.tolist():
+            final[i] = self.engine.observations[i].copy()
+        return {
+            "final_obs": final,
+            "_final_obs": over,
+            "final_info": self._summaries(over, indices),
+            "_final_info": over.copy(),
+        }
 
     def _begin_again(self, indices: NDArray[np.int64]) -> int:
         """The step after an episode's end begins the next one, whatever the action.

@@ -2,11 +2,13 @@
 
 import gc
 import sys
+import weakref
 
 import numpy as np
 import pytest
 
 from pma_gym.envs import PMAEnv
+from pma_gym.envs.advance import NOT_READ
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.options import parse_options
 from pma_gym.kernels import arrays
@@ -84,6 +86,10 @@ def _behind_a_byte(values):
     return room
 
 
+READ = ("single", "double", "every second entry", "from behind", "one number for all")
+READ += "at an odd address", "read-only"
+"""Forms that compiled code reads by itself."""
+
 FORMS = {
     "single": lambda values: np.array(values, np.float32),
     "double": lambda values: np.array(values),
@@ -112,6 +118,8 @@ def test_an_action_is_its_numbers_in_whatever_form(monkeypatch, form, known):
     env.reset(seed=1)
     env.step(np.array(values))
     np.testing.assert_array_equal(env._engine.records, given)
+    made = env._made(FORMS[form](values))
+    assert type(made) is tuple if form in READ and known else made == NOT_READ
 
 
 @pytest.mark.parametrize(
@@ -146,3 +154,18 @@ def test_an_action_may_be_the_array_that_keeps_it():
     env._given[:] = 0.5
     env.step(env._given)
     assert env.motor_voltage == 7.5
+
+
+def test_an_environment_is_freed_when_nobody_has_it():
+    gc.disable()
+    try:
+        for episodes in range(2):
+            env = PMAEnv("displacement")
+            for _ in range(episodes):
+                env.reset(seed=1)
+                env.step(np.zeros(1, np.float32))
+            gone = weakref.ref(env)
+            del env
+            assert gone() is None
+    finally:
+        gc.enable()
