@@ -30,7 +30,7 @@ def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
 
 @pytest.mark.parametrize("width", [4, 8, 16])
 def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragile, width):
-    monkeypatch.setattr("pma_gym.envs.engine.simd_lanes", lambda single: width)
+    monkeypatch.setattr("pma_gym.envs.engine_memory.simd_lanes", lambda single: width)
     both = twins(18, model=fragile, randomisation="varied")
     assert both.batch.engine.width == width
     both.reset(seed=4)
