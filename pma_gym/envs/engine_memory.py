@@ -1,14 +1,12 @@
 """What environments are: numbers in blocks of lanes, and the kernel that works on them."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.envs.block_memory import ARGUMENTS
 from pma_gym.envs.kernel import Kernel
 from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import Options, motor_at_rest, rig_model
+from pma_gym.envs.options import Options
 from pma_gym.envs.record import Record
 from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model
@@ -21,6 +19,7 @@ class EngineMemory:
 
     Args:
         told: the nominal model that controllers are told.
+        nominal: the Plant of the nominal model.
     """
 
     def __init__(
@@ -28,14 +27,13 @@ class EngineMemory:
         task: Task,
         options: Options,
         told: Model,
+        nominal: Plant,
         count: int,
         single: bool,
     ) -> None:
         """Compile, and make room."""
-        self.task, self.options, self.told, self.count = task, options, told, count
-        # The very same model where nothing is added: its plant is known by that.
-        self.nominal = Plant(rig_model(task, replace(options, model=told)))
-        self.rest_motor = motor_at_rest(told, task)
+        self.task, self.options, self.count = task, options, count
+        self.told, self.nominal = told, nominal
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self.width = 1 if count == 1 else simd_lanes(single)

@@ -1,6 +1,7 @@
 """How episodes begin: what is drawn, where the station rests, what will disturb it."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,10 +18,10 @@ from pma_gym.envs.beginning import (
 from pma_gym.envs.block_memory import ARGUMENTS
 from pma_gym.envs.engine_memory import EngineMemory
 from pma_gym.envs.operators import check_prescription, operators, wound_back
-from pma_gym.envs.options import Options, Pressure, told_model
+from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import regulator_voltage
+from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
@@ -43,10 +44,13 @@ class Episodes(EngineMemory):
     ) -> None:
         """Check the pressures that are asked for, then compile."""
         self.task, self.told = task, told_model(task, load_model(options.model))
+        # The very same model where nothing is added: its plant is known by that.
+        nominal = Plant(rig_model(task, replace(options, model=self.told)))
+        self.rest_motor = motor_at_rest(self.told, task)
         self.wanted = list(pressures) if pressures is not None else [options.pressure_kpa] * count
         self._possible: set[str] = set()
         self._check_prescription(self.wanted)
-        super().__init__(task, options, self.told, count, single)
+        super().__init__(task, options, self.told, nominal, count, single)
         self._rest = NoLoad(self.nominal)
         self._settling = self._slack_range()
         self._beginning = self._arguments.copy()
