@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
-from scipy.signal import lfilter
 
 from pma_gym.plant.logged import Logged
 
@@ -56,10 +55,11 @@ class Whitening:
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""
+        found = series / self.innovation
+        # Lag by lag: SciPy's filter without feedback goes through the series one by one.
+        for lag, share in enumerate(self.coefficients, 1):
+            found[..., lag:] -= (share / self.innovation) * series[..., :-lag]
         order = len(self.coefficients)
-        filtered = lfilter([1.0, *(-a for a in self.coefficients)], [1.0], series, axis=-1)
-        found = np.asarray(filtered)
-        found /= self.innovation
         if order:
             # The first readings have no past: by the level alone.
             found[..., :order] = series[..., :order] / self.level
