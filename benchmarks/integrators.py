@@ -32,14 +32,13 @@ from benchmarks.rosenbrock import VELDHUIZEN, Method
 from benchmarks.rosenbrock import step as rosenbrock_step
 from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.kernels.lanes import rebind
-from pma_gym.kernels.native import compiled
 from pma_gym.plant.attempt import attempt
 from pma_gym.plant.compose import Equations
 from pma_gym.plant.exponential import step
 from pma_gym.plant.march import Layout
 from pma_gym.plant.model import PLANTS, Model, load_model
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.program import Program, structure, table
+from pma_gym.plant.program import Program, table
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.plant.system import System
 
@@ -102,10 +101,12 @@ class MethodProgram(Program):
     """
 
     def __init__(self, model: Model, method: Method | None, name: str) -> None:
-        self.model, self.method = model, method
-        parts = ["integrators", name, *structure(model)]
-        self.library = compiled(parts, self._build, f"plant {model.name}, {name}")
-        self._functions()
+        self.method, self.name = method, name
+        super().__init__(model)
+
+    def key(self) -> list[str]:
+        """The same, and the method."""
+        return ["integrators", self.name, *super().key()]
 
     @cached_property
     def ramped(self) -> System:

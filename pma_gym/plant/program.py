@@ -5,7 +5,7 @@ as a vector when they run. So a drawn station, or a fit's next guess, compiles n
 """
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -73,8 +73,14 @@ class Program:
 
     def __init__(self, model: Model) -> None:
         self.model = model
-        self.library = compiled(["plant", *structure(model)], self._build, f"plant {model.name}")
+        # Briefly: a candidate of a diagnosis is compiled for a second or two of simulation.
+        key = ["plant", *self.key()]
+        self.library = compiled(key, self._build, f"plant {model.name}", brief=True)
         self._functions()
+
+    def key(self) -> list[str]:
+        """What the compiled functions depend on, beside this package's text."""
+        return structure(self.model)
 
     @cached_property
     def places(self) -> dict[str, int]:
@@ -109,8 +115,6 @@ class Program:
         self.table = get("table", [pointer, pointer])
         self.derivative = get("derivative", [whole, *[pointer] * 3, whole, pointer])
         self.observe = get("observe", [whole, pointer, real, pointer, pointer])
-        self.simulate_one = get("simulate_1", [whole, pointer, pointer])
-        self.simulate_many = get(f"simulate_{simd_lanes()}", [whole, pointer, pointer])
         if self.model.plant == "station":
             self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
         self.table_size = int(get("table_size", [], whole)())
@@ -122,9 +126,29 @@ class Program:
         self._observe(module)
         if self.model.plant == "station":
             self._balance(module)
-        for width in (1, simd_lanes()):
-            write_simulate(module, self.ramped, width)
         return module
+
+    @cached_property
+    def simulate_one(self) -> Callable:
+        """Simulates whole trials one after the other; see `write_simulate`."""
+        return self._simulate(1)
+
+    @cached_property
+    def simulate_many(self) -> Callable:
+        """Simulates whole trials, one in every lane; see `write_simulate`."""
+        return self._simulate(simd_lanes())
+
+    def _simulate(self, width: int) -> Callable:
+        """A library of its own: who simulates many trials of a model seldom simulates one."""
+
+        def build() -> ir.Module:
+            module = ir.Module()
+            write_simulate(module, self.ramped, width)
+            return module
+
+        key = [f"trials {width}", *self.key()]
+        library = compiled(key, build, f"trials of {self.model.name}", brief=True)
+        return library.function(f"simulate_{width}", [_INTEGER, _POINTER, _POINTER])
 
     def parameters(self, builder: Builder, vector: Operand, values: list[Value]) -> dict:
         """The inputs of level FIXED that values depend on, loaded from a vector.

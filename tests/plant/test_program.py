@@ -7,9 +7,11 @@ import sys
 import numpy as np
 import pytest
 
+from pma_gym.kernels.native import Library, compiled, simd_lanes
+from pma_gym.plant import program as program_module
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.plant.simulation import FEW, Run, simulate_all
 
 CHANGES = ("slide.mass_kg", "rotor.inertia_kg_m2", "cable.stiffness_n_per_mm")
 
@@ -46,6 +48,40 @@ def test_many_trials_at_once_have_the_bits_of_each_alone(count, threads):
         assert one.size == other.size
         assert one.states.shape == (len(one.time), len(program.states))
         assert np.all(np.isfinite(one.states))
+
+
+def test_few_passes_of_the_compiler_give_the_bits_of_all(monkeypatch):
+    def thorough(key, build, name, brief):
+        return Library(build(), name)
+
+    brief = Plant("station").program
+    monkeypatch.setattr(program_module, "compiled", thorough)
+    full = program_module.Program(brief.model)
+    for count in (2, 9):
+        runs, others = trials(count), trials(count)
+        simulate_all(brief, runs)
+        simulate_all(full, others)
+        for one, other in zip(runs, others, strict=True):
+            np.testing.assert_array_equal(one.states, other.states)
+
+
+def test_only_what_is_asked_for_is_compiled(monkeypatch):
+    asked = []
+
+    def noted(key, build, name, brief):
+        asked.append(key[0])
+        return compiled(key, build, name, brief)
+
+    made = Plant("station").program
+    monkeypatch.setattr(program_module, "compiled", noted)
+    program = program_module.Program(made.model)
+    assert asked == ["plant"]
+    simulate_all(program, trials(FEW))
+    assert asked == ["plant", f"trials {simd_lanes()}"]
+    simulate_all(program, trials(1))
+    assert asked == ["plant", f"trials {simd_lanes()}", "trials 1"]
+    simulate_all(program, trials(FEW + 1))
+    assert len(asked) == 3
 
 
 def test_the_order_of_trials_changes_nothing():
