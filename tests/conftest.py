@@ -7,6 +7,11 @@ os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
 os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+# The tests are run in as many processes as there are cores: threads of linear algebra would wait
+# for each other. Set before NumPy or PyTorch is first imported, and handed on to other processes.
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
+
 # No deadline: the first example of a test may compile a kernel.
 settings.register_profile("pma_gym", deadline=None, derandomize="CI" in os.environ)
 settings.load_profile("pma_gym")

@@ -27,6 +27,7 @@ from pma_gym.discovery.suspects import suspects
 from pma_gym.discovery.verdict import suspicious
 from pma_gym.plant.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
+from pma_gym.plant.sharing import linear_algebra_alone
 
 Progress = Callable[[str, int, int], None]
 
@@ -45,7 +46,7 @@ def diagnose(
 ) -> Diagnosis:
     """Find what a model misses in measured trials.
 
-    The same trials, model and seed give the same answer, whatever the number of jobs.
+    The same trials, model and seed give the same answer, whatever the number of jobs or cores.
 
     Args:
         trials: measured trials, or a data set (`pma_gym.data.dataset.read_dataset`).
@@ -73,7 +74,8 @@ def diagnose(
         >>> found.verdict, "regulator_delay" in found.blind
         ('undecidable', True)
     """
-    return _Work(trials, model, seed, jobs, journal, progress, propose).run(search=True)
+    with linear_algebra_alone():
+        return _Work(trials, model, seed, jobs, journal, progress, propose).run(search=True)
 
 
 def refit(
@@ -89,7 +91,8 @@ def refit(
 
     Arguments and errors as `diagnose`; the verdict is `parameters` or `agrees`.
     """
-    return _Work(trials, model, seed, jobs, journal, progress).run(search=False)
+    with linear_algebra_alone():
+        return _Work(trials, model, seed, jobs, journal, progress).run(search=False)
 
 
 @dataclass

@@ -24,6 +24,7 @@ from pma_gym.plant.least_squares import inverse, least
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE
 from pma_gym.plant.residuals import Residuals, Sums
+from pma_gym.plant.sharing import linear_algebra_alone
 
 __all__ = ["Fit", "Round", "fit"]
 
@@ -76,7 +77,7 @@ def fit(
 ) -> Fit:
     """Fit a model to trials, from the values that it has.
 
-    The same input gives the same bits, whatever the number of threads.
+    The same input gives the same bits, whatever the number of threads and of cores.
 
     Args:
         model: the model.
@@ -95,12 +96,13 @@ def fit(
     def residuals(some: Sequence[Trial]) -> Residuals:
         return Residuals(model, some, free, tolerance, joined, threads)
 
-    few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
-    rough = None if few is None else Search(few, central, ROUGH)
-    if rough is not None:
-        rough.run(progress)
-    search = Search(residuals(trials), central, 1.0, rough)
-    return search.result(search.run(progress))
+    with linear_algebra_alone():
+        few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
+        rough = None if few is None else Search(few, central, ROUGH)
+        if rough is not None:
+            rough.run(progress)
+        search = Search(residuals(trials), central, 1.0, rough)
+        return search.result(search.run(progress))
 
 
 def _some(trials: Sequence[Trial]) -> list[Trial]:

@@ -3,6 +3,8 @@
 import threading
 from collections.abc import Callable
 
+from threadpoolctl import threadpool_limits
+
 
 def share(work: Callable[[int], object], threads: int, kept: object = None) -> None:
     """Do the parts of a work, the first of them in this thread.
@@ -25,3 +27,13 @@ def share(work: Callable[[int], object], threads: int, kept: object = None) -> N
     finally:
         for other in others:
             other.join()
+
+
+def linear_algebra_alone() -> threadpool_limits:
+    """A context in which NumPy's and SciPy's linear algebra works in the calling thread alone.
+
+    The matrices of a fit are small: threads of OpenBLAS wait for each other longer than they
+    compute, in the time of the threads that simulate, and how they share a sum depends on the
+    number of cores.
+    """
+    return threadpool_limits(1, user_api="blas")

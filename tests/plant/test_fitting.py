@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
@@ -113,6 +114,21 @@ def test_bits_depend_neither_on_threads_nor_on_blocks(fitted, measured, monkeypa
     np.testing.assert_array_equal(found.covariance, fitted.covariance)
     monkeypatch.setattr(residuals, "MOST_BYTES", 1 << 20)
     assert fit(OFF, measured, FREE, threads=2).values == fitted.values
+
+
+def test_linear_algebra_has_one_thread_in_a_fit_and_its_own_number_after_it(measured):
+    def threads(_=None):
+        found = [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+        seen.extend(found)
+        return found
+
+    seen = []
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        seen.clear()
+        fit(OFF, measured[:1], FREE[:1], progress=threads)
+        assert seen and set(seen) == {1}
+        assert threads() == before and set(before) == {2}
 
 
 def test_many_trials_are_fitted_to_a_few_of_them_first():
