@@ -23,11 +23,12 @@ ONLY = "only an MlpPolicy of PPO, SAC, TD3 or TQC can be exported"
 
 OUTPUTS = {
     "stable_baselines3.common.policies.ActorCriticPolicy": "clip",
+    "pma_gym.envs.sb3_policy.LeanMlpPolicy": "clip",
     "stable_baselines3.sac.policies.SACPolicy": "tanh",
     "stable_baselines3.td3.policies.TD3Policy": "tanh",
     "sb3_contrib.tqc.policies.TQCPolicy": "tanh",
 }
-"""Classes that MlpPolicy stands for, and what keeps their actions in -1..1."""
+"""MlpPolicy's classes and what has their networks, and what keeps their actions in -1..1."""
 
 
 def policy_from_sb3(

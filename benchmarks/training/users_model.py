@@ -25,6 +25,9 @@ ALGORITHMS = {
 }
 """Where each algorithm's class is."""
 
+ACTOR_CRITIC = ("stable_baselines3.common.policies", "pma_gym.envs.sb3_policy")
+"""Where policies are that PPO shares with A2C; only PPO has a `clip_range`."""
+
 LOOP = ("control_rate_hz", "action_delay_s", "observation_delay_s")
 
 
@@ -158,7 +161,7 @@ def algorithm_of(path: Path) -> str:
             f"as one ({error}); save the model anew"
         ) from None
     package = module.split(".")[-2] if "." in module else ""
-    name = "ppo" if package == "common" and "clip_range" in data else package
+    name = "ppo" if module in ACTOR_CRITIC and "clip_range" in data else package
     if name not in ALGORITHMS:
         raise ExportError(
             f"{path} must be of one of {', '.join(ALGORITHMS)}, its policy is of {module}; if it "

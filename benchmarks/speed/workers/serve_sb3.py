@@ -11,6 +11,7 @@ import gymnasium as gym
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecEnv
 
 from benchmarks.speed.loops import Missing, Prepared
@@ -38,6 +39,21 @@ def batch(name: str, count: int) -> VecEnv:
 KINDS = {"copies": copies, "batch": batch}
 
 
+def learner(name: str, count: int, kind: str, lean: bool = False, **options: Any) -> PPO:
+    """PPO that has learned nothing yet; see `rollouts`."""
+    return PPO(_policy(lean), KINDS[kind](name, count), seed=0, device="cpu", **options)
+
+
+def _policy(lean: bool) -> str | type[ActorCriticPolicy]:
+    if not lean:
+        return "MlpPolicy"
+    try:
+        from pma_gym.envs.sb3_policy import LeanMlpPolicy
+    except ImportError:
+        raise Missing("this version has no pma_gym.envs.sb3_policy") from None
+    return LeanMlpPolicy
+
+
 def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any) -> Prepared:
     """PPO's rollouts without its learning: environments, policy, buffer, advantages.
 
@@ -46,9 +62,9 @@ def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any)
         count: how many.
         kind: `copies` or `batch`.
         threads: threads of PyTorch.
-        options: keyword arguments of PPO.
+        options: `lean` for this package's LeanMlpPolicy, and keyword arguments of PPO.
     """
-    model = PPO("MlpPolicy", KINDS[kind](name, count), seed=0, device="cpu", **options)
+    model = learner(name, count, kind, **options)
     _, callback = model._setup_learn(total_timesteps=1 << 40)
 
     def chunk() -> int:
@@ -62,7 +78,7 @@ def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any)
 
 def learning(name: str, count: int, kind: str, threads: int = 1, **options: Any) -> Prepared:
     """PPO from end to end, a rollout and what is learned from it at a time; see `rollouts`."""
-    model = PPO("MlpPolicy", KINDS[kind](name, count), seed=0, device="cpu", **options)
+    model = learner(name, count, kind, **options)
 
     def chunk() -> int:
         torch.set_num_threads(threads)

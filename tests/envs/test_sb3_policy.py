@@ -1,0 +1,164 @@
+"""The lean policy is Stable-Baselines3's own, up to rounding."""
+
+import numpy as np
+import pytest
+
+pytest.importorskip("stable_baselines3")
+
+import torch
+from gymnasium import spaces
+from stable_baselines3 import A2C, PPO
+from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import FlattenExtractor
+from torch import nn
+
+from pma_gym.envs.sb3 import SB3VecEnv
+from pma_gym.envs.sb3_policy import LeanMlpPolicy, _network
+
+SEEN = spaces.Box(-5.0, 5.0, (7,), np.float32)
+MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
+
+
+class Learning(FlattenExtractor):
+    """An extractor with parameters of its own."""
+
+    def __init__(self, observation_space):
+        super().__init__(observation_space)
+        self.scale = nn.Parameter(torch.linspace(0.5, 2.0, 7))
+
+    def forward(self, observations):
+        return self.scale * super().forward(observations)
+
+
+def pair(action=(1,), **options):
+    """Stable-Baselines3's policy and the lean one, with the same parameters."""
+    if isinstance(action, tuple):
+        action = spaces.Box(-1.0, 1.0, action, np.float32)
+    kinds = ActorCriticPolicy, LeanMlpPolicy
+    theirs, ours = (kind(SEEN, action, lambda _: 1e-3, **options) for kind in kinds)
+    generator = torch.Generator().manual_seed(5)
+    with torch.no_grad():
+        for parameter in theirs.parameters():
+            parameter += 0.3 * torch.randn(parameter.shape, generator=generator)
+    ours.load_state_dict(theirs.state_dict())
+    return theirs, ours
+
+
+def said(policy, rows=300):
+    """What a policy says of drawn observations, and its derivatives."""
+    generator = torch.Generator().manual_seed(6)
+    seen = torch.randn((rows, 7), generator=generator)
+    torch.manual_seed(7)
+    if policy.use_sde:
+        policy.reset_noise(rows)
+    with torch.no_grad():
+        drawn = policy(seen)
+        mode = policy(seen, deterministic=True)
+    actions = drawn[0].reshape(rows, -1)
+    if isinstance(policy.action_space, spaces.Discrete):
+        actions = actions.flatten()
+    values, likelihood, entropy = policy.evaluate_actions(seen, actions)
+    weights = torch.linspace(-1.0, 2.0, rows)
+    loss = (weights * likelihood).mean() + values.square().mean() - 0.1 * entropy.mean()
+    loss.backward()
+    gradients = [parameter.grad for parameter in policy.parameters()]
+    return *drawn, *mode, values, likelihood, entropy, *gradients
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"net_arch": [16]},
+        {"net_arch": {"pi": [9, 17, 33], "vf": [64]}},
+        {"action": (3,), "log_std_init": -1.5},
+        {"action": (2, 2)},
+        {"features_extractor_class": Learning, "share_features_extractor": False},
+    ],
+    ids=str,
+)
+def test_it_says_and_learns_what_theirs_does(options):
+    theirs, ours = pair(**options)
+    assert ours._is_lean()
+    for its, mine in zip(said(theirs), said(ours), strict=True):
+        mine, its = mine.detach(), its.detach()
+        assert mine.shape == its.shape and mine.dtype == its.dtype
+        full_scale = max(1.0, float(its.abs().max()))
+        np.testing.assert_allclose(mine, its, rtol=1e-5, atol=2e-6 * full_scale)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"activation_fn": nn.ReLU},
+        {"net_arch": {"pi": [], "vf": [8]}},
+        {"action": spaces.Discrete(3)},
+        {"use_sde": True},
+    ],
+    ids=str,
+)
+def test_what_it_cannot_it_leaves_to_theirs_to_the_bit(options):
+    theirs, ours = pair(**options)
+    assert not ours._is_lean()
+    for its, mine in zip(said(theirs), said(ours), strict=True):
+        assert torch.equal(mine, its)
+
+
+@pytest.mark.parametrize("sizes", [(5, 4, 3), (3, 8, 6, 7, 2)])
+def test_its_network_is_the_layers_in_double_precision(sizes):
+    torch.manual_seed(1)
+    modules = []
+    for before, after in zip(sizes[:-1], sizes[1:], strict=True):
+        modules += nn.Linear(before, after).double(), nn.Tanh()
+    net = nn.Sequential(*modules[:-1])
+    seen = torch.randn((11, sizes[0]), dtype=torch.float64, requires_grad=True)
+    np.testing.assert_allclose(
+        _network(seen, net).detach(), net(seen).detach(), rtol=1e-13, atol=1e-14
+    )
+    parameters = [seen, *net.parameters()]
+
+    def changed(*_):
+        return _network(seen, net)
+
+    assert torch.autograd.gradcheck(changed, parameters)
+
+
+def test_far_values_are_those_of_tanh():
+    far = torch.tensor([[-1e30], [-200.0], [0.0], [200.0], [1e30], [torch.nan]])
+    one, two = nn.Linear(1, 1), nn.Linear(1, 1)
+    with torch.no_grad():
+        for layer in (one, two):
+            layer.weight[:], layer.bias[:] = 1.0, 0.0
+        values = _network(far, [one, nn.Tanh(), two]).flatten()
+    np.testing.assert_array_equal(values, [-1.0, -1.0, 0.0, 1.0, 1.0, np.nan])
+
+
+@pytest.mark.parametrize("kind", [PPO, A2C])
+def test_models_learn_and_are_stored(kind, tmp_path):
+    envs = SB3VecEnv(8, "displacement", **MADE)
+    options = {"batch_size": 128} if kind is PPO else {}
+    model = kind(LeanMlpPolicy, envs, n_steps=32, seed=0, device="cpu", **options)
+    before = [parameter.clone() for parameter in model.policy.parameters()]
+    model.learn(512)
+    for then, now in zip(before, model.policy.parameters(), strict=True):
+        assert not torch.equal(then, now)
+    model.save(tmp_path / "model.zip")
+    again = kind.load(tmp_path / "model.zip", envs, device="cpu")
+    assert type(again.policy) is LeanMlpPolicy
+    plain = kind("MlpPolicy", envs, device="cpu")
+    plain.policy.load_state_dict(again.policy.state_dict())
+    seen = envs.reset()
+    for other in (again, plain):
+        np.testing.assert_array_equal(
+            model.predict(seen, deterministic=True)[0], other.predict(seen, deterministic=True)[0]
+        )
+
+
+def test_a_training_ends_where_theirs_does_after_a_few_steps():
+    ended = []
+    for policy in ("MlpPolicy", LeanMlpPolicy):
+        envs = SB3VecEnv(8, "displacement", **MADE)
+        model = PPO(policy, envs, n_steps=32, batch_size=128, n_epochs=2, seed=3, device="cpu")
+        ended.append(list(model.learn(256).policy.parameters()))
+    for its, mine in zip(*ended, strict=True):
+        np.testing.assert_allclose(mine.detach(), its.detach(), atol=1e-4)
