@@ -1,6 +1,7 @@
 """Environments as arrays: one, or many that step together."""
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,10 @@ from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import builtin
 from pma_gym.kernels.crew import Crew
 from pma_gym.tasks import Task
+
+LEAST_BLOCKS = 8
+"""Blocks of lanes that are not divided among threads: the last lanes of every part wait for each
+other."""
 
 
 class Engine(Episodes):
@@ -64,15 +69,21 @@ class Engine(Episodes):
         super().__init__(task, options, count, single, pressures)
         self._crew = Crew(self.kernel.library.address("step"), self._parts(threads))
 
-    def _parts(self, threads: int) -> list[NDArray[np.int64]]:
-        """The arguments of a step, a share of the blocks for each thread."""
+    def _parts(self, threads: int) -> list[list[NDArray[np.int64]]]:
+        """The arguments of a step, of every part of each thread's share of the blocks."""
         threads = max(1, min(threads, self.blocks))
-        edges = np.linspace(0, self.blocks, threads + 1).round().astype(int)
-        parts = [self._arguments.copy() for _ in range(threads)]
-        for k, part in enumerate(parts):
-            part[ARGUMENTS.index("first")], part[ARGUMENTS.index("last")] = edges[k : k + 2]
-            part[ARGUMENTS.index("attempts")] += 64 * k
-        return parts
+        edges = np.linspace(0, self.blocks, threads + 1).round().astype(int).tolist()
+        shares = [_halves(*ends) if threads > 1 else [ends] for ends in pairwise(edges)]
+        self._count_attempts(sum(map(len, shares)))
+        rows = iter(self._attempts)
+        return [[self._part(*ends, next(rows)) for ends in share] for share in shares]
+
+    def _part(self, first: int, last: int, attempts: NDArray[np.int64]) -> NDArray[np.int64]:
+        part = self._arguments.copy()
+        given = {"first": first, "last": last, "attempts": attempts.ctypes.data}
+        for name, number in given.items():
+            part[ARGUMENTS.index(name)] = number
+        return part
 
     def step(self) -> int:
         """Step all environments by `actions`; their results stand in the attributes.
@@ -81,8 +92,8 @@ class Engine(Episodes):
             0 while no episode ended, else the sum of 1 if any terminated and 2 if any was
             truncated.
         Raises:
-            ValueError: an action that is not finite; nothing has happened then, but to the shares
-                of other threads.
+            ValueError: an action that is not finite; nothing has happened then, but where several
+                threads work to other parts of the batch.
         """
         if self._has_idle_lanes:
             self._idle_lanes[:] = 0
@@ -128,3 +139,19 @@ class Engine(Episodes):
     def attempts(self) -> int:
         """Attempts at internal steps in the last step, all lanes of a block counted as one."""
         return int(self._attempts[:, 0].sum())
+
+
+def _halves(first: int, last: int) -> list[tuple[int, int]]:
+    """A thread's blocks in parts: half of what is left, over and over.
+
+    The last parts, which another thread may take, are small.
+
+    >>> _halves(0, 64)
+    [(0, 32), (32, 48), (48, 56), (56, 64)]
+    """
+    found = []
+    while last - first >= 2 * LEAST_BLOCKS:
+        middle = (first + last) // 2
+        found.append((first, middle))
+        first = middle
+    return [*found, (first, last)]

@@ -73,7 +73,6 @@ class EngineMemory:
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)
         self._ranges = np.zeros((max(self.count, 1), 2))
-        self._attempts = np.zeros((256, 8), np.int64)
         self._episodes = np.full(self.count, -1, np.int64)
         self._keys = np.zeros((self.count, 2), np.int64)
         self._arguments = np.zeros(len(ARGUMENTS), np.int64)
@@ -93,15 +92,21 @@ class EngineMemory:
             "truncated": self._all_flags[1].ctypes.data,
             "trace": self.trace.ctypes.data,
             "indices": self._indices.ctypes.data,
-            "attempts": self._attempts.ctypes.data,
+            "attempts": 0,
             "voltages": self.voltages.ctypes.data,
             "ideals": self._ideals.ctypes.data,
             "settles": 0,
             "pressures": self._ranges.ctypes.data,
         }
         self._arguments[:] = [given[name] for name in ARGUMENTS]
+        self._count_attempts(1)
         self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
         self._has_idle_lanes = self.count % width != 0
+
+    def _count_attempts(self, parts: int) -> None:
+        """Make room for the attempts of so many parts of a step, a line of the cache each."""
+        self._attempts = np.zeros((parts, 8), np.int64)
+        self._arguments[ARGUMENTS.index("attempts")] = self._attempts.ctypes.data
 
     def _table_of(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
         out = np.empty(self.kernel.table_size)

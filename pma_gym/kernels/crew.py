@@ -2,8 +2,10 @@
 
 A thread that sleeps is awakened on the processor of the one that calls it, and waits there until
 that is done: too late for work of less than a millisecond. So these look for work for a while
-before they sleep, in compiled code, without Python's lock. What a thread has not taken on when
-the one that calls has done its own part, that one does too: a busy machine holds up nobody.
+before they sleep, in compiled code, without Python's lock.
+
+Every thread has a share of the work, in parts. Who is done with its own takes what others have not
+begun, so that a processor that is slower for a while, or does something else, holds up nobody.
 """
 
 import ctypes
@@ -34,39 +36,34 @@ from pma_gym.kernels.native import Library, compiled
 SPINS = 100_000
 """Looks for work before a thread sleeps: 0.1 to 0.3 ms."""
 
-BEGUN, ARGUMENTS, RESULT, DONE, CLAIMED = 0, 1, 8, 16, 24
-"""Places of a hand's numbers, in lines of the cache of their own: how many works have been given,
-the address of its arguments, the last work's result, how many works are done, and how many someone
-has taken on."""
+TAKEN, GIVEN, DONE, RESULT, PARTS, ARGUMENTS, SHARE = 0, 8, 16, 17, 24, 25, 32
+"""Places of a share's numbers, in lines of the cache of their own, and how many there are: parts
+that someone has taken on, that have been given, and that are done, all since the beginning; what
+the function returned; how many parts there are, and the address of the addresses of their
+arguments."""
 
 _POINTER, _INTEGER = ctypes.c_void_p, ctypes.c_int64
 
 
 class Crew:
-    """Runs a compiled function, once for each part of some work, all at once.
+    """Runs a compiled function, once for each part of some work, in several threads.
 
     Args:
         address: address of a function of one pointer that returns a 64-bit integer.
-        parts: its arguments for each part; the first is done by the thread that calls.
+        shares: its arguments for each part of every thread's share; the first share is of the
+            thread that calls.
     """
 
-    def __init__(self, address: int, parts: Sequence[np.ndarray]) -> None:
-        """Start a thread for every part but the first."""
-        self._parts, self._address = list(parts), address
-        kinds = [_POINTER, _INTEGER, _INTEGER, _POINTER]
-        self._lead = _library().function("lead", kinds, _INTEGER)
+    def __init__(self, address: int, shares: Sequence[Sequence[np.ndarray]]) -> None:
+        """Start a thread for every share but the first."""
+        self._shares, self._address = shares, address
+        self._lead = _library().function("lead", [_POINTER, _POINTER, _INTEGER, _INTEGER], _INTEGER)
         self._begin()
 
     def _begin(self) -> None:
         self._process = os.getpid()
-        self._hands = [_Hand(self._address, part) for part in self._parts[1:]]
-        self._table = np.array([hand.counts.ctypes.data for hand in self._hands], np.int64)
-        self._call = (
-            self._table.ctypes.data,
-            len(self._hands),
-            self._address,
-            self._parts[0].ctypes.data,
-        )
+        self._board = _Board(self._address, self._shares)
+        self._hands = [_Hand(self._board, own) for own in range(1, len(self._shares))]
         # Threads know nothing of the crew, so that it can be forgotten, and they with it.
         self.close = weakref.finalize(self, _dismiss, self._hands)
         self.close.atexit = False
@@ -77,44 +74,61 @@ class Crew:
             # A process that was forked from this one has the hands but not their threads.
             if self._process != os.getpid() or not self.close.alive:
                 self._begin()
+            # Announced first: a thread that is about to sleep looks at this once more.
+            self._board.wanted += 1
             for hand in self._hands:
-                # Announced first: a thread that is about to sleep looks at this once more.
-                hand.wanted = int(hand.counts[DONE]) + 1
                 if hand.asleep:
                     hand.bell.set()
-        return self._lead(*self._call)
+        return self._lead(*self._board.call)
+
+
+class _Board:
+    """The work, as all threads see it.
+
+    Attributes:
+        wanted: number of works that there are to do, also those that begin at once.
+        call: the first arguments of `lead` and `serve`.
+    """
+
+    def __init__(self, address: int, shares: Sequence[Sequence[np.ndarray]]) -> None:
+        self._arguments = shares
+        self._tables = [
+            np.array([part.ctypes.data for part in share], np.int64) for share in shares
+        ]
+        self._works = np.zeros(SHARE, np.int64)
+        self._numbers = np.zeros((len(shares), SHARE), np.int64)
+        for numbers, table in zip(self._numbers, self._tables, strict=True):
+            numbers[PARTS], numbers[ARGUMENTS] = len(table), table.ctypes.data
+        self.wanted = 0
+        self.call = self._works.ctypes.data, self._numbers.ctypes.data, len(shares), address
 
 
 class _Hand:
     """A thread that waits for work, awake for a while and then asleep.
 
     Attributes:
-        counts: its numbers.
-        wanted: number of works that there are to do, also those that begin at once.
         asleep: whether it waits for the bell.
         dismissed: whether it is to end.
         bell: awakens it.
     """
 
-    def __init__(self, address: int, arguments: np.ndarray) -> None:
-        self.counts = np.zeros(32, np.int64)
-        self.counts[ARGUMENTS] = arguments.ctypes.data
-        self.wanted = 0
+    def __init__(self, board: _Board, own: int) -> None:
+        self._board = board
         self.asleep = self.dismissed = False
         self.bell = threading.Event()
-        kinds = [_POINTER, _INTEGER, _POINTER, _INTEGER]
+        kinds = [_POINTER, _POINTER, *[_INTEGER] * 5]
         self._serve = _library().function("serve", kinds, _INTEGER)
-        self._arguments = arguments
-        self._call = (self.counts.ctypes.data, address, arguments.ctypes.data, SPINS)
+        self._own = own
         threading.Thread(target=self._work, daemon=True).start()
 
     def _work(self) -> None:
+        seen = 0
         while not self.dismissed:
-            done = self._serve(*self._call)
+            seen = self._serve(*self._board.call, self._own, SPINS, seen)
             self.bell.clear()
             self.asleep = True
             # Work may have been announced between the last look and the line above.
-            if self.wanted == done and not self.dismissed:
+            if self._board.wanted == seen and not self.dismissed:
                 self.bell.wait()
             self.asleep = False
 
@@ -132,85 +146,95 @@ def _library() -> Library:
 
 def _build() -> ir.Module:
     module = ir.Module()
+    _write_work(module)
     _write_serve(module)
     _write_lead(module)
     return module
 
 
-def _at(b: Builder, counts: Operand, place: int) -> Operand:
-    where = offset(b, counts, place, INTEGER)
+_BOARD = [("works", POINTER), ("shares", POINTER), ("threads", INTEGER), ("address", INTEGER)]
+
+
+def _at(b: Builder, numbers: Operand, place: int) -> Operand:
+    where = offset(b, numbers, place, INTEGER)
     # llvmlite stores atomically through pointers that know what they lead to only.
     where.type = ir.PointerType(INTEGER)
     return where
 
 
-def _now(b: Builder, counts: Operand, place: int) -> Operand:
-    return b.load_atomic(_at(b, counts, place), "acquire", 8, typ=INTEGER)
+def _now(b: Builder, numbers: Operand, place: int) -> Operand:
+    return b.load_atomic(_at(b, numbers, place), "acquire", 8, typ=INTEGER)
+
+
+def _share(b: Builder, shares: Operand, number: Operand) -> Operand:
+    return offset(b, shares, b.mul(number, integer(SHARE)), INTEGER)
+
+
+def _write_work(module: ir.Module) -> None:
+    """Do what nobody has taken on, one's own share first."""
+    given = [*_BOARD[1:], ("own", INTEGER)]
+    b, (shares, threads, address, own) = function(module, "work", given)
+    with loop(b, threads) as ahead:
+        share = _share(b, shares, b.srem(b.add(own, ahead), threads))
+        with repeat(b) as leave_if:
+            end = _now(b, share, GIVEN)
+            number = _now(b, share, TAKEN)
+            leave_if(b.icmp_signed(">=", number, end))
+            more = b.add(number, integer(1))
+            tried = b.cmpxchg(_at(b, share, TAKEN), number, more, "acq_rel", "acquire")
+            with b.if_then(b.extract_value(tried, 1)):
+                _do(b, share, address, b.sub(number, end))
+    b.ret_void()
+
+
+def _do(b: Builder, share: Operand, address: Operand, before_end: Operand) -> None:
+    """Do a part, counted from the end of its share."""
+    number = b.add(b.load(_at(b, share, PARTS), typ=INTEGER), before_end)
+    table = b.inttoptr(b.load(_at(b, share, ARGUMENTS), typ=INTEGER), POINTER)
+    arguments = b.load(offset(b, table, number, INTEGER), typ=INTEGER)
+    kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER]))
+    result = b.call(b.inttoptr(address, kind), [b.inttoptr(arguments, POINTER)])
+    b.atomic_rmw("or", _at(b, share, RESULT), result, "monotonic")
+    b.atomic_rmw("add", _at(b, share, DONE), integer(1), "release")
 
 
 def _write_serve(module: ir.Module) -> None:
-    """Work whenever there is any; return the number of works done once there is none for long."""
-    b, (counts, address, arguments, spins) = function(
-        module,
-        "serve",
-        [("counts", POINTER), ("address", INTEGER), ("arguments", POINTER), ("spins", INTEGER)],
-        INTEGER,
+    """Work whenever there is any; return the number of works seen once there is none for long."""
+    given = [*_BOARD, ("own", INTEGER), ("spins", INTEGER), ("seen", INTEGER)]
+    b, (works, shares, threads, address, own, spins, before) = function(
+        module, "serve", given, INTEGER
     )
-    left = variable(b, INTEGER, spins)
+    left, seen = variable(b, INTEGER, spins), variable(b, INTEGER, before)
     with repeat(b) as leave_if:
-        seen = _now(b, counts, DONE)
-        work = b.icmp_signed("!=", _now(b, counts, BEGUN), seen)
-        with b.if_else(work) as (yes, no):
+        now = _now(b, works, 0)
+        there = b.icmp_signed("!=", now, b.load(seen, typ=INTEGER))
+        with b.if_else(there) as (yes, no):
             with yes:
-                done = b.add(seen, integer(1))
-                with b.if_then(_claim(b, counts, done)):
-                    b.store(_called(b, address, arguments), _at(b, counts, RESULT))
-                    b.store_atomic(done, _at(b, counts, DONE), "release", 8)
+                b.store(now, seen)
+                b.call(module.get_global("work"), [shares, threads, address, own])
                 b.store(spins, left)
             with no:
                 b.store(b.sub(b.load(left, typ=INTEGER), integer(1)), left)
         leave_if(b.icmp_signed("<=", b.load(left, typ=INTEGER), integer(0)))
-    b.ret(_now(b, counts, DONE))
+    b.ret(b.load(seen, typ=INTEGER))
 
 
 def _write_lead(module: ir.Module) -> None:
-    """Begin all hands' work, do one's own and what no hand has taken on, wait for the rest."""
-    b, (table, hands, address, arguments) = function(
-        module,
-        "lead",
-        [("table", POINTER), ("hands", INTEGER), ("address", INTEGER), ("arguments", POINTER)],
-        INTEGER,
-    )
-
-    def counts_of(k: Operand) -> Operand:
-        return b.inttoptr(b.load(offset(b, table, k, INTEGER), typ=INTEGER), POINTER)
-
-    with loop(b, hands) as k:
-        counts = counts_of(k)
-        begun = b.add(_now(b, counts, BEGUN), integer(1))
-        b.store_atomic(begun, _at(b, counts, BEGUN), "release", 8)
-    result = variable(b, INTEGER, _called(b, address, arguments))
-    with loop(b, hands) as k:
-        counts = counts_of(k)
-        begun = _now(b, counts, BEGUN)
-        with b.if_then(_claim(b, counts, begun)):
-            given = b.load(_at(b, counts, ARGUMENTS), typ=INTEGER)
-            b.store(_called(b, address, b.inttoptr(given, POINTER)), _at(b, counts, RESULT))
-            b.store_atomic(begun, _at(b, counts, DONE), "release", 8)
+    """Give all parts, work, wait for the rest."""
+    b, (works, shares, threads, address) = function(module, "lead", _BOARD, INTEGER)
+    with loop(b, threads) as k:
+        share = _share(b, shares, k)
+        b.store(integer(0), _at(b, share, RESULT))
+        more = b.load(_at(b, share, PARTS), typ=INTEGER)
+        b.store_atomic(b.add(_now(b, share, GIVEN), more), _at(b, share, GIVEN), "release", 8)
+    b.store_atomic(b.add(_now(b, works, 0), integer(1)), _at(b, works, 0), "release", 8)
+    b.call(module.get_global("work"), [shares, threads, address, integer(0)])
+    result = variable(b, INTEGER, integer(0))
+    with loop(b, threads) as k:
+        share = _share(b, shares, k)
+        end = _now(b, share, GIVEN)
         with wait(b) as leave_if:
-            leave_if(b.icmp_signed("==", _now(b, counts, DONE), begun))
-        its = b.load(_at(b, counts, RESULT), typ=INTEGER)
+            leave_if(b.icmp_signed("==", _now(b, share, DONE), end))
+        its = b.load(_at(b, share, RESULT), typ=INTEGER)
         b.store(b.or_(b.load(result, typ=INTEGER), its), result)
     b.ret(b.load(result, typ=INTEGER))
-
-
-def _claim(b: Builder, counts: Operand, work: Operand) -> Operand:
-    """Take a work on, if nobody has; whether it is one's own now."""
-    free = b.sub(work, integer(1))
-    tried = b.cmpxchg(_at(b, counts, CLAIMED), free, work, "acq_rel", "acquire")
-    return b.extract_value(tried, 1)
-
-
-def _called(b: Builder, address: Operand, arguments: Operand) -> Operand:
-    kind = ir.FunctionType(INTEGER, [POINTER])
-    return b.call(b.inttoptr(address, ir.PointerType(kind)), [arguments])

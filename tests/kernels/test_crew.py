@@ -1,4 +1,4 @@
-"""Threads that share a compiled function's work: each part once a call, asleep or awake."""
+"""Threads that share a compiled function's work: each part once a call, by whoever comes first."""
 
 import gc
 import os
@@ -12,22 +12,62 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
-from pma_gym.kernels.control import INTEGER, POINTER, function, integer, offset
+from pma_gym.kernels.control import (
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    function,
+    integer,
+    loop,
+    offset,
+    repeat,
+    variable,
+)
 from pma_gym.kernels.crew import Crew
 from pma_gym.kernels.native import Library, compiled
 
-COUNTER, SECOND = 0, 1
+COUNTER, SECOND, TIMES = 0, 1, 2
 
 
 def build() -> ir.Module:
-    """Adds the second number to the first, and returns the second."""
+    """Adds the second number to the first, and returns the second; the third is how often."""
     module = ir.Module()
     b, (numbers,) = function(module, "add", [("numbers", POINTER)], INTEGER)
+    _write_add(b, numbers)
+    b, (numbers,) = function(module, "add_often", [("numbers", POINTER)], INTEGER)
+    more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
+    with loop(b, b.load(offset(b, numbers, integer(TIMES), INTEGER), typ=INTEGER)):
+        where = offset(b, numbers, integer(COUNTER), INTEGER)
+        # Atomic, so that the loop is not reduced to one product.
+        where.type = ir.PointerType(INTEGER)
+        b.atomic_rmw("add", where, more, "monotonic")
+    b.ret(more)
+    _write_await_other(module)
+    return module
+
+
+def _write_await_other(module: ir.Module) -> None:
+    """Raise the flag at one address, wait for that at another; 1 if it is not raised for long."""
+    b, (numbers,) = function(module, "await_other", [("numbers", POINTER)], INTEGER)
+    mine, other = (
+        b.inttoptr(b.load(offset(b, numbers, i, INTEGER), typ=INTEGER), ir.PointerType(INTEGER))
+        for i in range(2)
+    )
+    b.store_atomic(integer(1), mine, "release", 8)
+    left = variable(b, INTEGER, integer(10**10))
+    with repeat(b) as leave_if:
+        leave_if(b.icmp_signed("!=", b.load_atomic(other, "acquire", 8, typ=INTEGER), integer(0)))
+        b.store(b.sub(b.load(left, typ=INTEGER), integer(1)), left)
+        leave_if(b.icmp_signed("==", b.load(left, typ=INTEGER), integer(0)))
+    b.ret(b.zext(b.icmp_signed("==", b.load(left, typ=INTEGER), integer(0)), INTEGER))
+
+
+def _write_add(b: Builder, numbers: Operand) -> None:
     more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
     where = offset(b, numbers, integer(COUNTER), INTEGER)
     b.store(b.add(b.load(where, typ=INTEGER), more), where)
     b.ret(more)
-    return module
 
 
 def library() -> Library:
@@ -38,7 +78,7 @@ def library() -> Library:
 def crew() -> Iterator[tuple[Crew, list[np.ndarray]]]:
     """Four threads, the parts of their work."""
     parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
-    crew = Crew(library().address("add"), parts)
+    crew = Crew(library().address("add"), [[part] for part in parts])
     yield crew, parts
     crew.close()
 
@@ -53,11 +93,43 @@ def test_each_part_is_done_once_a_call(crew):
 def test_what_no_thread_takes_on_is_done_all_the_same(monkeypatch):
     # As on a machine that is busy with something else: the threads never come.
     monkeypatch.setattr(threading.Thread, "start", lambda _: None)
-    parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
-    crew = Crew(library().address("add"), parts)
+    parts = [np.array([0, 1 << k], np.int64) for k in range(7)]
+    crew = Crew(library().address("add"), [parts[:1], parts[1:3], parts[3:6], parts[6:]])
     for calls in range(1, 4):
-        assert crew.run() == 15
-        assert [part[COUNTER] for part in parts] == [calls << k for k in range(4)]
+        assert crew.run() == 127
+        assert [part[COUNTER] for part in parts] == [calls << k for k in range(7)]
+
+
+@pytest.mark.parametrize("threads", [2, 3, 7])
+def test_parts_of_any_length_are_done_once_whoever_does_them(threads):
+    generator = np.random.default_rng(threads)
+    shares = [
+        [np.array([0, 1 << k, generator.choice([1, 30, 3000])]) for k in range(count)]
+        for count in generator.integers(1, 9, threads)
+    ]
+    parts = [part for share in shares for part in share]
+    crew = Crew(library().address("add_often"), shares)
+    bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
+    for calls in range(1, 400):
+        assert crew.run() == bits
+        for part in parts:
+            assert part[COUNTER] == calls * part[SECOND] * part[TIMES]
+    crew.close()
+
+
+def test_who_is_done_takes_what_another_has_not_begun():
+    # The second share's first part ends when its second has begun: somebody else must do that.
+    flags = np.zeros((3, 8), np.int64)
+    alone, first, second = (
+        np.array([flags[mine].ctypes.data, flags[other].ctypes.data])
+        for mine, other in ((0, 0), (1, 2), (2, 2))
+    )
+    crew = Crew(library().address("await_other"), [[alone], [first, second]])
+    for _ in range(50):
+        flags[:] = 0
+        assert crew.run() == 0, "waited in vain"
+        assert flags[:, 0].tolist() == [1, 1, 1]
+    crew.close()
 
 
 def test_threads_that_sleep_wake_up(crew):
@@ -83,13 +155,13 @@ def begun() -> Callable[[], list[threading.Thread]]:
 
 
 def test_a_crew_of_one_needs_no_thread(begun):
-    assert Crew(library().address("add"), [np.array([0, 3], np.int64)]).run() == 3
+    assert Crew(library().address("add"), [[np.array([0, 3], np.int64)]]).run() == 3
     assert not begun()
 
 
 @pytest.mark.parametrize("asleep", [False, True])
 def test_threads_end_with_their_crew(begun, asleep):
-    crew = Crew(library().address("add"), [np.ones(2, np.int64) for _ in range(3)])
+    crew = Crew(library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)])
     crew.run()
     threads = begun()
     assert len(threads) == 2
@@ -102,7 +174,7 @@ def test_threads_end_with_their_crew(begun, asleep):
 
 
 def test_a_closed_crew_begins_again(begun):
-    crew = Crew(library().address("add"), [np.ones(2, np.int64) for _ in range(3)])
+    crew = Crew(library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)])
     for _ in range(2):
         assert crew.run() == 1
         threads = begun()
