@@ -38,7 +38,7 @@ class Foresight:
         self._start = np.zeros((PLANS, count + 2))
         self._states = np.zeros((PLANS, rows + 1, count))
         self._outputs = np.zeros((PLANS, rows + 1, len(plant.outputs)))
-        self._attempts = np.zeros(8, np.int64)
+        self._taken, self._attempts = np.zeros(8, np.int64), np.zeros(8, np.int64)
         self._jobs = np.zeros((PLANS, len(JOB)), np.int64)
         for plan in range(PLANS):
             arrays = (self._motor, self._regulator, self._start, self._states)
@@ -66,7 +66,9 @@ class Foresight:
         self._start[:plans, :count] = condition.state
         self._start[:plans, count:] = condition.size, zero
         program = self.plant.program
-        program.simulate_many(plans, self._jobs.ctypes.data, self._attempts.ctypes.data)
+        self._taken[0] = 0
+        addresses = (one.ctypes.data for one in (self._jobs, self._taken, self._attempts))
+        program.simulate_many(plans, *addresses)
         program.observe(
             plans * (self.rows + 1),
             self._states.ctypes.data,

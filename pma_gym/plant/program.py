@@ -148,7 +148,7 @@ class Program:
 
         key = [f"trials {width}", *self.key()]
         library = compiled(key, build, f"trials of {self.model.name}", brief=True)
-        return library.function(f"simulate_{width}", [_INTEGER, _POINTER, _POINTER])
+        return library.function(f"simulate_{width}", [_INTEGER, *[_POINTER] * 3])
 
     def parameters(self, builder: Builder, vector: Operand, values: list[Value]) -> dict:
         """The inputs of level FIXED that values depend on, loaded from a vector.

@@ -83,11 +83,10 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
     # The longest first, so that the last lanes do not wait for one of them.
     order = np.argsort([-len(run.time) for run in runs], kind="stable")
     long = np.ascontiguousarray(jobs[[i for i in order if len(runs[i].time) > 1]])
-    parts = [np.ascontiguousarray(long[k::threads]) for k in range(threads)]
-    made = np.zeros((threads, 8), np.int64)
+    taken, made = np.zeros(8, np.int64), np.zeros((threads, 8), np.int64)
 
     def work(k: int) -> None:
-        kernel(len(parts[k]), parts[k].ctypes.data, made[k].ctypes.data)
+        kernel(len(long), long.ctypes.data, taken.ctypes.data, made[k].ctypes.data)
 
     share(work, threads, (known, starts, runs))
     for run, size in zip(runs, starts[:, count].tolist(), strict=True):

@@ -27,8 +27,9 @@ of the first step and the contraction x0; `out` takes the states, one row a time
 def write_simulate(module: ir.Module, system: System, width: int) -> None:
     """Write `simulate_1`, or of another width.
 
-    It takes the number of jobs, the address of their entries (`JOB`), and that of an integer, in
-    which it leaves how many steps were attempted.
+    It takes the number of jobs, the address of their entries (`JOB`), that of how many of them have
+    been taken on, and that of an integer, in which it leaves how many steps were attempted. Threads
+    that are given the same first three share the jobs: a lane that is free takes the next one.
 
     Args:
         module: where to write.
@@ -36,15 +37,16 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         width: lanes.
     """
     eq, made = system.equations, system.attempt
-    b, (count, jobs, attempts) = function(
+    b, (count, jobs, taken, attempts) = function(
         module,
         f"simulate_{width}",
-        [("count", INTEGER), ("jobs", POINTER), ("attempts", POINTER)],
+        [("count", INTEGER), ("jobs", POINTER), ("taken", POINTER), ("attempts", POINTER)],
     )
+    # llvmlite counts atomically through pointers that know what they lead to only.
+    taken = offset(b, taken, 0, INTEGER)
+    taken.type = ir.PointerType(INTEGER)
     lanes = Lanes(width, fused=FUSED)
     lane = Lane(b, lanes, system.layout)
-    following = memory(b, INTEGER)
-    b.store(integer(0), following)
     rows = memory(b, ir.ArrayType(INTEGER, width))
     n = len(eq.remembered)
 
@@ -93,10 +95,9 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             b.store(lane.get(state.value, k), offset(b, out, i))
 
     def take(k: Operand) -> Operand:
-        job = b.load(following, typ=INTEGER)
+        job = b.atomic_rmw("add", taken, integer(1), "monotonic")
         found = b.icmp_signed("<", job, count)
         with b.if_then(found):
-            b.store(b.add(job, integer(1)), following)
             b.store(job, lane.job(k))
             start = address(job, "start")
             for i, state in enumerate(eq.remembered):
