@@ -54,6 +54,8 @@ class Episodes(EngineMemory):
         self._rest = NoLoad(self.nominal)
         self._settling = self._slack_range()
         self._beginning = self._arguments.copy()
+        # Of steps, which have theirs elsewhere.
+        self._beginning[ARGUMENTS.index("attempts")] = 0
         self._begin_address = self._beginning.ctypes.data
 
     def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:

@@ -12,13 +12,14 @@ network's layers come from one node of PyTorch's graph.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import chain
 from typing import Any
 
 import torch
 from stable_baselines3.common.distributions import DiagGaussianDistribution
 from stable_baselines3.common.policies import ActorCriticPolicy
+from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
@@ -33,9 +34,9 @@ class LeanMlpPolicy(ActorCriticPolicy):
     other, and policy files are exported from it as from `MlpPolicy`. Actions are drawn with the
     same random numbers.
 
-    What it leaves to `ActorCriticPolicy`, at that one's speed: networks with an activation other
-    than tanh or without hidden layers, actions that are not Gaussian, gSDE, and devices other than
-    the processor.
+    What it leaves to `ActorCriticPolicy`, at that one's speed: networks that are anything but
+    Linear layers with Tanh between them, actions that are not Gaussian, gSDE, autocast, and devices
+    other than the processor. Derivatives are first ones only, and are not traced.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -50,7 +51,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
         if not self._is_lean():
             return super().forward(obs, deterministic)
         mean, values = self._mean_and_values(obs)
-        drawn = mean if deterministic else torch.normal(mean, self.log_std.exp().expand_as(mean))
+        drawn = mean if deterministic else mean + self.log_std.exp() * torch.randn_like(mean)
         actions = drawn.reshape(-1, *(self.action_space.shape or ()))
         return actions, values, self._log_likelihood(drawn, mean)
 
@@ -67,21 +68,28 @@ class LeanMlpPolicy(ActorCriticPolicy):
         return values, self._log_likelihood(actions, mean), entropy
 
     def _is_lean(self) -> bool:
-        nets = self.mlp_extractor.policy_net, self.mlp_extractor.value_net
         return (
-            self.activation_fn is nn.Tanh
-            and type(self.action_dist) is DiagGaussianDistribution
+            type(self.action_dist) is DiagGaussianDistribution
+            and type(self.mlp_extractor) is MlpExtractor
             and self.log_std.device.type == "cpu"
-            and all(len(net) > 0 for net in nets)
+            and not torch.is_autocast_enabled("cpu")
+            and all(_is_plain(modules) for modules in self._networks())
         )
+
+    def _networks(self) -> tuple[list[nn.Module], list[nn.Module]]:
+        """Modules of actor and critic, in order."""
+        nets = self.mlp_extractor
+        return [*nets.policy_net, self.action_net], [*nets.value_net, self.value_net]
 
     def _mean_and_values(self, obs: Any) -> tuple[Tensor, Tensor]:  # noqa: ANN401
         features = self.extract_features(obs)
         of_actor, of_critic = features if isinstance(features, tuple) else (features, features)
-        return (
-            _network(of_actor, [*self.mlp_extractor.policy_net, self.action_net]),
-            _network(of_critic, [*self.mlp_extractor.value_net, self.value_net]),
-        )
+        actor, critic = self._networks()
+        mean = _network(of_actor, actor)
+        if (mean + self.log_std).isnan().any():
+            # It says what is wrong with them.
+            self.action_dist.proba_distribution(mean, self.log_std)
+        return mean, _network(of_critic, critic)
 
     def _log_likelihood(self, actions: Tensor, mean: Tensor) -> Tensor:
         """Of the normal distribution, summed over an action's entries; shape (rows,)."""
@@ -90,9 +98,19 @@ class LeanMlpPolicy(ActorCriticPolicy):
         return -0.5 * deviations.square().sum(dim=1) - constant
 
 
-def _network(x: Tensor, modules: Iterable[nn.Module]) -> Tensor:
+def _is_plain(modules: Sequence[nn.Module]) -> bool:
+    """Whether they are Linear, Tanh and so on up to a Linear, with one hidden layer or more."""
+    layers, between = modules[::2], modules[1::2]
+    return (
+        len(layers) == len(between) + 1 > 1
+        and all(type(one) is nn.Tanh for one in between)
+        and all(type(one) is nn.Linear and one.bias is not None for one in layers)
+    )
+
+
+def _network(x: Tensor, modules: Sequence[nn.Module]) -> Tensor:
     """What Linear layers with tanh between them say, the last without."""
-    layers = [(m.weight, m.bias) for m in modules if isinstance(m, nn.Linear)]
+    layers: Any = [(layer.weight, layer.bias) for layer in modules[::2]]
     if torch.is_grad_enabled():
         return _Network.apply(x, *chain.from_iterable(layers))
     return _passed(x, layers)[-1]

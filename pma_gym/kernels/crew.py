@@ -75,7 +75,7 @@ class Crew:
             if self._process != os.getpid() or not self.close.alive:
                 self._begin()
             # Announced first: a thread that is about to sleep looks at this once more.
-            self._board.wanted += 1
+            self._board.announce()
             for hand in self._hands:
                 if hand.asleep:
                     hand.bell.set()
@@ -101,6 +101,10 @@ class _Board:
             numbers[PARTS], numbers[ARGUMENTS] = len(table), table.ctypes.data
         self.wanted = 0
         self.call = self._works.ctypes.data, self._numbers.ctypes.data, len(shares), address
+
+    def announce(self) -> None:
+        """There is one more work to do than were begun; again, should Ctrl-C come before that."""
+        self.wanted = int(self._works[0]) + 1
 
 
 class _Hand:

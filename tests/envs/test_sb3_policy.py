@@ -30,6 +30,14 @@ class Learning(FlattenExtractor):
         return self.scale * super().forward(observations)
 
 
+def with_norm(policy):
+    policy.mlp_extractor.policy_net.insert(1, nn.LayerNorm(64))
+
+
+def without_bias(policy):
+    policy.mlp_extractor.value_net[2] = nn.Linear(64, 64, bias=False)
+
+
 def pair(action=(1,), **options):
     """Stable-Baselines3's policy and the lean one, with the same parameters."""
     if isinstance(action, tuple):
@@ -102,6 +110,52 @@ def test_what_it_cannot_it_leaves_to_theirs_to_the_bit(options):
     assert not ours._is_lean()
     for its, mine in zip(said(theirs), said(ours), strict=True):
         assert torch.equal(mine, its)
+
+
+@pytest.mark.parametrize("change", [with_norm, without_bias])
+def test_changed_networks_are_left_to_theirs(change):
+    theirs, ours = pair()
+    for policy in (theirs, ours):
+        torch.manual_seed(4)
+        change(policy)
+    assert not ours._is_lean()
+    for its, mine in zip(said(theirs), said(ours), strict=True):
+        assert torch.equal(mine, its)
+
+
+def test_actions_that_are_drawn_have_theirs_derivatives():
+    found = []
+    for policy in pair():
+        torch.manual_seed(8)
+        actions, _, likelihood = policy(torch.ones(5, 7))
+        (actions.sum() + 0.1 * likelihood.square().sum()).backward()
+        found.append([parameter.grad for parameter in policy.parameters()])
+    for its, mine in zip(*found, strict=True):
+        assert (its is None) == (mine is None)
+        if its is not None:
+            np.testing.assert_allclose(mine, its, rtol=1e-4, atol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["log_std", "action_net.bias"])
+def test_parameters_that_are_lost_are_refused_as_by_theirs(name):
+    for policy in pair():
+        with torch.no_grad():
+            dict(policy.named_parameters())[name].fill_(torch.nan)
+        with pytest.raises(ValueError, match="constraint"):
+            policy(torch.ones(5, 7))
+        with pytest.raises(ValueError, match="constraint"):
+            policy.evaluate_actions(torch.ones(5, 7), torch.ones(5, 1))
+
+
+def test_autocast_is_left_to_theirs():
+    theirs, ours = pair()
+    for policy in (theirs, ours):
+        with torch.autocast("cpu", torch.bfloat16):
+            values, *_ = policy.evaluate_actions(torch.ones(5, 7), torch.ones(5, 1))
+        values.float().sum().backward()
+    for its, mine in zip(theirs.parameters(), ours.parameters(), strict=True):
+        if its.grad is not None:
+            assert torch.equal(mine.grad, its.grad)
 
 
 @pytest.mark.parametrize("sizes", [(5, 4, 3), (3, 8, 6, 7, 2)])

@@ -147,6 +147,18 @@ def test_threads_that_sleep_wake_up(crew):
     assert parts[3][COUNTER] == 1600
 
 
+def test_what_was_announced_and_never_begun_keeps_nobody_awake(crew):
+    crew, _ = crew
+    # As if Ctrl-C came between the two.
+    crew._board.announce()
+    assert crew.run() == crew.run() == 15
+    time.sleep(0.2)
+    before = time.process_time()
+    time.sleep(0.3)
+    assert time.process_time() - before < 0.1
+    assert crew.run() == 15
+
+
 @pytest.fixture
 def begun() -> Callable[[], list[threading.Thread]]:
     """Threads that have begun since."""
