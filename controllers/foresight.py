@@ -47,6 +47,8 @@ class Foresight:
                 *(rows + 1, 0, self._time.ctypes.data, motor, regulator),
                 *(plant.table.ctypes.data, start, states),
             )
+        shared = self._jobs, self._taken, self._attempts
+        self._addresses = [array.ctypes.data for array in shared]
 
     def __call__(
         self, condition: Condition, commands: Commands, plans: int
@@ -67,8 +69,7 @@ class Foresight:
         self._start[:plans, count:] = condition.size, zero
         program = self.plant.program
         self._taken[0] = 0
-        addresses = (one.ctypes.data for one in (self._jobs, self._taken, self._attempts))
-        program.simulate_many(plans, *addresses)
+        program.simulate_many(plans, *self._addresses)
         program.observe(
             plans * (self.rows + 1),
             self._states.ctypes.data,

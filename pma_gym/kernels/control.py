@@ -67,6 +67,16 @@ def offset(
     return builder.gep(pointer, [integer(index)], source_etype=element)
 
 
+def atomic(builder: Builder, pointer: Operand, index: Operand | int = 0) -> Operand:
+    """Address of an integer that several threads read and write, for atomic operations.
+
+    llvmlite writes these through pointers that know what they lead to only.
+    """
+    where = offset(builder, pointer, index, INTEGER)
+    where.type = ir.PointerType(INTEGER)
+    return where
+
+
 def variable(
     builder: Builder, type_: ir.Type, first: Operand | None = None, name: str = ""
 ) -> Operand:

@@ -23,6 +23,7 @@ from pma_gym.kernels.control import (
     POINTER,
     Builder,
     Operand,
+    atomic,
     function,
     integer,
     loop,
@@ -159,15 +160,8 @@ def _build() -> ir.Module:
 _BOARD = [("works", POINTER), ("shares", POINTER), ("threads", INTEGER), ("address", INTEGER)]
 
 
-def _at(b: Builder, numbers: Operand, place: int) -> Operand:
-    where = offset(b, numbers, place, INTEGER)
-    # llvmlite stores atomically through pointers that know what they lead to only.
-    where.type = ir.PointerType(INTEGER)
-    return where
-
-
 def _now(b: Builder, numbers: Operand, place: int) -> Operand:
-    return b.load_atomic(_at(b, numbers, place), "acquire", 8, typ=INTEGER)
+    return b.load_atomic(atomic(b, numbers, place), "acquire", 8, typ=INTEGER)
 
 
 def _share(b: Builder, shares: Operand, number: Operand) -> Operand:
@@ -185,7 +179,7 @@ def _write_work(module: ir.Module) -> None:
             number = _now(b, share, TAKEN)
             leave_if(b.icmp_signed(">=", number, end))
             more = b.add(number, integer(1))
-            tried = b.cmpxchg(_at(b, share, TAKEN), number, more, "acq_rel", "acquire")
+            tried = b.cmpxchg(atomic(b, share, TAKEN), number, more, "acq_rel", "acquire")
             with b.if_then(b.extract_value(tried, 1)):
                 _do(b, share, address, b.sub(number, end))
     b.ret_void()
@@ -193,13 +187,13 @@ def _write_work(module: ir.Module) -> None:
 
 def _do(b: Builder, share: Operand, address: Operand, before_end: Operand) -> None:
     """Do a part, counted from the end of its share."""
-    number = b.add(b.load(_at(b, share, PARTS), typ=INTEGER), before_end)
-    table = b.inttoptr(b.load(_at(b, share, ARGUMENTS), typ=INTEGER), POINTER)
+    number = b.add(b.load(atomic(b, share, PARTS), typ=INTEGER), before_end)
+    table = b.inttoptr(b.load(atomic(b, share, ARGUMENTS), typ=INTEGER), POINTER)
     arguments = b.load(offset(b, table, number, INTEGER), typ=INTEGER)
     kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER]))
     result = b.call(b.inttoptr(address, kind), [b.inttoptr(arguments, POINTER)])
-    b.atomic_rmw("or", _at(b, share, RESULT), result, "monotonic")
-    b.atomic_rmw("add", _at(b, share, DONE), integer(1), "release")
+    b.atomic_rmw("or", atomic(b, share, RESULT), result, "monotonic")
+    b.atomic_rmw("add", atomic(b, share, DONE), integer(1), "release")
 
 
 def _write_serve(module: ir.Module) -> None:
@@ -228,10 +222,10 @@ def _write_lead(module: ir.Module) -> None:
     b, (works, shares, threads, address) = function(module, "lead", _BOARD, INTEGER)
     with loop(b, threads) as k:
         share = _share(b, shares, k)
-        b.store(integer(0), _at(b, share, RESULT))
-        more = b.load(_at(b, share, PARTS), typ=INTEGER)
-        b.store_atomic(b.add(_now(b, share, GIVEN), more), _at(b, share, GIVEN), "release", 8)
-    b.store_atomic(b.add(_now(b, works, 0), integer(1)), _at(b, works, 0), "release", 8)
+        b.store(integer(0), atomic(b, share, RESULT))
+        more = b.load(atomic(b, share, PARTS), typ=INTEGER)
+        b.store_atomic(b.add(_now(b, share, GIVEN), more), atomic(b, share, GIVEN), "release", 8)
+    b.store_atomic(b.add(_now(b, works, 0), integer(1)), atomic(b, works, 0), "release", 8)
     b.call(module.get_global("work"), [shares, threads, address, integer(0)])
     result = variable(b, INTEGER, integer(0))
     with loop(b, threads) as k:
@@ -239,6 +233,6 @@ def _write_lead(module: ir.Module) -> None:
         end = _now(b, share, GIVEN)
         with wait(b) as leave_if:
             leave_if(b.icmp_signed("==", _now(b, share, DONE), end))
-        its = b.load(_at(b, share, RESULT), typ=INTEGER)
+        its = b.load(atomic(b, share, RESULT), typ=INTEGER)
         b.store(b.or_(b.load(result, typ=INTEGER), its), result)
     b.ret(b.load(result, typ=INTEGER))

@@ -7,6 +7,7 @@ from pma_gym.kernels.control import (
     INTEGER,
     POINTER,
     Operand,
+    atomic,
     function,
     integer,
     intrinsic,
@@ -42,9 +43,6 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         f"simulate_{width}",
         [("count", INTEGER), ("jobs", POINTER), ("taken", POINTER), ("attempts", POINTER)],
     )
-    # llvmlite counts atomically through pointers that know what they lead to only.
-    taken = offset(b, taken, 0, INTEGER)
-    taken.type = ir.PointerType(INTEGER)
     lanes = Lanes(width, fused=FUSED)
     lane = Lane(b, lanes, system.layout)
     rows = memory(b, ir.ArrayType(INTEGER, width))
@@ -95,7 +93,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             b.store(lane.get(state.value, k), offset(b, out, i))
 
     def take(k: Operand) -> Operand:
-        job = b.atomic_rmw("add", taken, integer(1), "monotonic")
+        job = b.atomic_rmw("add", atomic(b, taken), integer(1), "monotonic")
         found = b.icmp_signed("<", job, count)
         with b.if_then(found):
             b.store(job, lane.job(k))

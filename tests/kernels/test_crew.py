@@ -17,6 +17,7 @@ from pma_gym.kernels.control import (
     POINTER,
     Builder,
     Operand,
+    atomic,
     function,
     integer,
     loop,
@@ -38,10 +39,8 @@ def build() -> ir.Module:
     b, (numbers,) = function(module, "add_often", [("numbers", POINTER)], INTEGER)
     more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
     with loop(b, b.load(offset(b, numbers, integer(TIMES), INTEGER), typ=INTEGER)):
-        where = offset(b, numbers, integer(COUNTER), INTEGER)
         # Atomic, so that the loop is not reduced to one product.
-        where.type = ir.PointerType(INTEGER)
-        b.atomic_rmw("add", where, more, "monotonic")
+        b.atomic_rmw("add", atomic(b, numbers, COUNTER), more, "monotonic")
     b.ret(more)
     _write_await_other(module)
     return module
