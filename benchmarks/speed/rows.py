@@ -168,6 +168,9 @@ def _batches() -> Iterator[Row]:
             yield _batch("own_two", f"{title}, 2 threads", "own", two, step=_OWN, cores=2)
             held = one | {"held": True}
             yield _batch("own_held", f"{title}, voltage held, 1 thread", "own", held, step=_OWN)
+    pair: dict[str, Any] = {"row": "pair", "step": _OWN, "cores": 2}
+    each = own | {"count": 1024}
+    yield _batch("own_pair", f"{title}, 2 processes, so many each", "own", each, **pair)
     for toy, step in _STEPS.items():
         told: dict[str, Any] = {"right_hand_sides": 1, "step": step}
         for count in COUNTS:

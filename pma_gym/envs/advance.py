@@ -38,12 +38,12 @@ _TYPES = {"p": POINTER, "i": INTEGER, "n": INDEX, "d": DOUBLE, "v": ir.VoidType(
 
 
 def write_advance(module: ir.Module, record: Record) -> None:
-    """Write `advance`, which makes a step by the module's own `step`.
+    """Write `advance`, which makes a step by the module's own `check` and `step`.
 
     Its argument is the action: an array of one dimension and of single or double precision with an
     entry for each action, or the array of actions itself, in which the action stands already. It
-    returns observation, reward, False, False and info, or what `step` returns if that is not 0, or
-    NOT_READ. Other threads of Python run meanwhile.
+    returns observation, reward, False, False and info, or what one of those two returns if that is
+    not 0, or NOT_READ. Other threads of Python run meanwhile.
 
     Args:
         module: where to.
@@ -58,6 +58,9 @@ def write_advance(module: ir.Module, record: Record) -> None:
         at = offset(b, arguments, ARGUMENTS.index("actions"), INTEGER)
         given = b.inttoptr(b.load(at, typ=INTEGER), POINTER)
         _read(b, action, parts, given, record.actions)
+    bad = b.call(module.get_global("check"), [arguments])
+    with b.if_then(b.icmp_signed("!=", bad, integer(0)), likely=False):
+        b.ret(_call(b, "PyLong_FromLongLong", bad))
     thread = _call(b, "PyEval_SaveThread")
     ended = b.call(module.get_global("step"), [arguments])
     _call(b, "PyEval_RestoreThread", thread)

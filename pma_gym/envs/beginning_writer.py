@@ -17,6 +17,7 @@ from pma_gym.kernels.control import (
 )
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.llvm import Lanes
+from pma_gym.kernels.native import simd_lanes
 from pma_gym.kernels.random import philox, uniform
 from pma_gym.kernels.substitute import substitute
 from pma_gym.plant.march import FUSED, memory
@@ -43,12 +44,14 @@ class BeginningWriter(BlockMemory):
         traces: whether a single environment's course is written down.
         begun: what the first sample gives, by name.
         tare: readings at rest.
+        abreast: how many of them are computed at once; a divisor of their number.
     """
 
     def __init__(self, kernel: Plan) -> None:
         super().__init__(kernel)
         self.module = ir.Module()
         self.traces = kernel.width == 1
+        self.abreast = simd_lanes()
 
     def _trace_beginning(self) -> list[Value]:
         """Trace what a beginning computes; returns it, for its part of the table."""
@@ -85,7 +88,7 @@ class BeginningWriter(BlockMemory):
             if self.kernel.draws:
                 with b.if_then(settles):
                     self._settle(b, given, records, tables, lane, row)
-            self._zero_sensors(b, lanes, records, tables, lane)
+            self._zero_sensors(b, records, tables, lane)
             self._first(b, lanes, given, records, tables, lane, index)
         b.ret_void()
 
@@ -156,20 +159,24 @@ class BeginningWriter(BlockMemory):
                 found[f"wire_{k}_{i}"] = volts[i]
         return found
 
-    def _zero_sensors(
-        self, b: Builder, lanes: Lanes, records: Operand, tables: Operand, lane: Operand
-    ) -> None:
+    def _zero_sensors(self, b: Builder, records: Operand, tables: Operand, lane: Operand) -> None:
+        """Read the sensors at rest, some readings at once, and sum them up one after the other."""
         readings = TARE_READINGS if self.record.options.noise else 1
-        known = self._known(b, lanes, self.tare, records, tables, lane)
+        abreast = self._lanes(self.abreast if readings > 1 else 1)
+        alone = self._known(b, self._lanes(1), self.tare, records, tables, lane)
+        known = {i: abreast.spread(b, number) for i, number in alone.items()}
         totals = [memory(b, DOUBLE) for _ in range(2)]
         for total in totals:
             b.store(ir.Constant(DOUBLE, 0.0), total)
-        with loop(b, readings) as k:
-            known[self.eq.graph.input("reading", 2, "integer").id] = k
-            found = lanes.emit(b, self.tare, known)
+        with loop(b, readings, step=abreast.width) as first:
+            number = b.add(abreast.spread(b, first), abreast.numbers)
+            known[self.eq.graph.input("reading", 2, "integer").id] = number
+            found = abreast.emit(b, self.tare, known)
             for total, value in zip(totals, self.tare[:2], strict=True):
-                reading = widened(b, found[value.id])
-                b.store(b.fadd(b.load(total, typ=DOUBLE), reading), total)
+                sum_ = b.load(total, typ=DOUBLE)
+                for k in range(abreast.width):
+                    sum_ = b.fadd(sum_, widened(b, abreast.extract(b, found[value.id], k)))
+                b.store(sum_, total)
         for total, name in zip(totals, ("tare_contraction", "tare_rotation"), strict=True):
             mean = b.fmul(b.load(total, typ=DOUBLE), ir.Constant(DOUBLE, 1.0 / readings))
             b.store(narrowed(b, mean, self.element), self._cell(b, records, name, lane))

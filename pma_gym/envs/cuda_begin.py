@@ -25,7 +25,7 @@ class BeginWriter(ThreadMemory):
                 self._keep_final(b, given, records, job)
                 lanes, first = self._lanes(1), integer(0)
                 self._settle(b, given, records, tables, first, job)
-                self._zero_sensors(b, lanes, records, tables, first)
+                self._zero_sensors(b, records, tables, first)
                 self._first(b, lanes, given, records, tables, first, job)
 
     def _keep_final(

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from pma_gym.envs.advance import BOUND
 from pma_gym.envs.block_memory import ARGUMENTS
 from pma_gym.envs.episodes import Episodes
-from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.options import Options, Pressure
 from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import builtin
@@ -92,15 +91,13 @@ class Engine(Episodes):
             0 while no episode ended, else the sum of 1 if any terminated and 2 if any was
             truncated.
         Raises:
-            ValueError: an action that is not finite; nothing has happened then, but where several
-                threads work to other parts of the batch.
+            ValueError: an action that is not finite; nothing has happened then.
         """
+        if self.kernel.check(self._address):
+            raise ValueError("action must be finite")
         if self._has_idle_lanes:
             self._idle_lanes[:] = 0
-        ended = self._crew.run()
-        if ended & BAD_ACTION:
-            raise ValueError("action must be finite")
-        return ended
+        return self._crew.run()
 
     def close(self) -> None:
         """End the threads."""
@@ -115,9 +112,9 @@ class Engine(Episodes):
         Returns:
             What takes an action, or `given` with the action in it, and gives observation, reward,
             False, False and info; or, where the episode ended or an action was not finite, what
-            `step` of the kernel returns: 1 if it was terminated, 2 if truncated, or BAD_ACTION; or
-            NOT_READ, with nothing done, for an action that is no array of as many numbers in single
-            or double precision.
+            the kernel returns: 1 if it was terminated, 2 if truncated; or, with nothing done,
+            BAD_ACTION, or NOT_READ for an action that is no array of as many numbers in single or
+            double precision.
         """
         keys, known = self.record.info, arrays.are_known()
         bound = {

@@ -53,6 +53,7 @@ class Episodes(EngineMemory):
         super().__init__(task, options, self.told, nominal, count, single)
         self._rest = NoLoad(self.nominal)
         self._settling = self._slack_range()
+        self._usual = self._ranges_of(self.wanted)
         self._beginning = self._arguments.copy()
         # Of steps, which have theirs elsewhere.
         self._beginning[ARGUMENTS.index("attempts")] = 0
@@ -82,9 +83,12 @@ class Episodes(EngineMemory):
             self._check_prescription(wanted)
         count = len(indices)
         self._episodes[indices] += 1
-        asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
-        settles = self._settles(asked)
-        if not settles:
+        ranges = self._usual[indices] if wanted is None else self._ranges_of(wanted)
+        settles = not np.isnan(ranges).any()
+        if settles:
+            self._ranges[:count] = ranges
+        else:
+            asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else wanted
             self._begin_drawn(indices, asked)
         self._indices[:count] = indices
         self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
@@ -92,20 +96,23 @@ class Episodes(EngineMemory):
         if settles:
             self.pressures[indices] = self._of("pressure", indices)
 
-    def _settles(self, asked: Sequence[Pressure]) -> bool:
-        """Write ranges of pressures for compiled beginnings; whether they find a rest in all."""
+    def _ranges_of(self, asked: Sequence[Pressure]) -> NDArray[np.float64]:
+        """Ranges that compiled beginnings draw pressures from (Pa), shape (m, 2).
+
+        A row of no numbers is of one that they do not begin.
+        """
         lowest, highest = self._settling
-        for row, one in zip(self._ranges, asked, strict=False):
+        found = np.full((len(asked), 2), np.nan)
+        for row, one in enumerate(asked):
             if isinstance(one, str):
                 low, high = self.task.starts
             elif isinstance(one, Sequence):
-                return False
+                continue
             else:
                 low = high = 1e3 * float(one)
-            if not (lowest <= low and high <= highest):
-                return False
-            row[0], row[1] = low, high
-        return True
+            if lowest <= low and high <= highest:
+                found[row] = low, high
+        return found
 
     def _slack_range(self) -> tuple[float, float]:
         """Pressures at which compiled beginnings find a rest (Pa), none if the first is larger."""

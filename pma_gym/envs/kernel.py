@@ -40,7 +40,7 @@ class Kernel:
         self.draws = alone and pulls_none and hangs_by_itself(program.model)
         self.library: Library = compiled(self._key(), lambda: Writer(self).module, "environment")
         get = self.library.function
-        self.step = get("step", [ctypes.c_void_p], ctypes.c_int64)
+        self.check = get("check", [ctypes.c_void_p], ctypes.c_int64)
         self.begin = get("begin", [ctypes.c_void_p])
         self.table = get("table", [ctypes.c_void_p, ctypes.c_void_p])
         self.table_size = int(get("table_size", [], ctypes.c_int64)())

@@ -30,7 +30,7 @@ from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
 from pma_gym.plant.model import PLANTS
 
 BAD_ACTION = 4
-"""What `step` returns where an action is no finite number; nothing has happened then."""
+"""What `check` returns where an action is no finite number: there `step` is not to be called."""
 
 
 class Numbers(Protocol):
@@ -70,6 +70,7 @@ class Writer(BeginningWriter):
 
     def _write(self) -> None:
         self._table()
+        self._check()
         self._step()
         self._begin()
         if self.width == 1:
@@ -87,16 +88,24 @@ class Writer(BeginningWriter):
 
     # -- a step ------------------------------------------------------------------------------------
 
+    def _check(self) -> None:
+        """Whether all actions are finite, which a step takes for granted."""
+        b, (arguments,) = function(self.module, "check", [("arguments", POINTER)], INTEGER)
+        given = self._arguments(b, arguments)
+        bad, lanes = memory(b, INTEGER), Lanes(self.width)
+        b.store(integer(0), bad)
+        with loop(b, given["last"], given["first"]) as block:
+            for i in range(self.record.actions):
+                action = self._actions(b, lanes, given, block, i)
+                # Zero times a number that is not finite is none.
+                nothing = b.fmul(action, lanes.constant(0.0))
+                wrong = lanes.any(b, b.fcmp_unordered("uno", nothing, nothing))
+                b.store(b.or_(b.load(bad, typ=INTEGER), b.zext(wrong, INTEGER)), bad)
+        b.ret(b.mul(b.load(bad, typ=INTEGER), integer(BAD_ACTION)))
+
     def _step(self) -> None:
         b, (arguments,) = function(self.module, "step", [("arguments", POINTER)], INTEGER)
         given = self._arguments(b, arguments)
-        bad = memory(b, INTEGER)
-        b.store(integer(0), bad)
-        with loop(b, given["last"], given["first"]) as block:
-            self._check_actions(b, given, block, bad)
-        refused = b.icmp_signed("!=", b.load(bad, typ=INTEGER), integer(0))
-        with b.if_then(refused, likely=False):
-            b.ret(integer(BAD_ACTION))
         with loop(b, given["last"], given["first"]) as block:
             self._command(b, given, block)
         self._march(b, given)
@@ -119,18 +128,6 @@ class Writer(BeginningWriter):
             lanes,
             [self._action(b, given, b.add(first, integer(k)), i) for k in range(self.width)],
         )
-
-    def _check_actions(
-        self, b: Builder, given: dict[str, Operand], block: Operand, bad: Operand
-    ) -> None:
-        lanes = Lanes(self.width)
-        for i in range(self.record.actions):
-            action = self._actions(b, lanes, given, block, i)
-            # Zero times a number that is not finite is none.
-            nothing = b.fmul(action, lanes.constant(0.0))
-            wrong = lanes.any(b, b.fcmp_unordered("uno", nothing, nothing))
-            count = b.add(b.load(bad, typ=INTEGER), b.zext(wrong, INTEGER))
-            b.store(count, bad)
 
     def _command(self, b: Builder, given: dict[str, Operand], block: Operand) -> None:
         lanes = self._lanes(self.width)

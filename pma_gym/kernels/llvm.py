@@ -261,6 +261,12 @@ class Lanes:
         zeros = ir.Constant(ir.VectorType(INDEX, self.width), [0] * self.width)
         return builder.shuffle_vector(first, undefined, zeros)
 
+    @property
+    def numbers(self) -> Operand:
+        """Each lane's own number, from 0."""
+        own = list(range(self.width))
+        return ir.Constant(self.integer, own if self.width > 1 else 0)
+
     def extract(self, builder: Builder, vector: Operand, lane: Operand | int) -> Operand:
         """The scalar in one lane."""
         return vector if self.width == 1 else builder.extract_element(vector, integer(lane))

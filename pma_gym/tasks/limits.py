@@ -57,9 +57,10 @@ def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
 
 def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str | None:
     """The limit that `broken` or `unsafe` found, in words; None for 0."""
+    if not code:
+        return None
     limits = model.parameters["limits"]
     words = (
-        "",
         f"contraction above {limits.contraction * 1e3:g} mm",
         f"muscle stretched over {limits.stretch * 1e3:g} mm beyond its resting length",
         f"cable tension above {limits.tension:g} N",
@@ -71,4 +72,4 @@ def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) 
             f"moment at the joint above the safe {exercise.safe_moment:g} N m",
             f"joint faster than the safe {speed:g} deg/s",
         )
-    return words[int(code)] or None
+    return words[int(code) - 1]

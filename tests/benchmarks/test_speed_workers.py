@@ -12,6 +12,7 @@ from benchmarks.speed.loops import Missing, single, vector
 from benchmarks.speed.measure import Measurement, Plan
 from benchmarks.speed.peers import PEERS
 from benchmarks.speed.rows import Row
+from benchmarks.speed.workers import serve_own
 
 FAKE = """
 import os, time
@@ -149,3 +150,10 @@ def test_pips_reason_is_its_last_error():
     printed = "WARNING: a\nERROR: first\nERROR: No matching distribution found for x\nhint: y\n"
     assert install.reason(printed) == "ERROR: No matching distribution found for x"
     assert install.reason("") == "no reason given"
+
+
+def test_two_processes_are_counted_together():
+    made = serve_own.pair("pma_gym/IsokineticDisplacement-v0", 16)
+    own = serve_own.PAIRED * 1024
+    assert own < made.chunk() < 10 * own
+    assert made.facts()["right_hand_sides"] > 0

@@ -3,6 +3,7 @@
 A row whose part does not exist says so by `Missing` and is left out by name.
 """
 
+import ctypes
 from typing import Any
 
 import gymnasium as gym
@@ -51,7 +52,8 @@ def single_kernel(name: str) -> Prepared:
     environment: Any = gym.make(name).unwrapped
     environment.reset(seed=0)
     engine: Engine = environment._engine
-    run, arguments = engine.kernel.step, engine._address
+    run = engine.kernel.library.function("step", [ctypes.c_void_p], ctypes.c_int64)
+    arguments = engine._address
     entry = memoryview(engine.actions[0])
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, ACTIONS).tolist()
 

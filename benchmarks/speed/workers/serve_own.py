@@ -3,7 +3,9 @@
 What differs between versions of the package is in `hooks`.
 """
 
+import multiprocessing
 from functools import cache
+from multiprocessing.connection import Connection
 from typing import Any
 
 import gymnasium as gym
@@ -65,6 +67,47 @@ def batch(name: str, count: int, threads: int, held: bool = False) -> Prepared:
     return Prepared(prepared.chunk, lambda: _evaluations(environment.unwrapped))
 
 
+def pair(name: str, count: int) -> Prepared:
+    """As many environments in each of two processes, which share nothing but the machine.
+
+    Of two threads no more can be asked for than that.
+    """
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    context.Process(target=_beside, args=(there, name, count), daemon=True).start()
+    # Whoever waits for a process that has ended is told so.
+    there.close()
+    own = batch(name, count, 1)
+    here.recv()
+
+    def chunk() -> int:
+        here.send("go")
+        steps = sum(own.chunk() for _ in range(PAIRED))
+        here.send("stop")
+        return steps + here.recv()
+
+    return Prepared(chunk, own.facts)
+
+
+PAIRED = 64
+"""Chunks for which the other process is told to go on once."""
+
+
+def _beside(told: Connection, name: str, count: int) -> None:
+    """The other process: steps while it is told to, and says how many it made."""
+    own = batch(name, count, 1)
+    told.send("ready")
+    try:
+        while told.recv():
+            steps = 0
+            while not told.poll():
+                steps += own.chunk()
+            told.recv()
+            told.send(steps)
+    except EOFError:
+        return
+
+
 def tolerances(model: str, millionths: int) -> Prepared:
     """Control steps of the plant alone in a demanding trial, at a tolerance."""
     tolerance = millionths * 1e-6
@@ -103,6 +146,7 @@ ROWS = {
     "one": one,
     "kernel": kernel,
     "batch": batch,
+    "pair": pair,
     "tolerances": tolerances,
     "fits": hooks.joint_fits,
     "gpu": hooks.gpu,
