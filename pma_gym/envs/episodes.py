@@ -53,7 +53,8 @@ class Episodes(EngineMemory):
         super().__init__(task, options, self.told, nominal, count, single)
         self._rest = NoLoad(self.nominal)
         self._settling = self._slack_range()
-        self._usual = self._ranges_of(self.wanted)
+        usual = self._ranges_of(self.wanted)
+        self._usual = None if usual is None else np.array(usual)
         self._beginning = self._arguments.copy()
         # Of steps, which have theirs elsewhere.
         self._beginning[ARGUMENTS.index("attempts")] = 0
@@ -83,8 +84,8 @@ class Episodes(EngineMemory):
             self._check_prescription(wanted)
         count = len(indices)
         self._episodes[indices] += 1
-        ranges = self._usual[indices] if wanted is None else self._ranges_of(wanted)
-        settles = not np.isnan(ranges).any()
+        ranges = self._ranges_of(wanted) if wanted is not None else self._usual_ranges(indices)
+        settles = ranges is not None
         if settles:
             self._ranges[:count] = ranges
         else:
@@ -94,25 +95,30 @@ class Episodes(EngineMemory):
         self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
         self.kernel.begin(self._begin_address)
         if settles:
-            self.pressures[indices] = self._of("pressure", indices)
+            if count == self.count:
+                self.pressures[:] = self.numbers("pressure")
+            else:
+                self.pressures[indices] = self._of("pressure", indices)
 
-    def _ranges_of(self, asked: Sequence[Pressure]) -> NDArray[np.float64]:
-        """Ranges that compiled beginnings draw pressures from (Pa), shape (m, 2).
-
-        A row of no numbers is of one that they do not begin.
-        """
+    def _ranges_of(self, asked: Sequence[Pressure]) -> list[tuple[float, float]] | None:
+        """Ranges that compiled beginnings draw pressures from (Pa); None if they cannot all."""
         lowest, highest = self._settling
-        found = np.full((len(asked), 2), np.nan)
-        for row, one in enumerate(asked):
+        found = []
+        for one in asked:
             if isinstance(one, str):
                 low, high = self.task.starts
             elif isinstance(one, Sequence):
-                continue
+                return None
             else:
                 low = high = 1e3 * float(one)
-            if lowest <= low and high <= highest:
-                found[row] = low, high
+            if not (lowest <= low and high <= highest):
+                return None
+            found.append((low, high))
         return found
+
+    def _usual_ranges(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
+        """The same of environments that are asked for nothing else than usual."""
+        return None if self._usual is None else self._usual[indices]
 
     def _slack_range(self) -> tuple[float, float]:
         """Pressures at which compiled beginnings find a rest (Pa), none if the first is larger."""
