@@ -53,8 +53,7 @@ class Episodes(EngineMemory):
         super().__init__(task, options, self.told, nominal, count, single)
         self._rest = NoLoad(self.nominal)
         self._settling = self._slack_range()
-        usual = self._ranges_of(self.wanted)
-        self._usual = None if usual is None else np.array(usual)
+        self._usual = self._ranges.copy() if self._settles(self.wanted) else None
         self._beginning = self._arguments.copy()
         # Of steps, which have theirs elsewhere.
         self._beginning[ARGUMENTS.index("attempts")] = 0
@@ -84,41 +83,35 @@ class Episodes(EngineMemory):
             self._check_prescription(wanted)
         count = len(indices)
         self._episodes[indices] += 1
-        ranges = self._ranges_of(wanted) if wanted is not None else self._usual_ranges(indices)
-        settles = ranges is not None
-        if settles:
-            self._ranges[:count] = ranges
+        if wanted is None and self._usual is not None:
+            settles, self._ranges[:count] = True, self._usual[indices]
         else:
-            asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else wanted
-            self._begin_drawn(indices, asked)
+            asked = wanted or [self.wanted[i] for i in indices.tolist()]
+            settles = self._settles(asked)
+            if not settles:
+                self._begin_drawn(indices, asked)
         self._indices[:count] = indices
         self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
         self.kernel.begin(self._begin_address)
-        if settles:
-            if count == self.count:
-                self.pressures[:] = self.numbers("pressure")
-            else:
-                self.pressures[indices] = self._of("pressure", indices)
+        if settles and count == self.count:
+            self.pressures[:] = self.numbers("pressure")
+        elif settles:
+            self.pressures[indices] = self._of("pressure", indices)
 
-    def _ranges_of(self, asked: Sequence[Pressure]) -> list[tuple[float, float]] | None:
-        """Ranges that compiled beginnings draw pressures from (Pa); None if they cannot all."""
+    def _settles(self, asked: Sequence[Pressure]) -> bool:
+        """Write ranges of pressures for compiled beginnings; whether they find a rest in all."""
         lowest, highest = self._settling
-        found = []
-        for one in asked:
+        for row, one in zip(self._ranges, asked, strict=False):
             if isinstance(one, str):
                 low, high = self.task.starts
             elif isinstance(one, Sequence):
-                return None
+                return False
             else:
                 low = high = 1e3 * float(one)
             if not (lowest <= low and high <= highest):
-                return None
-            found.append((low, high))
-        return found
-
-    def _usual_ranges(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
-        """The same of environments that are asked for nothing else than usual."""
-        return None if self._usual is None else self._usual[indices]
+                return False
+            row[0], row[1] = low, high
+        return True
 
     def _slack_range(self) -> tuple[float, float]:
         """Pressures at which compiled beginnings find a rest (Pa), none if the first is larger."""
