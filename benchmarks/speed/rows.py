@@ -228,6 +228,10 @@ def _learning() -> Iterator[Row]:
 
 
 def _once() -> Iterator[Row]:
+    for kind, said in (("warm", "compiled before"), ("cold", "compiled anew")):
+        settings = {"name": DISPLACEMENT, "cold": kind == "cold"}
+        title = f"from the start of Python to the first step, {said}"
+        yield Row(f"start/{kind}", title, "own", "start", settings, unit="times")
     fits = {"candidates": 20, "trials": 60, "seconds": 10.0}
     title = "20 candidate models fitted to 60 trials of 10 s"
     yield Row("fits/own", title, "own", "fits", fits, unit="times", cores=2)

@@ -39,7 +39,8 @@ def views(document: Mapping[str, Any]) -> list[View]:
         _arithmetic(known),
         _tolerances(_of(known, "tolerances")),
         _others(_of(known, "rollouts", "learning", "gpu"), "training", "Training, and the GPU"),
-        _fits(_of(known, "fits")),
+        _times(_of(known, "start"), "start", "The first step"),
+        _times(_of(known, "fits"), "fits", "Fits"),
         _ratios(document["ratios"]),
         _left_out(document["rows"]),
     )
@@ -180,9 +181,9 @@ def _others(rows: Sequence[Row], name: str, title: str) -> View:
     return View(name, title, ["What", "Steps/s", "±"], cells)
 
 
-def _fits(rows: Sequence[Row]) -> View:
+def _times(rows: Sequence[Row], name: str, title: str) -> View:
     cells = [[row["title"], f"{1.0 / row['median']:.3g} s", spread(row)] for row in rows]
-    return View("fits", "Fits", ["What", "Time", "±"], cells)
+    return View(name, title, ["What", "Time", "±"], cells)
 
 
 def _ratios(ratios: Sequence[Row]) -> View:

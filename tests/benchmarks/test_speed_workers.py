@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import typer
 
-from benchmarks.speed import client, install
+from benchmarks.speed import client, install, starts
 from benchmarks.speed.client import Client, StartError, WorkerError
 from benchmarks.speed.loops import Missing, single, vector
 from benchmarks.speed.measure import Measurement, Plan
@@ -157,3 +157,9 @@ def test_two_processes_are_counted_together():
     own = serve_own.PAIRED * 1024
     assert own < made.chunk() < 10 * own
     assert made.facts()["right_hand_sides"] > 0
+
+
+def test_a_start_is_a_process_that_steps_once():
+    assert starts.start("pma_gym/IsokineticDisplacement-v0").chunk() == 1
+    with pytest.raises(RuntimeError, match="no first step: .*NoSuch"):
+        starts.start("pma_gym/NoSuch-v0").chunk()

@@ -21,6 +21,7 @@ from benchmarks.accuracy import (
 )
 from benchmarks.speed.core import core
 from benchmarks.speed.loops import ACTIONS, BATCHES, Missing, Prepared, single, vector
+from benchmarks.speed.starts import start
 from benchmarks.speed.workers import hooks
 from pma_gym.plant.plant import Plant
 
@@ -148,6 +149,7 @@ ROWS = {
     "batch": batch,
     "pair": pair,
     "tolerances": tolerances,
+    "start": start,
     "fits": hooks.joint_fits,
     "gpu": hooks.gpu,
 }
