@@ -11,7 +11,8 @@ ROTATION = "pma_gym/IsokineticRotation-v0"
 COUNTS = tuple(4**power for power in range(10))
 """Numbers of environments: 1 to 262144."""
 
-PAIR_COUNTS = (64, 1024, 16384)
+THREADED, EACH = (64, 1024, 16384), 1024
+"""Sizes of batches that two threads step, and of those that two processes have one each of."""
 """Where two threads, and a voltage that is held, are measured too."""
 
 SYNC_COUNTS = (64, 1024)
@@ -164,13 +165,13 @@ def _batches() -> Iterator[Row]:
     for count in COUNTS:
         one, two = (own | {"count": count, "threads": threads} for threads in (1, 2))
         yield _batch("own", f"{title}, 1 thread", "own", one, step=_OWN)
-        if count in PAIR_COUNTS:
+        if count in THREADED:
             yield _batch("own_two", f"{title}, 2 threads", "own", two, step=_OWN, cores=2)
             held = one | {"held": True}
             yield _batch("own_held", f"{title}, voltage held, 1 thread", "own", held, step=_OWN)
     pair: dict[str, Any] = {"row": "pair", "step": _OWN, "cores": 2}
-    each = own | {"count": 1024}
-    yield _batch("own_pair", f"{title}, 2 processes, so many each", "own", each, **pair)
+    each = own | {"count": EACH}
+    yield _batch("own_pair", f"{title}, 2 processes of so many", "own", each, **pair)
     for toy, step in _STEPS.items():
         told: dict[str, Any] = {"right_hand_sides": 1, "step": step}
         for count in COUNTS:

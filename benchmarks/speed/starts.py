@@ -1,11 +1,11 @@
 """How long it takes from the start of Python to an environment's first step."""
 
-import atexit
 import os
 import shutil
 import subprocess
 import sys
 import tempfile
+import weakref
 from pathlib import Path
 
 from benchmarks.speed.loops import Prepared
@@ -24,21 +24,24 @@ os._exit(0)
 """What a process does; how it would end is not measured."""
 
 
+LONGEST_S = 120.0
+"""How long a process may take (s)."""
+
+
 def start(name: str, cold: bool = False) -> Prepared:
     """New processes that make an environment, reset it and step it once.
 
-    Python keeps what it made of the modules' text from one to the next, as it does of what is
-    installed, even where this process was told not to.
+    Each process finds the bytecode that the one before has kept, even where this process was told
+    to keep none: whoever installs a package finds it too.
 
     Args:
         name: environment.
         cold: whether the kernels are compiled anew each time.
     """
     folder = Path(tempfile.mkdtemp(prefix="pma_gym_"))
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     kernels = folder / "kernels"
     given = os.environ | {
-        "PYTHONPATH": str(ROOT),
+        "PYTHONPATH": os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH")))),
         "PYTHONPYCACHEPREFIX": str(folder / "bytecode"),
         "PMA_GYM_CACHE": str(kernels),
     }
@@ -49,11 +52,18 @@ def start(name: str, cold: bool = False) -> Prepared:
             shutil.rmtree(kernels, ignore_errors=True)
         command = [sys.executable, "-c", FIRST_STEP, name]
         made = subprocess.run(
-            command, cwd=folder, env=given, stdin=subprocess.DEVNULL, stderr=subprocess.PIPE
+            command,
+            cwd=folder,
+            env=given,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=LONGEST_S,
         )
         if made.returncode:
             last = made.stderr.decode(errors="replace").strip().splitlines()[-1:]
             raise RuntimeError(f"no first step: {' '.join(last) or made.returncode}")
         return 1
 
+    weakref.finalize(chunk, shutil.rmtree, folder, ignore_errors=True)
     return Prepared(chunk)

@@ -17,7 +17,6 @@ from pma_gym.kernels.control import (
 )
 from pma_gym.kernels.graph import Value
 from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import simd_lanes
 from pma_gym.kernels.random import philox, uniform
 from pma_gym.kernels.substitute import substitute
 from pma_gym.plant.march import FUSED, memory
@@ -44,14 +43,12 @@ class BeginningWriter(BlockMemory):
         traces: whether a single environment's course is written down.
         begun: what the first sample gives, by name.
         tare: readings at rest.
-        abreast: how many of them are computed at once; a divisor of their number.
     """
 
     def __init__(self, kernel: Plan) -> None:
         super().__init__(kernel)
         self.module = ir.Module()
         self.traces = kernel.width == 1
-        self.abreast = simd_lanes()
 
     def _trace_beginning(self) -> list[Value]:
         """Trace what a beginning computes; returns it, for its part of the table."""
@@ -160,11 +157,15 @@ class BeginningWriter(BlockMemory):
         return found
 
     def _zero_sensors(self, b: Builder, records: Operand, tables: Operand, lane: Operand) -> None:
-        """Read the sensors at rest, some readings at once, and sum them up one after the other."""
+        """Read the sensors at rest, some readings at once.
+
+        They are summed in their order, so that no bit depends on how many these are.
+        """
         readings = TARE_READINGS if self.record.options.noise else 1
-        abreast = self._lanes(self.abreast if readings > 1 else 1)
-        alone = self._known(b, self._lanes(1), self.tare, records, tables, lane)
-        known = {i: abreast.spread(b, number) for i, number in alone.items()}
+        abreast = self._lanes(self.kernel.abreast if readings > 1 else 1)
+        assert readings % abreast.width == 0
+        own = self._known(b, self._lanes(1), self.tare, records, tables, lane)
+        known = {i: abreast.spread(b, number) for i, number in own.items()}
         totals = [memory(b, DOUBLE) for _ in range(2)]
         for total in totals:
             b.store(ir.Constant(DOUBLE, 0.0), total)

@@ -41,12 +41,17 @@ With settles other than 0 a beginning draws pressures, from two numbers each, an
 
 
 class Plan(Protocol):
-    """What a writer needs to know: a `Kernel`, or a kernel for other machines."""
+    """What a writer needs to know: a `Kernel`, or a kernel for other machines.
+
+    Attributes:
+        abreast: how many of the readings that zero the sensors are computed at once.
+    """
 
     program: Program
     record: Record
     observed: ObservationTable
     width: int
+    abreast: int
     single: bool
     draws: bool
 

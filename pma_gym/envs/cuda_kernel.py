@@ -87,7 +87,7 @@ class CudaKernel:
         ranged: bool = True,
     ) -> None:
         self.program, self.record, self.observed = program, record, table
-        self.width, self.single = 1, single
+        self.width, self.abreast, self.single = 1, 1, single
         self.own_tables, self.draws, self.ranged = own_tables, draws, ranged
         self.element: type[np.floating] = np.float32 if single else np.float64
         self.whole: type[np.signedinteger] = np.int32 if single else np.int64

@@ -31,7 +31,7 @@ class ThreadMemory(Writer):
         super().__init__(kernel)
 
     def _prepare(self) -> None:
-        self.traces, self.abreast = False, 1
+        self.traces = False
         self.element = FLOAT if self.kernel.single else DOUBLE
         self.real = "float" if self.kernel.single else "double"
         self._find_places()

@@ -21,6 +21,10 @@ LEAST_BLOCKS = 8
 other."""
 
 
+class ActionError(ValueError):
+    """Actions that no step is made by."""
+
+
 class Engine(Episodes):
     """State of n environments, and what moves it.
 
@@ -91,10 +95,10 @@ class Engine(Episodes):
             0 while no episode ended, else the sum of 1 if any terminated and 2 if any was
             truncated.
         Raises:
-            ValueError: an action that is not finite; nothing has happened then.
+            ActionError: an action that is not finite; nothing has happened then.
         """
         if self.kernel.check(self._address):
-            raise ValueError("action must be finite")
+            raise ActionError("actions must be finite")
         if self._has_idle_lanes:
             self._idle_lanes[:] = 0
         return self._crew.run()
@@ -111,10 +115,9 @@ class Engine(Episodes):
             given: the row of `actions`.
         Returns:
             What takes an action, or `given` with the action in it, and gives observation, reward,
-            False, False and info; or, where the episode ended or an action was not finite, what
-            the kernel returns: 1 if it was terminated, 2 if truncated; or, with nothing done,
-            BAD_ACTION, or NOT_READ for an action that is no array of as many numbers in single or
-            double precision.
+            False, False and info, or 1 where the episode was terminated and 2 where it was
+            truncated. With nothing done it gives BAD_ACTION for an action that is not finite, and
+            NOT_READ for one that is no array of as many numbers in single or double precision.
         """
         keys, known = self.record.info, arrays.are_known()
         bound = {

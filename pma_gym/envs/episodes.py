@@ -47,7 +47,8 @@ class Episodes(EngineMemory):
         # The very same model where nothing is added: its plant is known by that.
         nominal = Plant(rig_model(task, replace(options, model=self.told)))
         self.rest_motor = motor_at_rest(self.told, task)
-        self.wanted = list(pressures) if pressures is not None else [options.pressure_kpa] * count
+        # Never written to: what follows from them is kept.
+        self.wanted = tuple(pressures or [options.pressure_kpa] * count)
         self._possible: set[str] = set()
         self._check_prescription(self.wanted)
         super().__init__(task, options, self.told, nominal, count, single)
@@ -86,7 +87,7 @@ class Episodes(EngineMemory):
         if wanted is None and self._usual is not None:
             settles, self._ranges[:count] = True, self._usual[indices]
         else:
-            asked = wanted or [self.wanted[i] for i in indices.tolist()]
+            asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
             settles = self._settles(asked)
             if not settles:
                 self._begin_drawn(indices, asked)

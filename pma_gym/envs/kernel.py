@@ -5,7 +5,7 @@ import ctypes
 from pma_gym.envs.kernel_writer import Writer
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.record import Record
-from pma_gym.kernels.native import Library, compiled
+from pma_gym.kernels.native import Library, compiled, simd_lanes
 from pma_gym.plant.program import Program, structure
 from pma_gym.plant.settle import hangs_by_itself
 
@@ -34,7 +34,7 @@ class Kernel:
         single: bool = False,
     ) -> None:
         self.program, self.record, self.observed = program, record, table
-        self.width, self.single = width, single
+        self.width, self.abreast, self.single = width, simd_lanes(), single
         task, alone = record.task, record.options.randomisation == "none" and not record.events
         pulls_none = task.actuator == "motor" and task.exercise is None
         self.draws = alone and pulls_none and hangs_by_itself(program.model)
@@ -50,7 +50,8 @@ class Kernel:
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
-            *(options.regulator_action, options.safety, self.width, self.single, self.draws),
+            *(options.regulator_action, options.safety, self.draws),
+            *(self.width, self.abreast, self.single),
             *(record.task.structure, record.events),
         )
         return ["environment", *structure(self.program.model), *map(str, said)]

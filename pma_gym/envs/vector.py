@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pma_gym.envs.advance import TRUTHS
 from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
 from pma_gym.envs.command import CommandLine
-from pma_gym.envs.engine import Engine
+from pma_gym.envs.engine import ActionError, Engine
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import (
     Pressure,
@@ -179,7 +179,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         engine = self.engine
         try:
             ended = engine.step()
-        except ValueError:
+        except ActionError:
             raise self._not_finite() from None
         if waiting is not None:
             ended = self._begin_again(waiting)

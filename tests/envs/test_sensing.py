@@ -104,6 +104,17 @@ def test_zeros_are_tared_at_rest(make, model):
         assert abs(env.reading.rotation) < 2 * calibration.POTENTIOMETER.resolution
 
 
+@pytest.mark.parametrize("lanes", [1, 2, 16])
+def test_zeros_are_the_same_however_many_readings_are_computed_at_once(monkeypatch, make, lanes):
+    records = []
+    for _ in range(2):
+        env = make()
+        env.reset(seed=3)
+        records.append(env._engine.records.copy())
+        monkeypatch.setattr("pma_gym.envs.kernel.simd_lanes", lambda: lanes)
+    np.testing.assert_array_equal(*records)
+
+
 def test_before_history_has_begun_the_first_reading_stands_in(make):
     env = make(history=4, observation_delay_s=0.02)
     observation, _ = env.reset(seed=0)

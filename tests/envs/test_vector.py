@@ -56,6 +56,19 @@ def test_episodes_follow_each_other_as_gymnasium_has_it(twins, fragile, mode, ta
     both.step()
 
 
+@pytest.mark.parametrize("last", [500.0, [500.0]])
+def test_pressures_of_some_episodes_are_for_those_alone(last):
+    made = {"model": "serres2008", "control_rate_hz": 10.0}
+    envs = PMAVectorEnv(3, pressures_kpa=[200.0, 300.0, last], **made)
+    for options, wanted in (
+        ({"pressure_kpa": 444.0}, [444.0] * 3),
+        ({"pressures_kpa": [250.0, [350.0], 450.0]}, [250.0, 350.0, 450.0]),
+        ({}, [200.0, 300.0, 500.0]),
+    ):
+        envs.reset(seed=1, options=options)
+        assert envs.station_info()["pressure_kpa"] == pytest.approx(wanted)
+
+
 def test_without_autoreset_a_mask_says_who_begins_anew(twins, fragile):
     both = twins(17, autoreset_mode="Disabled", model=fragile, randomisation="varied")
     both.reset(seed=2)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAVectorEnv
+from pma_gym.envs.engine import ActionError
 
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
 
@@ -85,6 +86,21 @@ def test_a_bad_action_of_one_threads_share_changes_no_other(batch):
     actions[50] = np.nan
     with pytest.raises(ValueError, match="environment 50 got"):
         envs.step(actions)
+    assert state(envs) == before
+
+
+@pytest.mark.parametrize("options", [{"regulator_action": True}, {"precision": "single"}])
+def test_every_entry_of_an_action_is_looked_at(batch, options):
+    envs = batch(5, **options)
+    envs.reset(seed=0)
+    before = state(envs)
+    actions = np.zeros(envs.action_space.shape)
+    actions[4, -1] = np.inf
+    with pytest.raises(ValueError, match="environment 4 got"):
+        envs.step(actions)
+    envs.engine.actions[4, -1] = np.nan
+    with pytest.raises(ActionError, match="finite"):
+        envs.engine.step()
     assert state(envs) == before
 
 

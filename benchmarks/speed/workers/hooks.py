@@ -52,7 +52,10 @@ def single_kernel(name: str) -> Prepared:
     environment: Any = gym.make(name).unwrapped
     environment.reset(seed=0)
     engine: Engine = environment._engine
-    run = engine.kernel.library.function("step", [ctypes.c_void_p], ctypes.c_int64)
+    functions = engine.kernel.library
+    check, run = (
+        functions.function(name, [ctypes.c_void_p], ctypes.c_int64) for name in ("check", "step")
+    )
     arguments = engine._address
     entry = memoryview(engine.actions[0])
     actions = np.random.default_rng(0).uniform(-1.0, 1.0, ACTIONS).tolist()
@@ -60,7 +63,7 @@ def single_kernel(name: str) -> Prepared:
     def chunk() -> int:
         for action in actions:
             entry[0] = action
-            if run(arguments):
+            if check(arguments) or run(arguments):
                 environment.reset()
         return len(actions)
 

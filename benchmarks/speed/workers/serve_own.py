@@ -1,9 +1,10 @@
-"""This package: single environments, batches, its integrator's steps, fits, the GPU.
+"""This package: single environments, batches, its integrator's steps, starts, fits, the GPU.
 
 What differs between versions of the package is in `hooks`.
 """
 
 import multiprocessing
+from contextlib import suppress
 from functools import cache
 from multiprocessing.connection import Connection
 from typing import Any
@@ -71,21 +72,25 @@ def batch(name: str, count: int, threads: int, held: bool = False) -> Prepared:
 def pair(name: str, count: int) -> Prepared:
     """As many environments in each of two processes, which share nothing but the machine.
 
-    Of two threads no more can be asked for than that.
+    Of two threads no more than about that can be asked for.
     """
     context = multiprocessing.get_context("spawn")
     here, there = context.Pipe()
-    context.Process(target=_beside, args=(there, name, count), daemon=True).start()
+    other = context.Process(target=_beside, args=(there, name, count), daemon=True)
+    other.start()
     # Whoever waits for a process that has ended is told so.
     there.close()
     own = batch(name, count, 1)
-    here.recv()
 
     def chunk() -> int:
-        here.send("go")
-        steps = sum(own.chunk() for _ in range(PAIRED))
-        here.send("stop")
-        return steps + here.recv()
+        try:
+            here.send("go")
+            steps = sum(own.chunk() for _ in range(PAIRED))
+            here.send("stop")
+            return steps + here.recv()
+        except (EOFError, OSError):
+            other.join()
+            raise RuntimeError("the other process has ended") from None
 
     return Prepared(chunk, own.facts)
 
@@ -97,16 +102,13 @@ PAIRED = 64
 def _beside(told: Connection, name: str, count: int) -> None:
     """The other process: steps while it is told to, and says how many it made."""
     own = batch(name, count, 1)
-    told.send("ready")
-    try:
+    with suppress(EOFError, OSError):
         while told.recv():
             steps = 0
             while not told.poll():
                 steps += own.chunk()
             told.recv()
             told.send(steps)
-    except EOFError:
-        return
 
 
 def tolerances(model: str, millionths: int) -> Prepared:
