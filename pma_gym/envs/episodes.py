@@ -48,7 +48,8 @@ class Episodes(EngineMemory):
         nominal = Plant(rig_model(task, replace(options, model=self.told)))
         self.rest_motor = motor_at_rest(self.told, task)
         # Never written to: what follows from them is kept.
-        self.wanted = tuple(pressures or [options.pressure_kpa] * count)
+        usual = [options.pressure_kpa] * count if pressures is None else pressures
+        self.wanted = tuple(usual)
         self._possible: set[str] = set()
         self._check_prescription(self.wanted)
         super().__init__(task, options, self.told, nominal, count, single)
@@ -90,7 +91,12 @@ class Episodes(EngineMemory):
             asked = [self.wanted[i] for i in indices.tolist()] if wanted is None else list(wanted)
             settles = self._settles(asked)
             if not settles:
-                self._begin_drawn(indices, asked)
+                try:
+                    self._begin_drawn(indices, asked)
+                except BaseException:
+                    # The next one that can begin is this one.
+                    self._episodes[indices] -= 1
+                    raise
         self._indices[:count] = indices
         self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
         self.kernel.begin(self._begin_address)

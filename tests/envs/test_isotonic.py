@@ -215,6 +215,11 @@ def test_a_load_that_nothing_balances_is_refused():
     env = PMAEnv(isotonic(load=900.0), model=short, pressure_kpa=150.0)
     with pytest.raises(ValueError, match="balances the load .* at 150 kPa; give a higher"):
         env.reset(seed=0)
+    # Nothing of the seed is lost: the episode that could not begin was none.
+    whole = PMAEnv(isotonic(load=900.0), model=short, pressure_kpa=550.0)
+    possible = {"options": {"pressure_kpa": 550.0}}
+    np.testing.assert_array_equal(env.reset(**possible)[0], whole.reset(seed=0)[0])
+    np.testing.assert_array_equal(env.reset(**possible)[0], whole.reset()[0])
 
 
 def test_a_station_that_pulls_is_told_positions_as_before(make):
