@@ -175,14 +175,13 @@ def _signs(eq: Equations, frozen: Mapping[int, Value]) -> dict[int, Value]:
     """What laws ask of the sign of the slide's velocity, by its direction in the step.
 
     No step goes on beyond where the slide turns, but one may begin before, where it has as good as
-    turned. A damping that differs by direction, or the fall of friction with speed, is then that of
-    the way which the step goes.
+    turned. A damping that differs by direction is then that of the way which the step goes.
     """
     if eq.travelled is None:
         return {}
     speed, direction = eq.travelled[1], frozen[eq["direction"].id]
     found = {}
-    for value in order([entry.rate for entry in (*eq.states, *eq.bends)]):
+    for value in order([state.rate for state in eq.states]):
         if value.operation not in ("less", "less_equal"):
             continue
         left, right = value.operands

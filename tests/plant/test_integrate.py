@@ -63,43 +63,22 @@ def test_a_random_policy_against_scipy(model):
         assert found.get(name, 0.0) < 1e-5
 
 
-def turning(model, velocity, behind=0.0, pressure=350e3):
-    """A plant in plain Python, a state where its slide has as good as turned, and commands."""
-    plant = Plant(model)
-    rest = plant.settle(2.0, pressure)
-    state = rest.state.copy()
-    state[plant.states.index("velocity")] = velocity
-    state[plant.states.index("contraction")] -= behind
-    return PlainPlant(plant), state, rest.zero_contraction, plant.regulator_voltage(pressure)
-
-
 @pytest.mark.parametrize("pressure", [200e3, 350e3, 550e3])
 def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
     # serres2008 damps a muscle that shortens 1.8 times as much as one that is pulled, which this
     # one is in a moment: it still shortens by 0.1 um/s.
-    plain, state, zero, regulator = turning("serres2008", 1e-7, pressure=pressure)
-    made = plain.attempt(state, (3.0, regulator), zero, 5e-4, 1e-3)
+    plant = Plant("serres2008")
+    rest, at = plant.settle(2.0, pressure), plant.states.index("velocity")
+    told, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
+    rest.state[at] = 1e-7
+    made = PlainPlant(plant).attempt(rest.state, told, zero, 5e-4, 1e-3)
     assert made.taken
 
     def rate(_, state):
-        return plain.plant.derivative(state, 3.0, regulator, zero)
+        return plant.derivative(state, *told, zero)
 
-    kinks = switches(plain.plant, zero)
-    truth = integrated(rate, state, made.length, kinks)
-    at = plain.plant.states.index("velocity")
+    truth = integrated(rate, rest.state, made.length, switches(plant, zero))
     assert made.state[at] == pytest.approx(truth[at], rel=1e-4) and truth[at] < -5e-5
-
-
-@pytest.mark.parametrize("model", ["serres2008", "station"])
-def test_a_step_that_begins_at_a_turn_ends_where_friction_has_fallen_from_either_side(model):
-    # 50 um short of its rest the slide speeds up by 60 m/s^2: 15 mm/s, three Stribeck speeds.
-    lengths = []
-    for velocity in (-1e-7, 1e-7):
-        plain, state, zero, regulator = turning(model, velocity, behind=5e-5)
-        made = plain.attempt(state, (2.0, regulator), zero, 1e-3, 1e-2)
-        assert made.taken
-        lengths.append(made.length)
-    assert lengths[0] == pytest.approx(lengths[1], rel=1e-3) and lengths[0] < 3e-4
 
 
 def test_a_random_policy_takes_few_attempts():
