@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import linregress
@@ -95,10 +95,14 @@ def test_times_of_the_tables_have_the_rate_of_the_grid():
     assert mean_time == pytest.approx(times.mean() - 1 / 384, abs=1e-4)
 
 
-@given(st.lists(finite, min_size=3, max_size=40), finite, finite)
-def test_regression_agrees_with_scipy(values, slope, intercept):
+@given(st.lists(finite, min_size=3, max_size=40))
+@example([0.0, 0.0, 1.6e-161])
+def test_regression_agrees_with_scipy(values):
     time = np.arange(len(values)) / 7
-    line, expected = regression(time, values), linregress(time, values)
+    line = regression(time, values)
+    # Its correlation, which is not compared, divides by squares that may be too small for a number.
+    with np.errstate(divide="ignore", invalid="ignore"):
+        expected = linregress(time, values)
     scale = 1 + np.abs(values).max()
     assert_allclose(line.slope, expected.slope, rtol=1e-9, atol=1e-9 * scale)
     assert_allclose(line.intercept, expected.intercept, rtol=1e-9, atol=1e-9 * scale)
