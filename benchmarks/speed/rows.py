@@ -12,8 +12,8 @@ COUNTS = tuple(4**power for power in range(10))
 """Numbers of environments: 1 to 262144."""
 
 THREADED, EACH = (64, 1024, 16384), 1024
-"""Sizes of batches that two threads step, and of those that two processes have one each of."""
-"""Where two threads, and a voltage that is held, are measured too."""
+"""Sizes of the batches that are stepped by two threads, and at one voltage, too; and of those that
+two processes have one each of."""
 
 SYNC_COUNTS = (64, 1024)
 """The same for copies in a Python loop, which are no cheaper by the dozen."""
