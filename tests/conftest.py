@@ -12,6 +12,8 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
-# No deadline: the first example of a test may compile a kernel.
-settings.register_profile("pma_gym", deadline=None, derandomize="CI" in os.environ)
+# No deadline: the first example of a test may compile a kernel. A run of the suite draws the same
+# examples as any other; `pytest --hypothesis-profile search` draws new ones.
+settings.register_profile("search", deadline=None)
+settings.register_profile("pma_gym", deadline=None, derandomize=True)
 settings.load_profile("pma_gym")

@@ -60,10 +60,11 @@ def test_what_is_written_is_read_back(suffix, trial):
         once = quantities(read_trial(path))
         assert set(once) == set(quantities(trial))
         for name, values in quantities(trial).items():
-            # Through mm, kPa, deg (and 16 digits in XLSX) a double may become a neighbour...
+            # Through mm, kPa, deg a double may become a neighbour (in XLSX, whose 16 digits are off
+            # by 5e-16 at most, where 2**-53 may be a double's spacing, the fifth or sixth)...
             assert_array_equal(np.isnan(once[name]), np.isnan(values))
             gap = np.abs(once[name] - values) / np.spacing(np.abs(values))
-            assert np.nanmax(gap, initial=0.0) <= (4 if suffix == ".xlsx" else 1)
+            assert np.nanmax(gap, initial=0.0) <= (6 if suffix == ".xlsx" else 1)
         write_trial(read_trial(path), path)
         for name, values in quantities(read_trial(path)).items():
             # ...and then stays what it is, where all 17 digits are kept.
