@@ -9,9 +9,13 @@ as much, and what is linear is left to the products of matrices:
 
 so that h is nowhere computed. Its derivative 1 - h^2 is 4 s (1 - s). The derivatives of all of a
 network's layers come from one node of PyTorch's graph.
+
+What hidden layers pass on is written where that of an earlier minibatch stood: memory that is fresh
+from the system costs more to touch first than a layer's arithmetic.
 """
 
 import math
+from collections import deque
 from collections.abc import Sequence
 from itertools import chain
 from typing import Any
@@ -45,6 +49,10 @@ class LeanMlpPolicy(ActorCriticPolicy):
         >>> model = PPO(LeanMlpPolicy, envs, n_steps=64, batch_size=1024, device="cpu")
         >>> _ = model.learn(4096)
     """
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:  # noqa: ANN401 - the base class's
+        super().__init__(*args, **kwargs)
+        self._spares = _Spares()
 
     def forward(self, obs: Tensor, deterministic: bool = False) -> tuple[Tensor, Tensor, Tensor]:
         """Actions, values and logarithms of the actions' likelihoods; see `ActorCriticPolicy`."""
@@ -85,11 +93,11 @@ class LeanMlpPolicy(ActorCriticPolicy):
         features = self.extract_features(obs)
         of_actor, of_critic = features if isinstance(features, tuple) else (features, features)
         actor, critic = self._networks()
-        mean = _network(of_actor, actor)
+        mean = _network(of_actor, actor, self._spares)
         if (mean + self.log_std).isnan().any():
             # It says what is wrong with them.
             self.action_dist.proba_distribution(mean, self.log_std)
-        return mean, _network(of_critic, critic)
+        return mean, _network(of_critic, critic, self._spares)
 
     def _log_likelihood(self, actions: Tensor, mean: Tensor) -> Tensor:
         """Of the normal distribution, summed over an action's entries; shape (rows,)."""
@@ -108,31 +116,84 @@ def _is_plain(modules: Sequence[nn.Module]) -> bool:
     )
 
 
-def _network(x: Tensor, modules: Sequence[nn.Module]) -> Tensor:
+def _network(x: Tensor, modules: Sequence[nn.Module], spares: "_Spares") -> Tensor:
     """What Linear layers with tanh between them say, the last without."""
     layers: Any = [(layer.weight, layer.bias) for layer in modules[::2]]
     if torch.is_grad_enabled():
-        return _Network.apply(x, *chain.from_iterable(layers))
-    return _passed(x, layers)[-1]
+        return _Network.apply(spares, x, *chain.from_iterable(layers))
+    return _passed(x, layers, [None] * len(layers))[-1]
 
 
-def _passed(x: Tensor, layers: Sequence[tuple[Tensor, Tensor]]) -> list[Tensor]:
-    """What every hidden layer passes on, its s, and y."""
+def _passed(
+    x: Tensor, layers: Sequence[tuple[Tensor, Tensor]], out: Sequence[Tensor | None]
+) -> list[Tensor]:
+    """What every hidden layer passes on, its s, and y; written to `out` where that is given."""
     (weight, bias), *between, (last, last_bias) = layers
-    passed = [torch.addmm(bias, x, weight.t(), beta=2, alpha=2).sigmoid_()]
-    for weight, bias in between:
+    first = torch.addmm(bias, x, weight.t(), beta=2, alpha=2, out=out[0])
+    passed = [first.sigmoid_()]
+    for (weight, bias), where in zip(between, out[1:], strict=False):
         shifted = bias - weight.sum(1)
-        passed.append(torch.addmm(shifted, passed[-1], weight.t(), beta=2, alpha=4).sigmoid_())
+        s = torch.addmm(shifted, passed[-1], weight.t(), beta=2, alpha=4, out=where)
+        passed.append(s.sigmoid_())
     passed.append(torch.addmm(last_bias - last.sum(1), passed[-1], last.t(), alpha=2))
     return passed
 
 
+class _Spares:
+    """Matrices that nobody needs any more, to be written anew.
+
+    PyTorch gives a minibatch's memory back to the system and gets it anew for the next: thousands
+    of pages a second, each of which the system clears when it is first touched.
+    """
+
+    def __init__(self) -> None:
+        self._spare: deque[Tensor] = deque(maxlen=MOST_SPARES)
+
+    def take(self, rows: int, columns: int, like: Tensor) -> Tensor:
+        """A matrix of any contents, of the type of another."""
+        for _ in range(len(self._spare)):
+            try:
+                found = self._spare.popleft()
+            except IndexError:  # another thread took it
+                break
+            if found.shape == (rows, columns) and found.dtype is like.dtype:
+                return found
+            self._spare.append(found)
+        return like.new_empty((rows, columns))
+
+    def give(self, *matrices: Tensor) -> None:
+        """Matrices that nobody else holds; the oldest are let go of where there are many."""
+        self._spare.extend(matrices)
+
+    def __reduce__(self) -> tuple[type["_Spares"], tuple[()]]:
+        # A copy begins with none.
+        return _Spares, ()
+
+
+MOST_SPARES = 16
+"""Matrices that a policy keeps: those of two minibatches, for an old one's graph is forgotten when
+the next has been made, and of the derivatives, for two networks of two hidden layers."""
+
+
+class _Lent:
+    """Matrices that are spare again when the graph that holds this is forgotten."""
+
+    def __init__(self, spares: _Spares, matrices: Sequence[Tensor]) -> None:
+        self.spares, self.matrices = spares, matrices
+
+    def __del__(self) -> None:
+        self.spares.give(*self.matrices)
+
+
 class _Network(torch.autograd.Function):
     @staticmethod
-    def forward(ctx: Any, x: Tensor, *parameters: Tensor) -> Tensor:  # noqa: ANN401
-        weights = parameters[::2]
-        *hidden, y = _passed(x, list(zip(weights, parameters[1::2], strict=True)))
-        ctx.save_for_backward(*weights, x, *hidden)
+    def forward(ctx: Any, spares: _Spares, x: Tensor, *parameters: Tensor) -> Tensor:  # noqa: ANN401
+        layers = list(zip(parameters[::2], parameters[1::2], strict=True))
+        out = [spares.take(len(x), len(weight), x) for weight, _ in layers[:-1]]
+        *hidden, y = _passed(x, layers, [*out, None])
+        # Not saved as the others are: PyTorch would let go of them, and could not say when.
+        ctx.lent = _Lent(spares, hidden)
+        ctx.save_for_backward(x, *parameters[::2])
         return y
 
     @staticmethod
@@ -141,17 +202,20 @@ class _Network(torch.autograd.Function):
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> tuple[Tensor | None, ...]:
-        (gradient,), saved = grad_outputs, ctx.saved_tensors
-        weights, (x, *hidden) = saved[: len(saved) // 2], saved[len(saved) // 2 :]
+        (gradient,), (x, *weights) = grad_outputs, ctx.saved_tensors
+        spares, hidden = ctx.lent.spares, ctx.lent.matrices
         gradients: list[Tensor] = []
+        used = []
         for weight, s in zip(weights[:0:-1], hidden[::-1], strict=True):
             of_bias = gradient.sum(0)
             # By h = 2 s - 1.
             of_weight = torch.addmm(of_bias[:, None], gradient.t(), s, beta=-1, alpha=2)
             gradients += of_bias, of_weight
-            gradient = gradient.mm(4.0 * weight)
+            used.append(spares.take(*s.shape, s))
+            gradient = torch.mm(gradient, 4.0 * weight, out=used[-1])
             torch.ops.aten.sigmoid_backward.grad_input(gradient, s, grad_input=gradient)
         # So, and not the other way round: few columns on the left are four times as fast.
         gradients += gradient.sum(0), x.t().mm(gradient).t()
-        of_x = gradient.mm(weights[0]) if ctx.needs_input_grad[0] else None
-        return of_x, *gradients[::-1]
+        of_x = gradient.mm(weights[0]) if ctx.needs_input_grad[1] else None
+        spares.give(*used)
+        return None, of_x, *gradients[::-1]

@@ -1,5 +1,7 @@
 """The lean policy is Stable-Baselines3's own, up to rounding."""
 
+import copy
+
 import numpy as np
 import pytest
 
@@ -13,7 +15,7 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 from pma_gym.envs.sb3 import SB3VecEnv
-from pma_gym.envs.sb3_policy import LeanMlpPolicy, _network
+from pma_gym.envs.sb3_policy import MOST_SPARES, LeanMlpPolicy, _network, _Spares
 
 SEEN = spaces.Box(-5.0, 5.0, (7,), np.float32)
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
@@ -167,12 +169,12 @@ def test_its_network_is_the_layers_in_double_precision(sizes):
     net = nn.Sequential(*modules[:-1])
     seen = torch.randn((11, sizes[0]), dtype=torch.float64, requires_grad=True)
     np.testing.assert_allclose(
-        _network(seen, net).detach(), net(seen).detach(), rtol=1e-13, atol=1e-14
+        _network(seen, net, _Spares()).detach(), net(seen).detach(), rtol=1e-13, atol=1e-14
     )
     parameters = [seen, *net.parameters()]
 
     def changed(*_):
-        return _network(seen, net)
+        return _network(seen, net, _Spares())
 
     assert torch.autograd.gradcheck(changed, parameters)
 
@@ -183,7 +185,7 @@ def test_far_values_are_those_of_tanh():
     with torch.no_grad():
         for layer in (one, two):
             layer.weight[:], layer.bias[:] = 1.0, 0.0
-        values = _network(far, [one, nn.Tanh(), two]).flatten()
+        values = _network(far, [one, nn.Tanh(), two], _Spares()).flatten()
     np.testing.assert_array_equal(values, [-1.0, -1.0, 0.0, 1.0, 1.0, np.nan])
 
 
@@ -216,3 +218,54 @@ def test_a_training_ends_where_theirs_does_after_a_few_steps():
         ended.append(list(model.learn(256).policy.parameters()))
     for its, mine in zip(*ended, strict=True):
         np.testing.assert_allclose(mine.detach(), its.detach(), atol=1e-4)
+
+
+def learned(policy, rows, seed, times=1):
+    """Derivatives of a loss of drawn observations, whose graph is gone through a few times."""
+    generator = torch.Generator().manual_seed(seed)
+    seen = torch.randn((rows, 7), generator=generator)
+    values, likelihood, _ = policy.evaluate_actions(seen, torch.ones(rows, 1))
+    loss = likelihood.mean() + values.square().mean()
+
+    def derivatives():
+        policy.zero_grad()
+        for _ in range(times):
+            loss.backward(retain_graph=True)
+        return [parameter.grad.clone() for parameter in policy.parameters()]
+
+    return derivatives
+
+
+@pytest.mark.parametrize("times", [1, 2])
+def test_minibatches_whose_graphs_live_together_have_memory_of_their_own(times):
+    for policy in pair():
+        expected = [learned(policy, 50, seed, times)() for seed in (1, 2)]
+        waiting = [learned(policy, 50, seed, times) for seed in (1, 2)]
+        for found, own in zip(waiting, expected, strict=True):
+            for one, other in zip(found(), own, strict=True):
+                assert torch.equal(one, other)
+
+
+def test_what_a_minibatch_was_written_to_serves_the_next():
+    _, policy = pair()
+
+    def pieces():
+        return sorted(matrix.data_ptr() for matrix in policy._spares._spare)
+
+    learned(policy, 50, 1)()
+    first = pieces()
+    # Two networks' two hidden layers, and two of the derivatives.
+    assert len(first) == 6
+    for seed in range(2, 6):
+        learned(policy, 50, seed)()
+        assert pieces() == first
+
+
+def test_it_keeps_few_matrices_whatever_the_sizes_and_a_copy_none():
+    theirs, policy = pair()
+    for rows in range(20, 40):
+        expected = learned(theirs, rows, rows)()
+        for one, other in zip(learned(policy, rows, rows)(), expected, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5)
+    assert len(policy._spares._spare) == MOST_SPARES
+    assert len(copy.deepcopy(policy)._spares._spare) == 0
