@@ -1,6 +1,7 @@
 """Compiles LLVM modules for the processor at hand, keeps the result on disk, and calls it."""
 
 import ctypes
+import gc
 import itertools
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -18,10 +19,13 @@ if TYPE_CHECKING:
 
 _OPTIMISATION = 3
 
-_BRIEF = ("sroa", "instruction_combine", "simplify_cfg")
-"""LLVM's passes where compiling takes longer than what is compiled. They take 0.3 s less than all
-for a plant's trials, which then run in 0.98 of the time in lanes and in 1.01 to 1.05 alone (EPYC,
-Zen 3, interleaved)."""
+_PASSES = ("sroa", "new_gvn", "instruction_combine", "simplify_cfg")
+"""LLVM's passes. What is to be compiled is straight arithmetic, with vectors, constants and choices
+as they should be: all passes take 0.25 s more for an environment and gain nothing (0.98 to 1.02 of
+the time of a step in a batch and alone; EPYC, Zen 3, interleaved)."""
+
+_BRIEF = tuple(name for name in _PASSES if name != "new_gvn")
+"""Passes where compiling takes longer than what is compiled."""
 
 _libraries: dict[str, "Library"] = {}
 _numbers = itertools.count()
@@ -119,13 +123,30 @@ def compiled(
             as the names of a model's effects.
         build: makes the module; only called if the library is not kept.
         name: name in messages.
-        brief: compile it with few passes, in about half the time.
+        brief: compile it with the fewest passes: in 0.9 of the time, for code that takes up to
+            1.03 of it.
     """
     key = digest((source_digest(), *_machine_key(), str(brief), *key_parts))
     if key not in _libraries:
-        code, was_kept = _kept(key, lambda: object_code(str(build()), brief))
+        code, was_kept = _kept(key, lambda: _made(build, brief))
         _libraries[key] = Library.from_object(code, name, was_kept)
     return _libraries[key]
+
+
+def _made(build: "Callable[[], ir.Module | str]", brief: bool) -> bytes:
+    """Machine code of what `build` makes.
+
+    Python does not look for garbage meanwhile: a module is so many objects that it would look over
+    and over, also through all that others have loaded. With PyTorch and Matplotlib there that takes
+    a sixth of the time.
+    """
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        return object_code(str(build()), brief)
+    finally:
+        if collects:
+            gc.enable()
 
 
 def _kept(key: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
@@ -138,36 +159,37 @@ def _kept(key: str, make: Callable[[], bytes]) -> tuple[bytes, bool]:
 
 
 def object_code(text: str, brief: bool = False) -> bytes:
-    """Machine code of a module's text, made with all passes or with few."""
-    return _machine().emit_object(_optimised(text, brief))
+    """Machine code of a module's text; brief: made with the fewest passes."""
+    return _machine().emit_object(_optimised(text, _BRIEF if brief else _PASSES))
 
 
 def assembly(text: str) -> str:
     """Assembly of a module's text, to be read."""
-    return _machine().emit_assembly(_optimised(text))
+    return _machine().emit_assembly(_optimised(text, _PASSES))
 
 
-def _optimised(text: str, brief: bool = False) -> llvm.ModuleRef:
+def _optimised(text: str, passes: Sequence[str]) -> llvm.ModuleRef:
     module = llvm.parse_assembly(text)
     module.verify()
-    return optimise(module, _machine(), brief)
+    return optimise(module, _machine(), passes)
 
 
 def optimise(
-    module: llvm.ModuleRef, machine: llvm.TargetMachine, brief: bool = False
+    module: llvm.ModuleRef, machine: llvm.TargetMachine, passes: Sequence[str] | None = None
 ) -> llvm.ModuleRef:
-    """The module after LLVM's passes, all or few, which keep every bit of its results."""
+    """The module after LLVM's passes, these or all, which keep every bit of its results."""
     options = llvm.create_pipeline_tuning_options(speed_level=_OPTIMISATION)
     # The vectors are in the text already.
     options.loop_vectorization = False
     options.slp_vectorization = False
     builder = llvm.create_pass_builder(machine, options)
-    passes = builder.getModulePassManager()
-    if brief:
-        passes = llvm.create_new_module_pass_manager()
-        for name in _BRIEF:
-            getattr(passes, f"add_{name}_pass")()
-    passes.run(module, builder)
+    if passes is None:
+        manager = builder.getModulePassManager()
+    else:
+        manager = llvm.create_new_module_pass_manager()
+        for name in passes:
+            getattr(manager, f"add_{name}_pass")()
+    manager.run(module, builder)
     return module
 
 

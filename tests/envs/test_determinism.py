@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAEnv
+from pma_gym.kernels import native
 from pma_gym.plant.model import Model, Note, load_model
 from pma_gym.plant.statics import muscle_force
 from pma_gym.tasks import CORNERS, FORCE_TOLERANCE
@@ -52,6 +53,15 @@ def test_same_seed_same_bits_in_another_process():
         for _ in range(2)
     }
     assert len(runs) == 1
+
+
+def test_all_passes_of_the_compiler_give_the_bits_of_few(make, monkeypatch, tmp_path):
+    few = bits(make(randomisation="intervals", preview=1), 7)
+    monkeypatch.setenv("PMA_GYM_CACHE", str(tmp_path))
+    monkeypatch.setattr(native, "_libraries", {})
+    monkeypatch.setattr(native, "_PASSES", None)
+    assert bits(make(randomisation="intervals", preview=1), 7) == few
+    assert list(tmp_path.rglob("*.o"))
 
 
 def test_without_noise_the_seed_does_not_matter(make):

@@ -1,6 +1,7 @@
 """Compiled libraries: calls, and what is kept on disk and found again."""
 
 import ctypes
+import gc
 import os
 import subprocess
 import sys
@@ -58,6 +59,28 @@ def test_what_is_kept_is_not_built_again(folder, monkeypatch):
     # Where one part ends matters.
     compiled(["mode", "lb"], build)
     assert built == [1] * 3
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_collected_after_compiling_as_before(folder, collects):
+    seen = []
+
+    def build():
+        seen.append(gc.isenabled())
+        return text(factor=float(len(seen)))
+
+    def broken():
+        raise ValueError
+
+    (gc.enable if collects else gc.disable)()
+    try:
+        compiled(["collects", str(collects)], build)
+        assert seen == [False] and gc.isenabled() == collects
+        with pytest.raises(ValueError):
+            compiled(["broken", str(collects)], broken)
+        assert gc.isenabled() == collects
+    finally:
+        gc.enable()
 
 
 @pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "other"])

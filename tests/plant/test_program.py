@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from pma_gym.kernels import native
 from pma_gym.kernels.native import Library, compiled, simd_lanes
 from pma_gym.plant import program as program_module
 from pma_gym.plant.model import load_model
@@ -52,10 +53,11 @@ def test_many_trials_at_once_have_the_bits_of_each_alone(count, threads):
 
 def test_few_passes_of_the_compiler_give_the_bits_of_all(monkeypatch):
     def thorough(key, build, name, brief):
-        return Library(build(), name)
+        return Library.from_object(native.object_code(str(build())), name)
 
     brief = Plant("station").program
     monkeypatch.setattr(program_module, "compiled", thorough)
+    monkeypatch.setattr(native, "_PASSES", None)
     full = program_module.Program(brief.model)
     for count in (2, 9):
         runs, others = trials(count), trials(count)
