@@ -1,8 +1,8 @@
 """Rounds over all rows: each round measures every row once, in another order.
 
 So a slow minute of the machine falls on all rows alike, and a ratio of two rows is taken within a
-round. One worker works at a time; the others wait for their input. Rows of `ANEW` are measured in a
-new process each round.
+round, in which they are measured one soon after the other. One worker works at a time; the others
+wait for their input. Rows of `ANEW` are measured in a new process each round.
 """
 
 import os
@@ -114,6 +114,8 @@ class Measurement:
         rows: what to measure.
         plan: for how long.
         clients: gives a peer's worker, or None if it is not installed.
+        together: keys of rows that are measured one after the other, in groups; the others come
+            anywhere.
 
     Attributes:
         rows: what was measured, by the row's key.
@@ -126,8 +128,12 @@ class Measurement:
         rows: Sequence[Row],
         plan: Plan,
         clients: Callable[[Peer], Asked | None] | None = None,
+        together: Sequence[Sequence[str]] = (),
     ) -> None:
         self.rows = {row.key: Measured(row) for row in rows}
+        grouped = {key for group in together for key in group}
+        alone = [[key] for key in self.rows if key not in grouped]
+        self._groups = [[self.rows[key] for key in group] for group in [*together, *alone]]
         self.plan = plan
         self.versions: dict[str, dict[str, str]] = {}
         self.complete = False
@@ -147,7 +153,8 @@ class Measurement:
             for number in range(self.plan.rounds):
                 if number:
                     self._end(anew=True)
-                shuffled = order.sample(list(self.rows.values()), len(self.rows))
+                groups = order.sample(self._groups, len(self._groups))
+                shuffled = [one for group in groups for one in order.sample(group, len(group))]
                 self._each(shuffled, lambda one, n=number: self._measure(one, n), on_done)
             self.complete = True
         finally:

@@ -202,3 +202,20 @@ def wanted_rows(targets: Sequence[Target], keys: Sequence[str]) -> list[str]:
     """Keys of the rows that some targets compare."""
     patterns = [p for target in targets for p in (*target.own, *target.others)]
     return [key for key in keys if any(matches(key, pattern) for pattern in patterns)]
+
+
+def neighbours(targets: Sequence[Target], keys: Sequence[str]) -> list[list[str]]:
+    """Groups of rows whose steps targets compare, directly or through others.
+
+    A shared machine's speed changes by half within a minute, and a ratio of rates says something
+    where both were measured before it did. Right-hand sides are compared with the best at any
+    number of environments, which are too many to be measured in one breath.
+    """
+    groups: list[set[str]] = []
+    for target in targets:
+        meant = set(wanted_rows([target], keys))
+        if target.quantity == "steps" and target.others and meant:
+            beside = [group for group in groups if group & meant]
+            groups = [group for group in groups if not group & meant]
+            groups.append(meant.union(*beside))
+    return [[key for key in keys if key in group] for group in groups]

@@ -14,7 +14,15 @@ from rich.table import Table
 from benchmarks.files import write_text
 from benchmarks.speed.document import Document, document, started
 from benchmarks.speed.measure import QUICK, Measurement, Plan
-from benchmarks.speed.ratios import CHECKS, TARGETS, Target, Verdict, judge_all, wanted_rows
+from benchmarks.speed.ratios import (
+    CHECKS,
+    TARGETS,
+    Target,
+    Verdict,
+    judge_all,
+    neighbours,
+    wanted_rows,
+)
 from benchmarks.speed.rows import RequestError, Row, all_rows, select
 from benchmarks.speed.views import View, rate, views
 from pma_gym.files import OutputError, check_output
@@ -53,9 +61,9 @@ def run_speed(
     if quick:
         console.print("A smoke run: it shows that all works, its figures say little.")
     targets = CHECKS if check else TARGETS
-    measurement = Measurement(
-        chosen_rows(targets if check else (), only), QUICK if quick else Plan()
-    )
+    rows = chosen_rows(targets if check else (), only)
+    together = neighbours(targets, [row.key for row in rows])
+    measurement = Measurement(rows, QUICK if quick else Plan(), together=together)
     info, begin = started(), time.perf_counter()
     try:
         _measure(measurement, console)

@@ -68,6 +68,25 @@ def test_every_round_measures_every_row_once_in_another_order():
     assert orders[0] == orders[1]
 
 
+def test_rows_that_belong_together_are_measured_one_after_the_other():
+    rows = [Row(f"single/{name}", name, "own", "one") for name in "abcdefgh"]
+    keys = [row.key for row in rows]
+    groups = [keys[1:3], keys[4:7]]
+    made = StandIn(dict.fromkeys(keys, 1.0))
+    Measurement(rows, Plan(20, 0.0), lambda peer: made, groups).run()
+    rounds = [made.calls[i : i + 8] for i in range(0, 160, 8)]
+    found = set()
+    for calls in rounds:
+        assert sorted(calls) == keys
+        for group in groups:
+            first = min(map(calls.index, group))
+            beside = calls[first : first + len(group)]
+            assert sorted(beside) == group
+            found.add(tuple(beside))
+    # In any order among themselves.
+    assert len(found) == 2 + 6
+
+
 def test_single_environments_are_measured_in_a_new_process_each_round():
     keys = ["single/own", "batch/own/64", "single/CartPole"]
     workers = []

@@ -8,7 +8,15 @@ import pytest
 
 from benchmarks.speed.measure import Measured, spread
 from benchmarks.speed.peers import PEERS
-from benchmarks.speed.ratios import CHECKS, TARGETS, Target, judge, judge_all, wanted_rows
+from benchmarks.speed.ratios import (
+    CHECKS,
+    TARGETS,
+    Target,
+    judge,
+    judge_all,
+    neighbours,
+    wanted_rows,
+)
 from benchmarks.speed.rows import all_rows, matches, select
 from benchmarks.speed.views import rate, three
 
@@ -116,3 +124,14 @@ def test_a_check_measures_only_what_it_compares():
     keys = wanted_rows(CHECKS, [row.key for row in all_rows()])
     assert {"batch/own/1024", "batch/own_two/1024", "single/own"} <= set(keys)
     assert all(key.split("/")[1].startswith("own") for key in keys)
+
+
+def test_rows_whose_steps_are_compared_are_neighbours():
+    keys = [row.key for row in all_rows()]
+    groups = neighbours(TARGETS, keys)
+    for target in TARGETS:
+        if target.others and target.quantity == "steps":
+            assert any(set(wanted_rows([target], keys)) <= set(group) for group in groups)
+    grouped = [key for group in groups for key in group]
+    assert len(grouped) == len(set(grouped))
+    assert "batch/own_two/1024" in grouped and "batch/own/64" not in grouped
