@@ -39,11 +39,10 @@ class LeanMlpPolicy(ActorCriticPolicy):
     same random numbers.
 
     What it leaves to `ActorCriticPolicy`, at that one's speed: networks that are anything but
-    Linear layers with Tanh between them, actions that are not Gaussian, gSDE, autocast, and devices
-    other than the processor. Derivatives are first ones only, and are not traced.
-
-    It keeps the memory of two minibatches' hidden layers for the next ones: 10 MB for two networks
-    of two layers of 64, and minibatches of 4096.
+    Linear layers with Tanh between them, actions that are not Gaussian, gSDE, autocast, what
+    `torch.compile` compiles, and devices other than the processor. Derivatives are first ones only,
+    and are not traced. It keeps the memory of two minibatches' hidden layers for the next ones:
+    10 MB for two networks of two layers of 64, and minibatches of 4096.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -84,6 +83,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
             and type(self.mlp_extractor) is MlpExtractor
             and self.log_std.device.type == "cpu"
             and not torch.is_autocast_enabled("cpu")
+            and not torch.compiler.is_compiling()
             and all(_is_plain(modules) for modules in self._networks())
         )
 

@@ -160,6 +160,21 @@ def test_autocast_is_left_to_theirs():
             assert torch.equal(mine.grad, its.grad)
 
 
+def test_what_is_compiled_is_left_to_theirs():
+    theirs, ours = pair()
+    compiled = torch.compile(ours.evaluate_actions, backend="eager")
+    for _ in range(2):
+        gradients = []
+        for policy, evaluate in ((theirs, theirs.evaluate_actions), (ours, compiled)):
+            policy.zero_grad()
+            values, likelihood, _ = evaluate(torch.ones(5, 7), torch.ones(5, 1))
+            (values.sum() + likelihood.sum()).backward()
+            gradients.append([parameter.grad for parameter in policy.parameters()])
+        for its, mine in zip(*gradients, strict=True):
+            assert torch.equal(mine, its)
+    assert not ours._spares._spare
+
+
 @pytest.mark.parametrize("sizes", [(5, 4, 3), (3, 8, 6, 7, 2)])
 def test_its_network_is_the_layers_in_double_precision(sizes):
     torch.manual_seed(1)
