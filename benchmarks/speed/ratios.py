@@ -49,7 +49,7 @@ TARGETS = (
     Target("single: the fastest gym-electric-motor", SINGLE, 30, ("single/gem_*",)),
     Target("single: PC-gym reactor", SINGLE, 100, ("single/pcgym",)),
     Target("single: do-mpc's simulator of the same plant", SINGLE, 120, ("plant/dompc",)),
-    Target("batch of 1024: EnvPool CartPole", BATCH, 1.8, ("batch/envpool_CartPole/1024",)),
+    Target("batch of 1024: EnvPool CartPole", BATCH, 1.8, ("batch/envpool_CartPole*/1024",)),
     Target("batch of 1024: SyncVectorEnv Pendulum", BATCH, 18, ("batch/sync_Pendulum/1024",)),
     Target(
         "right-hand sides: the fastest gymnax at any n",

@@ -185,6 +185,9 @@ def _batches() -> Iterator[Row]:
                 yield _batch(f"sync_{toy}", title, "classic", sync, **told)
             if count <= ENVPOOL_MOST:
                 yield _batch(f"envpool_{toy}", f"EnvPool {toy}", "envpool", named, **told)
+            if count in SYNC_COUNTS:
+                title, kept = f"EnvPool {toy}, on one processor", named | {"kept": True}
+                yield _batch(f"envpool_{toy}_kept", title, "envpool", kept, **told)
             title = f"gymnax {toy}"
             yield _batch(f"gymnax_{toy}", title, "gymnax", named, row="loop", **told)
 
