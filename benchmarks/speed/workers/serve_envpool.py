@@ -1,7 +1,7 @@
 """EnvPool: batches of environments in C++, on one thread.
 
 That thread and Python's take turns. On two processors each wakes the other across them, which costs
-up to half the speed and swings; kept to one processor they run at EnvPool's best.
+up to half the speed and swings; kept to one processor that is idle they were fastest.
 """
 
 # pyright: reportMissingImports=false
