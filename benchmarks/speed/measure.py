@@ -1,8 +1,8 @@
 """Rounds over all rows: each round measures every row once, in another order.
 
 So a slow minute of the machine falls on all rows alike, and a ratio of two rows is taken within a
-round, in which they are measured one soon after the other. One worker works at a time; the others
-wait for their input. Rows of `ANEW` are measured in a new process each round.
+round. Rows that belong together are measured one soon after the other. One worker works at a time;
+the others wait for their input. Rows of `ANEW` are measured in a new process each round.
 """
 
 import os
