@@ -38,8 +38,8 @@ ENVPOOL_MOST = 16384
 GPU_COUNTS = (262144, 1048576)
 
 LEAN = {"lean": True, "policy_kwargs": {"optimizer_kwargs": {"fused": True, "eps": 1e-5}}}
-"""How the documentation has PPO learn from batches: this package's LeanMlpPolicy, and PyTorch's
-Adam in one pass (eps is Stable-Baselines3's own)."""
+"""How the documentation has PPO learn from batches: this package's LeanPPO, and PyTorch's Adam in
+one pass (eps is Stable-Baselines3's own)."""
 
 
 class RequestError(ValueError):
@@ -220,14 +220,14 @@ def _learning() -> Iterator[Row]:
     yield Row("rollouts/own_copies/8", f"{title} pma-gym", "sb3", "rollouts", copies)
     title = "PPO end to end, 8 copies of Pendulum-v1, default settings"
     yield Row("learning/Pendulum/8", title, "sb3", "learning", pendulum)
-    policies = ("own", "LeanMlpPolicy", batch | LEAN), ("own_mlp", "MlpPolicy", batch)
-    for key, policy, options in policies:
+    learners = ("own", "LeanPPO", batch | LEAN), ("own_sb3", "Stable-Baselines3's PPO", batch)
+    for key, learner, options in learners:
         for count in (64, 256):
             settings = options | {"count": count}
-            title = f"PPO rollouts, pma-gym, batch of {count}, {policy}"
+            title = f"PPO rollouts, pma-gym, batch of {count}, {learner}"
             yield Row(f"rollouts/{key}/{count}", title, "sb3", "rollouts", settings)
         settings = options | {"count": 256, "batch_size": 4096, "threads": 2}
-        title = f"PPO end to end, pma-gym, batch of 256, minibatches of 4096, {policy}"
+        title = f"PPO end to end, pma-gym, batch of 256, minibatches of 4096, {learner}"
         yield Row(f"learning/{key}/256", title, "sb3", "learning", settings)
 
 

@@ -1,7 +1,5 @@
 """The lean policy is Stable-Baselines3's own, up to rounding."""
 
-import copy
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,8 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 from pma_gym.envs.sb3 import SB3VecEnv
-from pma_gym.envs.sb3_policy import MOST_SPARES, LeanMlpPolicy, _network, _Spares
+from pma_gym.envs.sb3_network import layers_of, network
+from pma_gym.envs.sb3_policy import LeanMlpPolicy
 
 SEEN = spaces.Box(-5.0, 5.0, (7,), np.float32)
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
@@ -89,7 +88,7 @@ def said(policy, rows=300):
 )
 def test_it_says_and_learns_what_theirs_does(options):
     theirs, ours = pair(**options)
-    assert ours._is_lean()
+    assert ours.is_lean()
     for its, mine in zip(said(theirs), said(ours), strict=True):
         mine, its = mine.detach(), its.detach()
         assert mine.shape == its.shape and mine.dtype == its.dtype
@@ -109,7 +108,7 @@ def test_it_says_and_learns_what_theirs_does(options):
 )
 def test_what_it_cannot_it_leaves_to_theirs_to_the_bit(options):
     theirs, ours = pair(**options)
-    assert not ours._is_lean()
+    assert not ours.is_lean()
     for its, mine in zip(said(theirs), said(ours), strict=True):
         assert torch.equal(mine, its)
 
@@ -120,7 +119,7 @@ def test_changed_networks_are_left_to_theirs(change):
     for policy in (theirs, ours):
         torch.manual_seed(4)
         change(policy)
-    assert not ours._is_lean()
+    assert not ours.is_lean()
     for its, mine in zip(said(theirs), said(ours), strict=True):
         assert torch.equal(mine, its)
 
@@ -172,7 +171,6 @@ def test_what_is_compiled_is_left_to_theirs():
             gradients.append([parameter.grad for parameter in policy.parameters()])
         for its, mine in zip(*gradients, strict=True):
             assert torch.equal(mine, its)
-    assert not ours._spares._spare
 
 
 @pytest.mark.parametrize("sizes", [(5, 4, 3), (3, 8, 6, 7, 2)])
@@ -184,12 +182,12 @@ def test_its_network_is_the_layers_in_double_precision(sizes):
     net = nn.Sequential(*modules[:-1])
     seen = torch.randn((11, sizes[0]), dtype=torch.float64, requires_grad=True)
     np.testing.assert_allclose(
-        _network(seen, net, _Spares()).detach(), net(seen).detach(), rtol=1e-13, atol=1e-14
+        network(seen, layers_of(net)).detach(), net(seen).detach(), rtol=1e-13, atol=1e-14
     )
     parameters = [seen, *net.parameters()]
 
     def changed(*_):
-        return _network(seen, net, _Spares())
+        return network(seen, layers_of(net))
 
     assert torch.autograd.gradcheck(changed, parameters)
 
@@ -200,7 +198,7 @@ def test_far_values_are_those_of_tanh():
     with torch.no_grad():
         for layer in (one, two):
             layer.weight[:], layer.bias[:] = 1.0, 0.0
-        values = _network(far, [one, nn.Tanh(), two], _Spares()).flatten()
+        values = network(far, layers_of([one, nn.Tanh(), two])).flatten()
     np.testing.assert_array_equal(values, [-1.0, -1.0, 0.0, 1.0, 1.0, np.nan])
 
 
@@ -259,28 +257,3 @@ def test_minibatches_whose_graphs_live_together_have_memory_of_their_own(times):
         for found, own in zip(waiting, expected, strict=True):
             for one, other in zip(found(), own, strict=True):
                 assert torch.equal(one, other)
-
-
-def test_what_a_minibatch_was_written_to_serves_the_next():
-    _, policy = pair()
-
-    def pieces():
-        return sorted(matrix.data_ptr() for matrix in policy._spares._spare)
-
-    learned(policy, 50, 1)()
-    first = pieces()
-    # Two networks' two hidden layers, and two of the derivatives.
-    assert len(first) == 6
-    for seed in range(2, 6):
-        learned(policy, 50, seed)()
-        assert pieces() == first
-
-
-def test_it_keeps_few_matrices_whatever_the_sizes_and_a_copy_none():
-    theirs, policy = pair()
-    for rows in range(20, 40):
-        expected = learned(theirs, rows, rows)()
-        for one, other in zip(learned(policy, rows, rows)(), expected, strict=True):
-            np.testing.assert_allclose(one, other, rtol=1e-4, atol=1e-5)
-    assert len(policy._spares._spare) == MOST_SPARES
-    assert len(copy.deepcopy(policy)._spares._spare) == 0

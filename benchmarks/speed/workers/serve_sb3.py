@@ -11,7 +11,6 @@ import gymnasium as gym
 import torch
 from stable_baselines3 import PPO
 from stable_baselines3.common.env_util import make_vec_env
-from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.vec_env import VecEnv
 
 from benchmarks.speed.loops import Missing, Prepared
@@ -41,17 +40,16 @@ KINDS = {"copies": copies, "batch": batch}
 
 def learner(name: str, count: int, kind: str, lean: bool = False, **options: Any) -> PPO:
     """PPO that has learned nothing yet; see `rollouts`."""
-    return PPO(_policy(lean), KINDS[kind](name, count), seed=0, device="cpu", **options)
+    make = _lean() if lean else PPO
+    return make("MlpPolicy", KINDS[kind](name, count), seed=0, device="cpu", **options)
 
 
-def _policy(lean: bool) -> str | type[ActorCriticPolicy]:
-    if not lean:
-        return "MlpPolicy"
+def _lean() -> type[PPO]:
     try:
-        from pma_gym.envs.sb3_policy import LeanMlpPolicy
+        from pma_gym.envs.sb3_ppo import LeanPPO
     except ImportError:
-        raise Missing("this version has no pma_gym.envs.sb3_policy") from None
-    return LeanMlpPolicy
+        raise Missing("this version has no pma_gym.envs.sb3_ppo") from None
+    return LeanPPO
 
 
 def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any) -> Prepared:
@@ -62,7 +60,7 @@ def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any)
         count: how many.
         kind: `copies` or `batch`.
         threads: threads of PyTorch.
-        options: `lean` for this package's LeanMlpPolicy, and keyword arguments of PPO.
+        options: `lean` for this package's LeanPPO, and keyword arguments of PPO.
     """
     model = learner(name, count, kind, **options)
     _, callback = model._setup_learn(total_timesteps=1 << 40)
