@@ -1,6 +1,6 @@
 """Stable-Baselines3's PPO with less work in its minibatches on a processor."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -123,8 +123,13 @@ class LeanPPO(PPO):
                 losses.divergences.clear()
                 order = np.random.permutation(rollout.rows)
                 rows = [order[i : i + most] for i in range(0, rollout.rows, most)]
-                for part in _ahead(begin, rollout.part, rows):
+                waiting = begin(rollout.part, rows[0])
+                for following in [*rows[1:], None]:
+                    part = waiting()
                     critic = begin(self._criticise, updates.critic, part, clip_values)
+                    if following is not None:
+                        # Behind the critic, while the optimiser works.
+                        waiting = begin(rollout.part, following)
                     self._act(updates, part, clip, losses)
                     losses.values.append(critic())
                     divergence = losses.divergences[-1]
@@ -325,12 +330,3 @@ def _two_at_once(work: int) -> Iterator[Begin]:
 
 def _result(found: object) -> Callable[[], Any]:
     return lambda: found
-
-
-def _ahead(begin: Begin, call: Callable[[Any], Any], arguments: Sequence[Any]) -> Iterator[Any]:
-    """Results of calls in order; the next one is begun when one is taken."""
-    waiting = [begin(call, arguments[0])]
-    for argument in arguments[1:]:
-        waiting.append(begin(call, argument))
-        yield waiting.pop(0)()
-    yield waiting.pop()()
