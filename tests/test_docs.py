@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tomllib
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -37,7 +38,8 @@ def generators():
 
 @pytest.fixture(scope="module")
 def page(generators):
-    return lambda name: generators.expand((DOCS / name).read_text(encoding="utf-8"))
+    # Expanding the effects takes a second, and every effect looks at them.
+    return cache(lambda name: generators.expand((DOCS / name).read_text(encoding="utf-8")))
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: str(path.relative_to(DOCS)))

@@ -177,7 +177,9 @@ def test_it_learns_in_a_batch_and_its_files_are_theirs(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["log_std", "action_net.bias"])
-def test_parameters_that_are_lost_are_refused_and_threads_come_back(name):
+def test_parameters_that_are_lost_are_refused_and_threads_come_back(name, monkeypatch):
+    # torch.compile, which another test may have used, has them go unnoticed from then on.
+    monkeypatch.setattr(torch.distributions.Distribution, "_validate_args", True)
     model = learned(LeanPPO)
     before = torch.get_num_threads()
     with torch.no_grad():
@@ -211,7 +213,7 @@ def test_actions_drawn_while_parameters_are_held_are_the_same():
             moved, values, _ = drawn()
         again = drawn()
     np.testing.assert_array_equal(moved, again[0])
-    np.testing.assert_allclose(moved, expected[0] + 1.0, rtol=1e-6)
+    np.testing.assert_allclose(moved, expected[0] + 1.0, rtol=1e-5, atol=1e-6)
     np.testing.assert_array_equal(values, again[1])
     with policy.held():
         assert policy(seen)[1].requires_grad
