@@ -89,7 +89,7 @@ class Plant:
         self.model = load_model(model)
         self.tolerance = tolerance
         self.program = program(self.model)
-        self.states = self.program.states
+        self.states = list(self.program.states)
         self.vector = vector(self.model, tolerance)
         self.table = table(self.program, self.vector)
         self.outputs = OUTPUTS

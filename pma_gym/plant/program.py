@@ -104,10 +104,10 @@ class Program:
         PLANTS[self.model.plant].write_equations(equations)
         return equations
 
-    @property
-    def states(self) -> list[str]:
+    @cached_property
+    def states(self) -> tuple[str, ...]:
         """Names of states and memories, in the order of the state vector."""
-        return [state.name for state in self.equations.remembered]
+        return tuple(state.name for state in self.equations.remembered)
 
     def _functions(self) -> None:
         pointer, whole, real = _POINTER, _INTEGER, _REAL
