@@ -28,7 +28,8 @@ Begin = Callable[..., Callable[[], Any]]
 
 MOST_ALONE = 1 << 22
 """Products of a number and a weight, in a network's pass, up to which a second thread is not worth
-waking. What is learned does not depend on it, to the bit."""
+waking: 900 rows of two layers of 64 (EPYC). No bit of what is learned from a rollout depends on it.
+"""
 
 
 class LeanPPO(PPO):

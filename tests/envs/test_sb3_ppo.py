@@ -167,6 +167,11 @@ def test_it_learns_in_a_batch_and_its_files_are_theirs(tmp_path):
     theirs = PPO("MlpPolicy", SB3VecEnv(8, "displacement", **MADE), **options).learn(512)
     ours = LeanPPO("MlpPolicy", envs, **options).learn(512)
     assert_same(theirs, ours)
+    theirs.save(tmp_path / "theirs.zip")
+    policy = {"policy_class": LeanMlpPolicy}
+    changed = LeanPPO.load(tmp_path / "theirs.zip", envs, device="cpu", custom_objects=policy)
+    assert_same(theirs, changed, rtol=0.0)
+    assert changed.learn(256).is_lean()
     ours.save(tmp_path / "model.zip")
     for kind in (PPO, LeanPPO):
         again = kind.load(tmp_path / "model.zip", envs, device="cpu")

@@ -32,6 +32,7 @@ from controllers.policy_file import load_policy_file
 from controllers.view import View
 from pma_gym.envs import Station
 from pma_gym.envs.sb3_policy import LeanMlpPolicy
+from pma_gym.envs.sb3_ppo import LeanPPO
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS
 from tests.controllers.policies import drawn_policy
@@ -295,8 +296,9 @@ def test_the_algorithm_is_read_off_the_zip(saved, tmp_path):
     for name, kind in {"sac": SAC, "td3": TD3, "tqc": TQC}.items():
         kind("MlpPolicy", Small(), buffer_size=1, device="cpu").save(tmp_path / name)
         assert algorithm_of(tmp_path / f"{name}.zip") == name
-    PPO(LeanMlpPolicy, Small(), device="cpu").save(tmp_path / "lean")
-    assert algorithm_of(tmp_path / "lean.zip") == "ppo"
+    for model in (PPO(LeanMlpPolicy, Small(), device="cpu"), LeanPPO("MlpPolicy", Small())):
+        model.save(tmp_path / "lean")
+        assert algorithm_of(tmp_path / "lean.zip") == "ppo"
     for policy in ("MlpPolicy", LeanMlpPolicy):
         model = A2C(policy, Small(), device="cpu")
         model.save(tmp_path / "a2c")
