@@ -66,7 +66,7 @@ def core(operation: str) -> Prepared:
     own = Path(__file__).read_text(encoding="utf-8")
     library = compiled(["core", operation, own], lambda: _module(operation), "core")
     run = library.function("run", [ctypes.c_int64, ctypes.c_void_p])
-    width = register()
+    width = simd_lanes()
     numbers = np.linspace(1.0, 2.0, (CHAINS + 2) * width)
     # A contraction for the multiply-adds, so that no number leaves the usual range.
     numbers[-2 * width : -width], numbers[-width:] = 0.9, 0.1
@@ -79,13 +79,8 @@ def core(operation: str) -> Prepared:
     return Prepared(chunk, lambda: {"in_attempt": counts[operation], "flops": flops})
 
 
-def register() -> int:
-    """Numbers in double precision in a register of this processor: 8 of AVX-512, else 4."""
-    return min(simd_lanes(), 8)
-
-
 def _module(operation: str) -> ir.Module:
-    module, lanes = ir.Module(), Lanes(register())
+    module, lanes = ir.Module(), Lanes(simd_lanes())
     b, (count, numbers) = function(module, "run", [("count", INTEGER), ("numbers", POINTER)])
     loaded = [lanes.load(b, numbers, i) for i in range(CHAINS + 2)]
     chains = [memory(b, lanes.real) for _ in range(CHAINS)]

@@ -46,7 +46,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         autoreset_mode: NEXT_STEP (default), SAME_STEP or DISABLED (then `reset` takes the option
             `reset_mask`).
         threads: how many threads step them, at most one for every block
-            of environments: 16 with AVX-512, else 4 (8 in single precision).
+            of environments: 8 with AVX-512, else 4 (twice as many in single precision).
         precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.

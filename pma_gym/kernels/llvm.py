@@ -22,6 +22,7 @@ from pma_gym.kernels.control import (
     offset,
 )
 from pma_gym.kernels.graph import Kind, Number, Value
+from pma_gym.kernels.sums import Sums, Term
 
 _BINARY: dict[str, dict[str, str]] = {
     "real": {"add": "fadd", "subtract": "fsub", "multiply": "fmul", "divide": "fdiv"},
@@ -47,8 +48,8 @@ class Lanes:
     Args:
         width: lanes of a vector; 1 writes scalar code.
         real: LLVM type of reals, "double" or "float".
-        fused: write a * b + c as one operation with one rounding, where sums are all that the
-            product is used in; faster, with other bits.
+        fused: write sums as `sums` has them: a * b + c as one operation with one rounding, and
+            terms in the order in which they are there; faster, with other bits.
 
     Attributes:
         width: lanes.
@@ -97,14 +98,13 @@ class Lanes:
         """
         found = dict(known)
         todo = _missing(outputs, found)
-        merged = self._merged(todo, outputs) if self.fused else {}
-        skipped = {product.id for product in merged.values()}
+        sums = Sums(todo, outputs) if self.fused else Sums((), ())
         for value in todo:
             if value.is_constant:
                 found[value.id] = self.constant(value.data, value.kind)
-            elif value.id in merged:
-                found[value.id] = self._multiply_add(builder, value, merged[value.id], found)
-            elif value.id not in skipped:
+            elif value.id in sums.terms:
+                found[value.id] = self._sum(builder, sums.terms[value.id], found)
+            elif value.id not in sums.within:
                 parts = [found[part.id] for part in value.operands]
                 found[value.id] = self._one(builder, value, parts)
         return found
@@ -150,44 +150,31 @@ class Lanes:
         "from_bits": _from_bits,
     }
 
-    def _merged(self, todo: list[Value], outputs: Sequence[Value]) -> dict[int, Value]:
-        """Products that go into multiply-adds, by the id of the sum that takes them.
-
-        A product goes where sums are all that it is used in, and each of them takes no other: then
-        it is not computed by itself.
-        """
-        asked = {value.id for value in outputs}
-        users: dict[int, list[Value]] = {}
-        for value in todo:
-            for part in value.operands:
-                users.setdefault(part.id, []).append(value)
-        merged: dict[int, Value] = {}
-        for value in todo:
-            product = value.operation == "multiply" and value.kind == "real"
-            if not product or value.id in asked:
-                continue
-            sums = users.get(value.id, [])
-            if all(
-                total.operation in ("add", "subtract")
-                and total.id not in merged
-                and total.operands[0] is not total.operands[1]
-                for total in sums
-            ):
-                merged.update((total.id, value) for total in sums)
-        return merged
-
-    def _multiply_add(
-        self, builder: Builder, total: Value, product: Value, found: dict[int, Operand]
-    ) -> Operand:
-        left, right = total.operands
-        a, b = (found[part.id] for part in product.operands)
-        c = found[(right if product is left else left).id]
-        if total.operation == "subtract":
-            if product is left:
-                c = builder.fneg(c)
+    def _sum(self, builder: Builder, terms: Sequence[Term], found: dict[int, Operand]) -> Operand:
+        """A sum of terms in their order, products rounded together with their sum."""
+        first, *others = terms
+        total, is_negative = self._first(builder, first, found), first.is_negative
+        for term in others:
+            differs = term.is_negative != is_negative
+            # What was subtracted so far is subtracted from the first term that is not.
+            turns = differs and is_negative
+            own, *factor = [found[value.id] for value in term.factors]
+            if factor:
+                if turns:
+                    total = builder.fneg(total)
+                elif differs:
+                    own = builder.fneg(own)
+                total = intrinsic(builder, "fma", own, *factor, total)
+            elif turns:
+                total = builder.fsub(own, total)
             else:
-                a = builder.fneg(a)
-        return intrinsic(builder, "fma", a, b, c)
+                total = (builder.fsub if differs else builder.fadd)(total, own)
+            is_negative &= not turns
+        return builder.fneg(total) if is_negative else total
+
+    def _first(self, builder: Builder, term: Term, found: dict[int, Operand]) -> Operand:
+        own, *factor = [found[value.id] for value in term.factors]
+        return builder.fmul(own, *factor) if factor else own
 
     def load(
         self,

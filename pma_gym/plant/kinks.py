@@ -78,15 +78,12 @@ def ahead(
         # By the speed alone, which is there at once: it is wrong only where the slide turns, and
         # how long a step may be is waited for by all else.
         begin[eq["direction"].id] = along = where(eq.travelled[1] < 0.0, -1.0, 1.0)
-    # The soonest as a quotient, so that it takes one division whatever there is.
-    way, speed = graph.constant(1.0), graph.constant(1.0 / FAR_S)
-    exact = graph.constant(False, "truth")
+    considered: list[tuple[Value, Value, Value]] = []
 
     def consider(is_ahead: Value, its_way: Value, its_speed: Value, is_switch: bool) -> None:
-        nonlocal way, speed, exact
-        sooner = is_ahead & (its_way * speed < way * its_speed)
-        way, speed = where(sooner, its_way, way), where(sooner, its_speed, speed)
-        exact = (exact | sooner) if is_switch else (exact & ~sooner)
+        far = (graph.constant(1.0), graph.constant(1.0 / FAR_S))
+        way, speed = (where(is_ahead, a, b) for a, b in zip((its_way, its_speed), far, strict=True))
+        considered.append((way, speed, graph.constant(is_switch, "truth")))
 
     for switch in eq.switches:
         value, (rate,) = switch.value, substitute([switch.rate], begin)
@@ -108,10 +105,25 @@ def ahead(
         twice = now + square_root(where(square > 0.0, square, 0.0))
         left = 2.0 * its_way > (NEGLIGIBLE * size) * twice
         consider((square > 0.0) & left, 2.0 * its_way, twice, False)
+    way, speed, exact = _soonest(considered)
     soon = way / speed
     landing = exact & (soon < CLOSE * size)
     length = soon * where(landing, PAST, where(exact, SHORT, BEND))
     return Ahead(where(length > LEAST_AIM_S, length, LEAST_AIM_S), landing)
+
+
+def _soonest(considered: list[tuple[Value, Value, Value]]) -> tuple[Value, Value, Value]:
+    """The soonest of ways and speeds, and its truth: in rounds, of two that stand side by side.
+
+    They are compared as quotients, so that it takes one division whatever there is.
+    """
+    while len(considered) > 1:
+        won = []
+        for first, second in zip(considered[::2], considered[1::2], strict=False):
+            sooner = second[0] * first[1] < first[0] * second[1]
+            won.append(tuple(where(sooner, b, a) for a, b in zip(first, second, strict=True)))
+        considered = won + considered[2 * len(won) :]
+    return considered[0]
 
 
 def turns(switch: Switch, speed: Value, rate: Value) -> Value:

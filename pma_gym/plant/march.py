@@ -27,8 +27,9 @@ from pma_gym.kernels.trace import split
 from pma_gym.plant.attempt import Attempt
 
 FUSED = True
-"""Products and sums are rounded once, as IEEE 754 has it (fused multiply-add): the same bits at
-every width and on every machine, and a third faster."""
+"""Products and sums are rounded once, as IEEE 754 has it (fused multiply-add), and a sum's terms
+are added as they come to be there: the same bits at every width and on every machine, and a third
+faster."""
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 import gymnasium as gym
 import pytest
 
-from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted, register
+from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted
 from benchmarks.speed.rows import CORE, EVALUATIONS
 from benchmarks.speed.views import views
 from pma_gym.envs.kernel_writer import Writer
@@ -36,7 +36,7 @@ def test_every_sort_is_measured():
 @pytest.mark.parametrize("operation", OPERATIONS)
 def test_a_core_counts_all_lanes_of_all_chains(operation):
     prepared = core(operation)
-    assert prepared.chunk() == prepared.chunk() == REPEATS * CHAINS * register()
+    assert prepared.chunk() == prepared.chunk() == REPEATS * CHAINS * simd_lanes()
     assert prepared.facts()["in_attempt"] == counted()[0][operation]
 
 
