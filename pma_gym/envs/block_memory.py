@@ -184,7 +184,7 @@ class BlockMemory:
 
     def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
         if lanes.width == 1:
-            return numbers[0]
+            return lanes.spread(b, numbers[0])
         vector = ir.Constant(lanes.real, ir.Undefined)
         for k, number in enumerate(numbers):
             vector = lanes.insert(b, vector, number, k)

@@ -24,6 +24,7 @@ from pma_gym.kernels.control import (
 from pma_gym.kernels.generic import to_real
 from pma_gym.kernels.graph import FIXED, HELD
 from pma_gym.kernels.llvm import Lanes
+from pma_gym.kernels.native import pairs
 from pma_gym.kernels.trace import split
 from pma_gym.plant.attempt import attempt
 from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
@@ -140,7 +141,8 @@ class Writer(BeginningWriter):
         self._store(b, lanes, found, self.commanded, records, 0)
 
     def _march(self, b: Builder, given: dict[str, Operand]) -> None:
-        lanes = Lanes(self.width, "float" if self.kernel.single else "double", FUSED)
+        real, paired = "float" if self.kernel.single else "double", pairs(self.width)
+        lanes = Lanes(self.width, real, FUSED, paired)
         sums = [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
         lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
         period = self.record.options.period
@@ -239,9 +241,9 @@ class Writer(BeginningWriter):
                 leave_if(b.not_(lanes.any(b, taken[one.due.id])))
             if self.traces:
                 number = known[graph.input("record.sample", 2).id]
-                index = b.fptoui(number, INTEGER)
+                index = b.fptoui(lanes.extract(b, number, 0), INTEGER)
                 where = offset(b, given["trace"], index)
-                b.store(widened(b, taken[one.position.id]), where)
+                b.store(widened(b, lanes.extract(b, taken[one.position.id], 0)), where)
             lane.put_vector("sample", taken[one.sample.id])
             for phase, value in zip(phases, one.sums, strict=True):
                 lane.put_vector(f"sum_{phase.name}", taken[value.id])

@@ -48,18 +48,24 @@ class Lanes:
     Args:
         width: lanes of a vector; 1 writes scalar code.
         real: LLVM type of reals, "double" or "float".
+        paired: one lane is computed as both halves of a register, of which the second is never looked
+            at: with AVX-512, truths of vectors need not leave the mask registers.
         fused: write sums as `sums` has them: a * b + c as one operation with one rounding, and
             terms in the order in which they are there; faster, with other bits.
 
     Attributes:
         width: lanes.
+        places: how many numbers of memory a value takes: one a lane, or two of a pair.
         real: type of a real in LLVM; `integer` and `truth` those of the other kinds.
         element: type of one real in memory.
         size: bytes of one real in memory.
     """
 
-    def __init__(self, width: int = 1, real: str = "double", fused: bool = False) -> None:
+    def __init__(
+        self, width: int = 1, real: str = "double", fused: bool = False, paired: bool = False
+    ) -> None:
         self.width = width
+        self.places = 2 if paired else width
         self.fused = fused
         self.element = {"double": DOUBLE, "float": FLOAT}[real]
         self.size = {"double": 8, "float": 4}[real]
@@ -68,7 +74,7 @@ class Lanes:
         self.truth = self._wide(TRUTH)
 
     def _wide(self, element: ir.Type) -> ir.Type:
-        return element if self.width == 1 else ir.VectorType(element, self.width)
+        return element if self.places == 1 else ir.VectorType(element, self.places)
 
     def type(self, kind: Kind) -> ir.Type:
         """LLVM type of a kind of value."""
@@ -77,7 +83,7 @@ class Lanes:
     def constant(self, number: Number, kind: Kind = "real") -> Operand:
         """A number in every lane."""
         wide = self.type(kind)
-        return ir.Constant(wide, number if self.width == 1 else [number] * self.width)
+        return ir.Constant(wide, number if self.places == 1 else [number] * self.places)
 
     def emit(
         self,
@@ -220,8 +226,8 @@ class Lanes:
     def address(self, builder: Builder, pointer: Operand, slot: Operand | int) -> Operand:
         """Address of the vector `slot` vectors behind a pointer."""
         if isinstance(slot, int):
-            return offset(builder, pointer, slot * self.width, self.element)
-        return offset(builder, pointer, builder.mul(slot, integer(self.width)), self.element)
+            return offset(builder, pointer, slot * self.places, self.element)
+        return offset(builder, pointer, builder.mul(slot, integer(self.places)), self.element)
 
     def load_spread(
         self,
@@ -240,42 +246,42 @@ class Lanes:
 
     def spread(self, builder: Builder, scalar: Operand) -> Operand:
         """A scalar in every lane."""
-        if self.width == 1:
+        if self.places == 1:
             return scalar
-        wide = ir.VectorType(scalar.type, self.width)
+        wide = ir.VectorType(scalar.type, self.places)
         undefined = ir.Constant(wide, ir.Undefined)
         first = builder.insert_element(undefined, scalar, ir.Constant(INDEX, 0))
-        zeros = ir.Constant(ir.VectorType(INDEX, self.width), [0] * self.width)
+        zeros = ir.Constant(ir.VectorType(INDEX, self.places), [0] * self.places)
         return builder.shuffle_vector(first, undefined, zeros)
 
     @property
     def numbers(self) -> Operand:
         """Each lane's own number, from 0."""
-        own = list(range(self.width))
-        return ir.Constant(self.integer, own if self.width > 1 else 0)
+        own = list(range(self.places)) if self.width > 1 else [0] * self.places
+        return ir.Constant(self.integer, own if self.places > 1 else 0)
 
     def extract(self, builder: Builder, vector: Operand, lane: Operand | int) -> Operand:
         """The scalar in one lane."""
-        return vector if self.width == 1 else builder.extract_element(vector, integer(lane))
+        return vector if self.places == 1 else builder.extract_element(vector, integer(lane))
 
     def insert(
         self, builder: Builder, vector: Operand, scalar: Operand, lane: Operand | int
     ) -> Operand:
         """The vector with one lane replaced."""
         if self.width == 1:
-            return scalar
+            return self.spread(builder, scalar)
         return builder.insert_element(vector, scalar, integer(lane))
 
     def any(self, builder: Builder, truths: Operand) -> Operand:
         """Whether a truth holds in some lane."""
-        return truths if self.width == 1 else self._mask(builder, "!=", truths, 0)
+        return truths if self.places == 1 else self._mask(builder, "!=", truths, 0)
 
     def all(self, builder: Builder, truths: Operand) -> Operand:
         """Whether a truth holds in every lane."""
-        return truths if self.width == 1 else self._mask(builder, "==", truths, -1)
+        return truths if self.places == 1 else self._mask(builder, "==", truths, -1)
 
     def _mask(self, builder: Builder, sign: str, truths: Operand, bits: int) -> Operand:
-        mask = ir.IntType(self.width)
+        mask = ir.IntType(self.places)
         return builder.icmp_unsigned(sign, builder.bitcast(truths, mask), ir.Constant(mask, bits))
 
 

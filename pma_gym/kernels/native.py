@@ -214,6 +214,15 @@ def simd_lanes(single: bool = False) -> int:
     return (8 if wide else 4) * (2 if single else 1)
 
 
+def pairs(width: int) -> bool:
+    """Whether kernels for so many plants at once compute each of them twice, as a pair.
+
+    One plant, with AVX-512: truths of scalars go through registers of integers and back. A step
+    took 0.96 of the time (Xeon, Granite Rapids). No bit depends on it.
+    """
+    return width == 1 and "+avx512vl" in host()[1].split(",")
+
+
 def _machine_key() -> tuple[str, ...]:
     versions = llvmlite.__version__, str(llvm.llvm_version_info), str(_OPTIMISATION)
     return (*versions, llvm.get_process_triple(), *host())

@@ -97,13 +97,16 @@ class Lane:
 
     def cell(self, what: Value | str, lane: Operand | int) -> Operand:
         """Address of a lane's number."""
-        first = integer(self.slot(what) * self.lanes.width)
+        first = integer(self.slot(what) * self.lanes.places)
         where = self.builder.add(first, integer(lane))
         return offset(self.builder, self.memory, where, self.lanes.element)
 
     def put(self, what: Value | str, lane: Operand | int, number: Operand) -> None:
         """Write a lane's number."""
-        self.builder.store(number, self.cell(what, lane))
+        if self.lanes.width == 1:
+            self.put_vector(what, self.lanes.spread(self.builder, number))
+        else:
+            self.builder.store(number, self.cell(what, lane))
 
     def get(self, what: Value | str, lane: Operand | int) -> Operand:
         """Read a lane's number."""
@@ -194,7 +197,7 @@ def march(
     with loop(b, lanes.width) as k:
         # Numbers that an idle lane can be computed with, whatever they mean.
         for i in range(len(lane.at) + len(lane.own)):
-            where = b.add(integer(i * lanes.width), k)
+            where = b.add(integer(i * lanes.places), k)
             b.store(zero, offset(b, lane.memory, where, lanes.element))
         found = take(k)
         b.store(b.select(found, b.load(lane.job(k), typ=INTEGER), integer(-1)), lane.job(k))

@@ -15,6 +15,7 @@ from pma_gym.kernels.control import (
 )
 from pma_gym.kernels.graph import CHANGING
 from pma_gym.kernels.llvm import Lanes
+from pma_gym.kernels.native import pairs
 from pma_gym.plant.attempt import first_size
 from pma_gym.plant.compose import COMMANDS, ZERO
 from pma_gym.plant.march import FUSED, Lane, march, memory
@@ -43,7 +44,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         f"simulate_{width}",
         [("count", INTEGER), ("jobs", POINTER), ("taken", POINTER), ("attempts", POINTER)],
     )
-    lanes = Lanes(width, fused=FUSED)
+    lanes = Lanes(width, fused=FUSED, paired=pairs(width))
     lane = Lane(b, lanes, system.layout)
     rows = memory(b, ir.ArrayType(INTEGER, width))
     n = len(eq.remembered)
