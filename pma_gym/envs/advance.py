@@ -62,7 +62,7 @@ def write_advance(module: ir.Module, record: Record) -> None:
     with b.if_then(b.icmp_signed("!=", bad, integer(0)), likely=False):
         b.ret(_call(b, "PyLong_FromLongLong", bad))
     thread = _call(b, "PyEval_SaveThread")
-    ended = b.call(module.get_global("step"), [arguments])
+    ended = b.call(module.get_global("step"), [arguments, ir.Constant(POINTER, None)])
     _call(b, "PyEval_RestoreThread", thread)
     with b.if_then(b.icmp_signed("!=", ended, integer(0)), likely=False):
         b.ret(_call(b, "PyLong_FromLongLong", ended))

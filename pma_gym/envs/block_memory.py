@@ -39,6 +39,9 @@ ARGUMENTS = (
 
 With settles other than 0 a beginning draws pressures, from two numbers each, and settles there."""
 
+BEFORE = len(ARGUMENTS)
+"""Place, behind them, of the address of those of another part that the same thread took before."""
+
 
 class Plan(Protocol):
     """What a writer needs to know: a `Kernel`, or a kernel for other machines.

@@ -16,9 +16,9 @@ from pma_gym.kernels.builtin import builtin
 from pma_gym.kernels.crew import Crew
 from pma_gym.tasks import Task
 
-LEAST_BLOCKS = 8
-"""Blocks of lanes that are not divided among threads: the last lanes of every part wait for each
-other."""
+LEAST_BLOCKS = 2
+"""Blocks of lanes that are not divided among threads: taking a part costs what a block does in some
+hundredths of its time."""
 
 
 class ActionError(ValueError):
@@ -146,8 +146,8 @@ def _halves(first: int, last: int) -> list[tuple[int, int]]:
 
     The last parts, which another thread may take, are small.
 
-    >>> _halves(0, 64)
-    [(0, 32), (32, 48), (48, 56), (56, 64)]
+    >>> _halves(0, 16)
+    [(0, 8), (8, 12), (12, 14), (14, 16)]
     """
     found = []
     while last - first >= 2 * LEAST_BLOCKS:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.block_memory import ARGUMENTS
+from pma_gym.envs.block_memory import ARGUMENTS, BEFORE
 from pma_gym.envs.kernel import Kernel
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import Options
@@ -75,7 +75,7 @@ class EngineMemory:
         self._ranges = np.zeros((max(self.count, 1), 2))
         self._episodes = np.full(self.count, -1, np.int64)
         self._keys = np.zeros((self.count, 2), np.int64)
-        self._arguments = np.zeros(len(ARGUMENTS), np.int64)
+        self._arguments = np.zeros(BEFORE + 1, np.int64)
         stride = 0 if self._shares_table else self.kernel.table_size * width
         given = {
             "first": 0,
@@ -98,7 +98,7 @@ class EngineMemory:
             "settles": 0,
             "pressures": self._ranges.ctypes.data,
         }
-        self._arguments[:] = [given[name] for name in ARGUMENTS]
+        self._arguments[:BEFORE] = [given[name] for name in ARGUMENTS]
         self._count_attempts(1)
         self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
         self._has_idle_lanes = self.count % width != 0

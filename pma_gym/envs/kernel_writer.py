@@ -1,5 +1,6 @@
 """Writes the control step of environments: command, march, sensors, reward."""
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from typing import Protocol
 
@@ -7,7 +8,7 @@ from llvmlite import ir
 
 from pma_gym.envs.advance import write_advance
 from pma_gym.envs.beginning_writer import BeginningWriter
-from pma_gym.envs.block_memory import Plan, narrowed, widened
+from pma_gym.envs.block_memory import BEFORE, Plan, narrowed, widened
 from pma_gym.envs.scoring import COURSE, Course, course, sampling
 from pma_gym.kernels.control import (
     DOUBLE,
@@ -20,7 +21,9 @@ from pma_gym.kernels.control import (
     loop,
     offset,
     repeat,
+    variable,
 )
+from pma_gym.kernels.crew import write_another
 from pma_gym.kernels.generic import to_real
 from pma_gym.kernels.graph import FIXED, HELD
 from pma_gym.kernels.llvm import Lanes
@@ -105,16 +108,51 @@ class Writer(BeginningWriter):
         b.ret(b.mul(b.load(bad, typ=INTEGER), integer(BAD_ACTION)))
 
     def _step(self) -> None:
-        b, (arguments,) = function(self.module, "step", [("arguments", POINTER)], INTEGER)
-        given = self._arguments(b, arguments)
+        """Step a part of the blocks, and what other parts the thread takes meanwhile."""
+        b, (part,) = function(self.module, "command", [("part", POINTER)])
+        given = self._arguments(b, part)
         with loop(b, given["last"], given["first"]) as block:
             self._command(b, given, block)
-        self._march(b, given)
+        b.ret_void()
+        both = [("part", POINTER), ("crew", POINTER)]
+        b, (part, crew) = function(self.module, "step", both, INTEGER)
+        b.call(self.module.get_global("command"), [part])
+        b.store(integer(0), offset(b, part, BEFORE, INTEGER))
+        newest = variable(b, INTEGER, b.ptrtoint(part, INTEGER))
+        given = self._arguments(b, part)
+        self._march(b, given, lambda: self._take_part(b, crew, newest))
         ended = memory(b, INTEGER)
         b.store(integer(0), ended)
-        with loop(b, given["last"], given["first"]) as block:
-            self._sense(b, given, block, ended)
+        with repeat(b) as leave_if:
+            address = b.load(newest, typ=INTEGER)
+            leave_if(b.icmp_signed("==", address, integer(0)))
+            part = b.inttoptr(address, POINTER)
+            given = self._arguments(b, part)
+            with loop(b, given["last"], given["first"]) as block:
+                self._sense(b, given, block, ended)
+            b.store(b.load(offset(b, part, BEFORE, INTEGER), typ=INTEGER), newest)
         b.ret(b.load(ended, typ=INTEGER))
+
+    def _take_part(self, b: Builder, crew: Operand, newest: Operand) -> tuple[Operand, Operand]:
+        """Take another part, if there is one, and command it; its first job and the one behind."""
+        first, stop = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
+        address = write_another(b, crew)
+        with b.if_then(b.icmp_signed("!=", address, integer(0))):
+            part = b.inttoptr(address, POINTER)
+            b.store(b.load(newest, typ=INTEGER), offset(b, part, BEFORE, INTEGER))
+            b.store(address, newest)
+            b.call(self.module.get_global("command"), [part])
+            given = self._arguments(b, part)
+            # Whoever took the first part counts them all.
+            b.store(integer(0), given["attempts"])
+            for place, job in zip((first, stop), self._jobs(b, given), strict=True):
+                b.store(job, place)
+        return b.load(first, typ=INTEGER), b.load(stop, typ=INTEGER)
+
+    def _jobs(self, b: Builder, given: dict[str, Operand]) -> tuple[Operand, Operand]:
+        """The first environment of a part, and the one behind the last."""
+        first, last = (b.mul(given[name], integer(self.width)) for name in ("first", "last"))
+        return first, b.select(b.icmp_signed("<", last, given["count"]), last, given["count"])
 
     def _action(self, b: Builder, given: dict[str, Operand], index: Operand, i: int) -> Operand:
         at = b.add(b.mul(index, integer(self.record.actions)), integer(i))
@@ -140,16 +178,18 @@ class Writer(BeginningWriter):
         found = lanes.emit(b, values, known)
         self._store(b, lanes, found, self.commanded, records, 0)
 
-    def _march(self, b: Builder, given: dict[str, Operand]) -> None:
+    def _march(
+        self,
+        b: Builder,
+        given: dict[str, Operand],
+        take_part: Callable[[], tuple[Operand, Operand]],
+    ) -> None:
         real, paired = "float" if self.kernel.single else "double", pairs(self.width)
         lanes = Lanes(self.width, real, FUSED, paired)
         sums = [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
         lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
         period = self.record.options.period
-        following = memory(b, INTEGER)
-        b.store(b.mul(given["first"], integer(self.width)), following)
-        stop = b.mul(given["last"], integer(self.width))
-        stop = b.select(b.icmp_signed("<", stop, given["count"]), stop, given["count"])
+        following, behind = (variable(b, INTEGER, job) for job in self._jobs(b, given))
         kept = [*self.record.states, "size"]
         values = {name: self.circuit.slot(name) for name in self.record.states}
         values["size"] = self.attempt.size
@@ -162,9 +202,15 @@ class Writer(BeginningWriter):
         def number(job: Operand, name: str) -> Operand:
             return b.load(address(job, name), typ=DOUBLE)
 
+        def is_left() -> Operand:
+            return b.icmp_signed("<", b.load(following, typ=INTEGER), b.load(behind, typ=INTEGER))
+
         def take(k: Operand, again: bool = False) -> Operand:
-            job = b.load(following, typ=INTEGER)
-            found = b.icmp_signed("<", job, stop)
+            if self.width > 1:
+                with b.if_then(b.not_(is_left())):
+                    for place, job in zip((following, behind), take_part(), strict=True):
+                        b.store(job, place)
+            found, job = is_left(), b.load(following, typ=INTEGER)
             with b.if_then(found):
                 b.store(b.add(job, integer(1)), following)
                 b.store(job, lane.job(k))

@@ -5,7 +5,8 @@ that is done: too late for work of less than a millisecond. So these look for wo
 before they sleep, in compiled code, without Python's lock.
 
 Every thread has a share of the work, in parts. Who is done with its own takes what others have not
-begun, so that a processor that is slower for a while, or does something else, holds up nobody.
+begun, so that a processor that is slower for a while, or does something else, holds up nobody. The
+function itself may take further parts before it is done with the first (`write_another`).
 """
 
 import ctypes
@@ -43,14 +44,20 @@ that someone has taken on, that have been given, and that are done, all since th
 the function returned; how many parts there are, and the address of the addresses of their
 arguments."""
 
+ANOTHER, SHARES, THREADS, OWN, FROM = range(5)
+"""What a thread keeps while it works, in 64-bit integers: address of the function that takes
+another part, address and number of the shares, its own, and address of the share that it took a
+part from last."""
+
 _POINTER, _INTEGER = ctypes.c_void_p, ctypes.c_int64
 
 
 class Crew:
-    """Runs a compiled function, once for each part of some work, in several threads.
+    """Runs a compiled function on all parts of some work, in several threads.
 
     Args:
-        address: address of a function of one pointer that returns a 64-bit integer.
+        address: address of a function of two pointers, the arguments of a part and what
+            `write_another` asks for, that returns a 64-bit integer.
         shares: its arguments for each part of every thread's share; the first share is of the
             thread that calls.
     """
@@ -151,6 +158,7 @@ def _library() -> Library:
 
 def _build() -> ir.Module:
     module = ir.Module()
+    _write_take(module)
     _write_work(module)
     _write_serve(module)
     _write_lead(module)
@@ -168,32 +176,92 @@ def _share(b: Builder, shares: Operand, number: Operand) -> Operand:
     return offset(b, shares, b.mul(number, integer(SHARE)), INTEGER)
 
 
-def _write_work(module: ir.Module) -> None:
-    """Do what nobody has taken on, one's own share first."""
-    given = [*_BOARD[1:], ("own", INTEGER)]
-    b, (shares, threads, address, own) = function(module, "work", given)
-    with loop(b, threads) as ahead:
-        share = _share(b, shares, b.srem(b.add(own, ahead), threads))
-        with repeat(b) as leave_if:
-            end = _now(b, share, GIVEN)
-            number = _now(b, share, TAKEN)
-            leave_if(b.icmp_signed(">=", number, end))
-            more = b.add(number, integer(1))
-            tried = b.cmpxchg(atomic(b, share, TAKEN), number, more, "acq_rel", "acquire")
-            with b.if_then(b.extract_value(tried, 1)):
-                _do(b, share, address, b.sub(number, end))
-    b.ret_void()
+def write_another(b: Builder, crew: Operand) -> Operand:
+    """Write the taking of another part in the midst of one; address of its arguments, 0 for none.
+
+    It is to be done before the function returns, whose result is that of both.
+
+    Args:
+        b: where to write.
+        crew: the function's second argument.
+    """
+    kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER]))
+    address = b.load(offset(b, crew, ANOTHER, INTEGER), typ=INTEGER)
+    return b.call(b.inttoptr(address, kind), [crew])
 
 
-def _do(b: Builder, share: Operand, address: Operand, before_end: Operand) -> None:
-    """Do a part, counted from the end of its share."""
+def _write_take(module: ir.Module) -> None:
+    """Take a part on that nobody has, one's own share first; 0 if there is none."""
+    b, (crew,) = function(module, "take", [("crew", POINTER)], INTEGER)
+    shares, threads, own = (
+        b.load(offset(b, crew, place, INTEGER), typ=INTEGER) for place in (SHARES, THREADS, OWN)
+    )
+    found, ahead = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
+    with repeat(b) as leave_if:
+        number = b.load(ahead, typ=INTEGER)
+        leave_if(b.icmp_signed(">=", number, threads))
+        whose = b.srem(b.add(own, number), threads)
+        share = _share(b, b.inttoptr(shares, POINTER), whose)
+        end = _now(b, share, GIVEN)
+        taken = _now(b, share, TAKEN)
+        with b.if_else(b.icmp_signed("<", taken, end)) as (some, none):
+            with some:
+                more = b.add(taken, integer(1))
+                tried = b.cmpxchg(atomic(b, share, TAKEN), taken, more, "acq_rel", "acquire")
+                with b.if_then(b.extract_value(tried, 1)):
+                    b.store(_arguments(b, share, b.sub(taken, end)), found)
+                    b.store(b.ptrtoint(share, INTEGER), offset(b, crew, FROM, INTEGER))
+            with none:
+                b.store(b.add(number, integer(1)), ahead)
+        leave_if(b.icmp_signed("!=", b.load(found, typ=INTEGER), integer(0)))
+    b.ret(b.load(found, typ=INTEGER))
+    # The part in whose midst it is taken is not done before both are.
+    b, (crew,) = function(module, "another", [("crew", POINTER)], INTEGER)
+    found = b.call(module.get_global("take"), [crew])
+    with b.if_then(b.icmp_signed("!=", found, integer(0))):
+        _done(b, crew)
+    b.ret(found)
+
+
+def _arguments(b: Builder, share: Operand, before_end: Operand) -> Operand:
+    """Address of a part's arguments, counted from the end of its share."""
     number = b.add(b.load(atomic(b, share, PARTS), typ=INTEGER), before_end)
     table = b.inttoptr(b.load(atomic(b, share, ARGUMENTS), typ=INTEGER), POINTER)
-    arguments = b.load(offset(b, table, number, INTEGER), typ=INTEGER)
-    kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER]))
-    result = b.call(b.inttoptr(address, kind), [b.inttoptr(arguments, POINTER)])
-    b.atomic_rmw("or", atomic(b, share, RESULT), result, "monotonic")
-    b.atomic_rmw("add", atomic(b, share, DONE), integer(1), "release")
+    return b.load(offset(b, table, number, INTEGER), typ=INTEGER)
+
+
+def _from(b: Builder, crew: Operand) -> Operand:
+    return b.inttoptr(b.load(offset(b, crew, FROM, INTEGER), typ=INTEGER), POINTER)
+
+
+def _done(b: Builder, crew: Operand) -> None:
+    b.atomic_rmw("add", atomic(b, _from(b, crew), DONE), integer(1), "release")
+
+
+def _write_work(module: ir.Module) -> None:
+    """Do what nobody has taken on."""
+    given = [*_BOARD[1:], ("own", INTEGER)]
+    b, (shares, threads, address, own) = function(module, "work", given)
+    crew = variable(b, ir.ArrayType(INTEGER, FROM + 1))
+    crew.type = POINTER
+    another = b.ptrtoint(module.get_global("another"), INTEGER)
+    for place, value in (
+        (ANOTHER, another),
+        (SHARES, b.ptrtoint(shares, INTEGER)),
+        (THREADS, threads),
+        (OWN, own),
+    ):
+        b.store(value, offset(b, crew, place, INTEGER))
+    kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER, POINTER]))
+    work = b.inttoptr(address, kind)
+    with repeat(b) as leave_if:
+        part = b.call(module.get_global("take"), [crew])
+        leave_if(b.icmp_signed("==", part, integer(0)))
+        share = _from(b, crew)
+        result = b.call(work, [b.inttoptr(part, POINTER), crew])
+        b.atomic_rmw("or", atomic(b, share, RESULT), result, "monotonic")
+        b.atomic_rmw("add", atomic(b, share, DONE), integer(1), "release")
+    b.ret_void()
 
 
 def _write_serve(module: ir.Module) -> None:

@@ -48,8 +48,8 @@ class Lanes:
     Args:
         width: lanes of a vector; 1 writes scalar code.
         real: LLVM type of reals, "double" or "float".
-        paired: one lane is computed as both halves of a register, of which the second is never looked
-            at: with AVX-512, truths of vectors need not leave the mask registers.
+        paired: compute one lane as both halves of a register and never look at the second: with
+            AVX-512, truths of vectors need not leave the mask registers.
         fused: write sums as `sums` has them: a * b + c as one operation with one rounding, and
             terms in the order in which they are there; faster, with other bits.
 

@@ -25,7 +25,7 @@ from pma_gym.kernels.control import (
     repeat,
     variable,
 )
-from pma_gym.kernels.crew import Crew
+from pma_gym.kernels.crew import Crew, write_another
 from pma_gym.kernels.native import Library, compiled
 
 COUNTER, SECOND, TIMES = 0, 1, 2
@@ -34,21 +34,43 @@ COUNTER, SECOND, TIMES = 0, 1, 2
 def build() -> ir.Module:
     """Adds the second number to the first, and returns the second; the third is how often."""
     module = ir.Module()
-    b, (numbers,) = function(module, "add", [("numbers", POINTER)], INTEGER)
+    b, (numbers, _) = function(module, "add", [("numbers", POINTER), ("crew", POINTER)], INTEGER)
     _write_add(b, numbers)
-    b, (numbers,) = function(module, "add_often", [("numbers", POINTER)], INTEGER)
+    b, (numbers, _) = function(
+        module, "add_often", [("numbers", POINTER), ("crew", POINTER)], INTEGER
+    )
     more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
     with loop(b, b.load(offset(b, numbers, integer(TIMES), INTEGER), typ=INTEGER)):
         # Atomic, so that the loop is not reduced to one product.
         b.atomic_rmw("add", atomic(b, numbers, COUNTER), more, "monotonic")
     b.ret(more)
     _write_await_other(module)
+    _write_add_all(module)
     return module
+
+
+def _write_add_all(module: ir.Module) -> None:
+    """As "add", and then for every other part that there is to take."""
+    both = [("numbers", POINTER), ("crew", POINTER)]
+    b, (numbers, crew) = function(module, "add_all", both, INTEGER)
+    now = variable(b, INTEGER, b.ptrtoint(numbers, INTEGER))
+    bits = variable(b, INTEGER, integer(0))
+    with repeat(b) as leave_if:
+        part = b.inttoptr(b.load(now, typ=INTEGER), POINTER)
+        more = b.load(offset(b, part, integer(SECOND), INTEGER), typ=INTEGER)
+        # Atomic, so that a part that two threads do is seen to have been done twice.
+        b.atomic_rmw("add", atomic(b, part, COUNTER), more, "monotonic")
+        b.store(b.or_(b.load(bits, typ=INTEGER), more), bits)
+        b.store(write_another(b, crew), now)
+        leave_if(b.icmp_signed("==", b.load(now, typ=INTEGER), integer(0)))
+    b.ret(b.load(bits, typ=INTEGER))
 
 
 def _write_await_other(module: ir.Module) -> None:
     """Raise the flag at one address, wait for that at another; 1 if it is not raised for long."""
-    b, (numbers,) = function(module, "await_other", [("numbers", POINTER)], INTEGER)
+    b, (numbers, _) = function(
+        module, "await_other", [("numbers", POINTER), ("crew", POINTER)], INTEGER
+    )
     mine, other = (
         b.inttoptr(b.load(offset(b, numbers, i, INTEGER), typ=INTEGER), ir.PointerType(INTEGER))
         for i in range(2)
@@ -113,6 +135,22 @@ def test_parts_of_any_length_are_done_once_whoever_does_them(threads):
         assert crew.run() == bits
         for part in parts:
             assert part[COUNTER] == calls * part[SECOND] * part[TIMES]
+    crew.close()
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_parts_that_a_function_takes_itself_are_done_once_and_waited_for(threads):
+    generator = np.random.default_rng(threads)
+    shares = [
+        [np.array([0, 1 << int(generator.integers(50))]) for _ in range(count)]
+        for count in generator.integers(1, 9, threads)
+    ]
+    parts = [part for share in shares for part in share]
+    crew = Crew(library().address("add_all"), shares)
+    bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
+    for calls in range(1, 2000):
+        assert crew.run() == bits
+        assert all(part[COUNTER] == calls * part[SECOND] for part in parts)
     crew.close()
 
 
