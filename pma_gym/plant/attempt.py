@@ -7,6 +7,7 @@ from typing import Any
 from pma_gym.kernels.generic import from_bits, to_bits, where
 from pma_gym.kernels.graph import CHANGING, FIXED, Value
 from pma_gym.kernels.substitute import substitute
+from pma_gym.kernels.trace import order
 from pma_gym.plant.compose import Equations
 from pma_gym.plant.exponential import step
 from pma_gym.plant.followers import followed, followers
@@ -78,6 +79,7 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     # Two halves instead of a step and a scrap.
     length = where(left <= size, left, where(left < 2.0 * size, 0.5 * left, size))
     frozen, here = beginning(eq)
+    frozen = frozen | _signs(eq, frozen)
     found, landing = ahead(eq, size, frozen, here), graph.constant(False, "truth")
     if found is not None:
         sooner = found.length < length
@@ -167,6 +169,27 @@ def beginning(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
         if switch.turning:
             direction = where(turns(switch, speed, rate), onwards, direction)
     return {eq["origin"].id: way, eq["direction"].id: direction}, here
+
+
+def _signs(eq: Equations, frozen: Mapping[int, Value]) -> dict[int, Value]:
+    """What laws ask of the sign of the slide's velocity, by its direction in the step.
+
+    No step goes on beyond where the slide turns, but one may begin before, where it has as good as
+    turned. A damping that differs by direction is then that of the way which the step goes.
+    """
+    if eq.travelled is None:
+        return {}
+    speed, direction = eq.travelled[1], frozen[eq["direction"].id]
+    found = {}
+    for value in order([state.rate for state in eq.states]):
+        if value.operation not in ("less", "less_equal"):
+            continue
+        left, right = value.operands
+        if left is speed and right.is_constant and right.data == 0.0:
+            found[value.id] = direction < 0.0
+        elif right is speed and left.is_constant and left.data == 0.0:
+            found[value.id] = direction > 0.0
+    return found
 
 
 def _allowed(eq: Equations) -> Value:

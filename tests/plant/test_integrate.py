@@ -7,8 +7,16 @@ import pytest
 
 from benchmarks.accuracy import MODELS, POSITION_LIMIT, STATE_LIMIT, error_ladder
 from benchmarks.limits import FRICTIONLESS, energies, energy_drift, mass_effect, one_mass_error
-from benchmarks.reference import integrated, random_commands, reference, shares, simulated
+from benchmarks.reference import (
+    integrated,
+    random_commands,
+    reference,
+    shares,
+    simulated,
+    switches,
+)
 from pma_gym.plant.model import load_model
+from pma_gym.plant.plain import PlainPlant
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
 from pma_gym.plant.simulation import Run, simulate_all
 
@@ -53,6 +61,24 @@ def test_a_random_policy_against_scipy(model):
     assert max(found.values()) < 4e-4
     for name in ("contraction", "angle", "extension", "servo"):
         assert found.get(name, 0.0) < 1e-5
+
+
+@pytest.mark.parametrize("pressure", [200e3, 350e3, 550e3])
+def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
+    # serres2008 damps a muscle that shortens 1.8 times as much as one that is pulled, which this
+    # one is in a moment: it still shortens by 0.1 um/s.
+    plant = Plant("serres2008")
+    rest, at = plant.settle(2.0, pressure), plant.states.index("velocity")
+    told, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
+    rest.state[at] = 1e-7
+    made = PlainPlant(plant).attempt(rest.state, told, zero, 5e-4, 1e-3)
+    assert made.taken
+
+    def rate(_, state):
+        return plant.derivative(state, *told, zero)
+
+    truth = integrated(rate, rest.state, made.length, switches(plant, zero))
+    assert made.state[at] == pytest.approx(truth[at], rel=1e-4) and truth[at] < -5e-5
 
 
 def test_a_random_policy_takes_few_attempts():
