@@ -5,7 +5,7 @@ import ctypes
 from pma_gym.envs.kernel_writer import Writer
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.record import Record
-from pma_gym.kernels.native import Library, compiled, simd_lanes
+from pma_gym.kernels.native import Library, compiled, pairs, simd_lanes
 from pma_gym.plant.program import Program, structure
 from pma_gym.plant.settle import hangs_by_itself
 
@@ -51,7 +51,7 @@ class Kernel:
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward),
             *(options.regulator_action, options.safety, self.draws),
-            *(self.width, self.abreast, self.single),
+            *(self.width, self.abreast, self.single, pairs(self.width)),
             *(record.task.structure, record.events),
         )
         return ["environment", *structure(self.program.model), *map(str, said)]

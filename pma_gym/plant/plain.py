@@ -6,8 +6,9 @@
         print(made.length, made.taken, made.state)
 
 It makes the same attempts in the same order as the compiled march, some hundred times slower.
-Compiled code rounds a product and a sum at once (fused multiply-add), so a step's numbers differ
-from it by a few units in the last place, and a long trial's by what those grow to.
+Compiled code rounds a product and a sum at once (fused multiply-add) and adds first what is there
+first, so a step's numbers differ from it by a few units in the last place, and a long trial's by
+what those grow to.
 """
 
 from collections.abc import Callable, Iterator

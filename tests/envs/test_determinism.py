@@ -64,6 +64,15 @@ def test_all_passes_of_the_compiler_give_the_bits_of_few(make, monkeypatch, tmp_
     assert list(tmp_path.rglob("*.o"))
 
 
+def test_one_computed_as_a_pair_has_the_bits_of_one_alone(make, monkeypatch):
+    found = []
+    for paired in (False, True):
+        for module in ("kernel", "kernel_writer"):
+            monkeypatch.setattr(f"pma_gym.envs.{module}.pairs", lambda width, p=paired: p)
+        found.append(bits(make(preview=1, pressure_kpa=300), 7))
+    assert found[0] == found[1]
+
+
 def test_without_noise_the_seed_does_not_matter(make):
     assert bits(make(noise=False), 1) == bits(make(noise=False), 2)
     assert bits(make(noise=True), 1) != bits(make(noise=True), 2)

@@ -143,19 +143,21 @@ def columns_module(outputs, inputs, lanes):
     return module
 
 
-def run(outputs, given, width=1, real="double", fused=False):
+def run(outputs, given, width=1, real="double", fused=False, paired=False):
     """Compiled outputs for arrays by name, of a length that the width divides."""
     inputs = live_inputs(outputs)
-    library = Library(columns_module(outputs, inputs, Lanes(width, real, fused)))
+    lanes = Lanes(width, real, fused, paired)
+    library = Library(columns_module(outputs, inputs, lanes))
     call = library.function("run", [ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p])
     type_ = {"double": np.float64, "float": np.float32}[real]
     columns = [np.asarray(given[value.data]) for value in inputs]
     columns = [c.view(type_) if c.dtype == np.uint64 else c.astype(type_) for c in columns]
     blocks = len(columns[0]) // width
-    packed = np.stack([c.reshape(blocks, width) for c in columns], axis=1).copy()
-    found = np.zeros((blocks, len(outputs), width), type_)
+    packed = np.stack([c.reshape(blocks, width) for c in columns], axis=1)
+    packed = np.repeat(packed, lanes.places // width, axis=2)
+    found = np.zeros((blocks, len(outputs), lanes.places), type_)
     call(blocks, packed.ctypes.data, found.ctypes.data)
-    results = [found[:, i].ravel() for i in range(len(outputs))]
+    results = [found[:, i, :width].ravel() for i in range(len(outputs))]
     kinds = [value.kind for value in outputs]
     return [r.view(np.uint64) if k == "integer" else r for r, k in zip(results, kinds, strict=True)]
 

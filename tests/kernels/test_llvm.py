@@ -122,8 +122,8 @@ def test_any_and_all(width, truths):
     assert call(write, given, returns=INTEGER) == int(given.any()) + 2 * int(given.all())
 
 
-@pytest.mark.parametrize("width", [1, 8])
-def test_every_kind_is_kept_and_every_operation_written(width, run_columns):
+@pytest.mark.parametrize(("width", "paired"), [(1, False), (1, True), (8, False)])
+def test_every_kind_is_kept_and_every_operation_written(width, paired, run_columns):
     graph = Graph()
     x, y = (graph.input(name, CHANGING) for name in "xy")
     i, t = graph.input("i", CHANGING, "integer"), graph.input("t", CHANGING, "truth")
@@ -142,7 +142,7 @@ def test_every_kind_is_kept_and_every_operation_written(width, run_columns):
         "i": np.array([0, 4, 2**63, 2**64 - 1] * 4, np.uint64),
         "t": np.array([0.0, 1.0] * 8),
     }
-    found = run_columns(outputs, given, width)
+    found = run_columns(outputs, given, width, paired=paired)
     for column, expected in zip(found, evaluate(outputs, given), strict=True):
         np.testing.assert_array_equal(column, expected)
 
