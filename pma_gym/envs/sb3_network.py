@@ -21,6 +21,10 @@ from torch.autograd.function import once_differentiable
 Layers = Sequence[tuple[Tensor, Tensor]]
 """Weights and biases, or their derivatives: shapes (outputs, inputs) and (outputs,)."""
 
+Scaled = Sequence[tuple[Tensor, Tensor, float, float]]
+"""Transposed weights, biases, and factors on the product with the former and on the latter: powers
+of two, with which no bit depends on when they are multiplied in."""
+
 
 def is_plain(modules: Sequence[nn.Module]) -> bool:
     """Whether they are Linear, Tanh and so on up to a Linear, with one hidden layer or more."""
@@ -38,21 +42,21 @@ def layers_of(modules: Sequence[nn.Module]) -> Layers:
     return [(one.weight, one.bias) for one in linear]
 
 
-def scaled(layers: Layers) -> Layers:
-    """Transposed weights, and biases, as `passed` wants them: those of s in place of h.
+def scaled(layers: Layers) -> Scaled:
+    """The layers as `passed` wants them, those of s in place of h.
 
     Args:
         layers: two or more.
     """
     (weight, bias), *between, (last, last_bias) = layers
     return [
-        ((2.0 * weight).t(), 2.0 * bias),
-        *(((4.0 * weight).t(), 2.0 * (bias - weight.sum(1))) for weight, bias in between),
-        ((2.0 * last).t(), last_bias - last.sum(1)),
+        (weight.t(), bias, 2.0, 2.0),
+        *((weight.t(), bias - weight.sum(1), 4.0, 2.0) for weight, bias in between),
+        (last.t(), last_bias - last.sum(1), 2.0, 1.0),
     ]
 
 
-def passed(x: Tensor, layers: Layers, out: Sequence[Tensor] = ()) -> list[Tensor]:
+def passed(x: Tensor, layers: Scaled, out: Sequence[Tensor] = ()) -> list[Tensor]:
     """What every hidden layer passes on, its s, and y.
 
     Args:
@@ -60,11 +64,16 @@ def passed(x: Tensor, layers: Layers, out: Sequence[Tensor] = ()) -> list[Tensor
         layers: scaled ones.
         out: where to write each s, shapes (rows, outputs); empty for fresh memory.
     """
-    *hidden, (last, last_bias) = layers
+    *hidden, last = layers
     found = [x]
-    for (weight, bias), place in zip(hidden, out or [None] * len(hidden), strict=True):
-        found.append(torch.addmm(bias, found[-1], weight, out=place).sigmoid_())
-    return [*found[1:], torch.addmm(last_bias, found[-1], last)]
+    for layer, place in zip(hidden, out or [None] * len(hidden), strict=True):
+        found.append(_linear(found[-1], layer, place).sigmoid_())
+    return [*found[1:], _linear(found[-1], last)]
+
+
+def _linear(x: Tensor, layer: tuple[Tensor, Tensor, float, float], out: Any = None) -> Tensor:  # noqa: ANN401
+    weight, bias, alpha, beta = layer
+    return torch.addmm(bias, x, weight, alpha=alpha, beta=beta, out=out)
 
 
 def network(x: Tensor, layers: Layers) -> Tensor:
@@ -98,9 +107,11 @@ def derivatives(
         torch.sum(of_y, 0, out=of_bias)
         # By h = 2 s - 1.
         torch.addmm(of_bias[:, None], of_y.t(), s, beta=-1, alpha=2, out=of_weight)
-        # Of one column it is the same, in 0.4 of the time.
-        product = torch.mul if of_y.shape[1] == 1 else torch.mm
-        of_y = product(of_y, 4.0 * weight, out=place)
+        if of_y.shape[1] == 1:
+            # The same, in 0.4 of the time.
+            of_y = torch.mul(of_y, 4.0 * weight, out=place)
+        else:
+            of_y = torch.addmm(place, of_y, weight, alpha=4.0, beta=0.0, out=place)
         torch.ops.aten.sigmoid_backward.grad_input(of_y, s, grad_input=of_y)
     of_weight, of_bias = out.layers[0]
     torch.sum(of_y, 0, out=of_bias)

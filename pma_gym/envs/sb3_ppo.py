@@ -108,12 +108,13 @@ class LeanPPO(PPO):
         self, policy: LeanMlpPolicy, clip: float, clip_values: float | None
     ) -> "_Losses":
         """Go through the rollout `n_epochs` times, or until the policy has changed too much."""
-        rollout = _Rollout(self.rollout_buffer)
+        rollout = _Rollout(self.rollout_buffer, self.normalize_advantage)
         most = min(self.batch_size, rollout.rows)
         updates, losses = _Updates(policy, most), _Losses()
         with _two_at_once(most * self._weights()) as begin:
             for epoch in range(self.n_epochs):
                 losses.divergences.clear()
+                acted: list[_Acted] = []
                 order = np.random.permutation(rollout.rows)
                 rows = [order[i : i + most] for i in range(0, rollout.rows, most)]
                 waiting = begin(rollout.part, rows[0])
@@ -123,26 +124,28 @@ class LeanPPO(PPO):
                     if following is not None:
                         # Behind the critic, while the optimiser works.
                         waiting = begin(rollout.part, following)
-                    self._act(updates, part, clip, losses)
+                    acted.append(self._act(updates, part, clip))
                     losses.values.append(critic())
-                    divergence = losses.divergences[-1]
-                    if self.target_kl is not None and divergence > 1.5 * self.target_kl:
-                        self._n_updates += 1
-                        if self.verbose >= 1:
-                            print(
-                                f"Early stopping at step {epoch} due to reaching max kl: "
-                                f"{divergence:.2f}"
-                            )
-                        return losses
+                    if self.target_kl is not None:
+                        losses.judge(acted.pop(), clip)
+                        divergence = losses.divergences[-1]
+                        if divergence > 1.5 * self.target_kl:
+                            self._n_updates += 1
+                            if self.verbose >= 1:
+                                print(
+                                    f"Early stopping at step {epoch} due to reaching max kl: "
+                                    f"{divergence:.2f}"
+                                )
+                            return losses
                     updates.make(self.max_grad_norm)
+                # Not in between, where Python's threads wait for each other.
+                for one in acted:
+                    losses.judge(one, clip)
                 self._n_updates += 1
         return losses
 
-    def _act(self, updates: "_Updates", part: "_Part", clip: float, losses: "_Losses") -> None:
-        """The actor's derivatives and losses."""
-        advantages = part.advantages
-        if self.normalize_advantage and len(advantages) > 1:
-            advantages = (advantages - advantages.mean()) / (advantages.std(ddof=1) + 1e-8)
+    def _act(self, updates: "_Updates", part: "_Part", clip: float) -> "_Acted":
+        """The actor's derivatives, and what its losses follow from."""
         mean = updates.actor.passed(part.observations)
         updates.policy.check_mean(mean)
         log_std = updates.log_std
@@ -151,17 +154,14 @@ class LeanPPO(PPO):
         constant = (log_std + HALF_LOG_TAU).sum()
         log_ratio = -0.5 * squares.sum(1) - constant - part.likelihoods
         ratio = np.exp(log_ratio)
-        free = advantages * ratio
-        clipped = advantages * np.clip(ratio, 1.0 - clip, 1.0 + clip)
-        losses.policies.append(-float(np.minimum(free, clipped).mean()))
-        losses.clipped.append(float((np.abs(ratio - 1.0) > clip).mean()))
-        losses.entropies.append(-float((log_std + (0.5 + HALF_LOG_TAU)).sum()))
-        losses.divergences.append(float((ratio - 1.0 - log_ratio).mean()))
+        free = part.advantages * ratio
+        clipped = part.advantages * np.clip(ratio, 1.0 - clip, 1.0 + clip)
         # By the logarithm of the likelihood; none where the clipped ratio counts.
         by_likelihood = (np.where(free > clipped, 0.0, free) / -len(free))[:, None]
         updates.of_log_std[:] = (by_likelihood * (squares - 1.0)).sum(0) - self.ent_coef
         by_mean = by_likelihood * deviations * np.exp(-log_std)
         updates.actor.derive(torch.from_numpy(by_mean), part.observations)
+        return _Acted(log_std.copy(), log_ratio, ratio, free, clipped)
 
     def _criticise(self, critic: "_Net", part: "_Part", clip: float | None) -> float:
         """The critic's derivatives; its loss."""
@@ -212,10 +212,34 @@ class _Part:
     returns: Numbers
 
 
-class _Rollout:
-    """What a buffer holds, a row a step, all of a step side by side."""
+@dataclass(frozen=True)
+class _Acted:
+    """What the actor's losses in a minibatch follow from.
 
-    def __init__(self, buffer: RolloutBuffer) -> None:
+    Attributes:
+        log_std: logarithms of the actions' standard deviations, shape (entries,).
+        log_ratio, ratio: of the actions' likelihood now to that when they were drawn,
+            shape (rows,).
+        free, clipped: advantages times the ratio, and times the clipped one, shape (rows,).
+    """
+
+    log_std: Numbers
+    log_ratio: Numbers
+    ratio: Numbers
+    free: Numbers
+    clipped: Numbers
+
+
+class _Rollout:
+    """What a buffer holds, a row a step, all of a step side by side.
+
+    Args:
+        buffer: the buffer.
+        normalises: advantages of a minibatch get a mean of 0 and a standard deviation of 1.
+    """
+
+    def __init__(self, buffer: RolloutBuffer, normalises: bool) -> None:
+        self._normalises = normalises
         self.rows = buffer.buffer_size * buffer.n_envs
         names = "observations", "actions", "log_probs", "advantages", "values", "returns"
         # The order of the buffer's own samples, in which it keeps what it has drawn from.
@@ -227,15 +251,19 @@ class _Rollout:
     def part(self, rows: NDArray[np.int64]) -> _Part:
         found = self._whole.take(rows, 0)
         observations, actions = found[:, : self._entries], found[:, self._entries : -4]
-        return _Part(torch.from_numpy(observations), actions, *found[:, -4:].T)
+        likelihoods, advantages, *others = found[:, -4:].T
+        if self._normalises and len(rows) > 1:
+            advantages = (advantages - advantages.mean()) / (advantages.std(ddof=1) + 1e-8)
+        return _Part(torch.from_numpy(observations), actions, likelihoods, advantages, *others)
 
 
 class _Net:
     """A network, with memory for a minibatch's pass and derivatives."""
 
     def __init__(self, layers: Layers, most: int) -> None:
-        self.layers = layers
+        self._layers = layers
         self.weights = [weight for weight, _ in layers]
+        self.follow()
         self._memory = [
             [weight.new_empty((most, len(weight))) for weight in self.weights[:-1]]
             for _ in range(2)
@@ -243,9 +271,13 @@ class _Net:
         self._gradients = [(_gradient(weight), _gradient(bias)) for weight, bias in layers]
         self._hidden: list[Tensor] = []
 
+    def follow(self) -> None:
+        """What follows from the parameters, once they have changed."""
+        self._scaled = scaled(self._layers)
+
     def passed(self, seen: Tensor) -> Tensor:
         out = [one[: len(seen)] for one in self._memory[0]]
-        *self._hidden, y = passed(seen, scaled(self.layers), out)
+        *self._hidden, y = passed(seen, self._scaled, out)
         return y
 
     def derive(self, of_y: Tensor, seen: Tensor) -> None:
@@ -278,6 +310,9 @@ class _Updates:
         """An update, by derivatives whose norm is limited."""
         self._gradient.mul_((most / (self._gradient.norm() + 1e-6)).clamp(max=1.0))
         self.policy.optimizer.step()
+        # Here, where no other thread of Python's works, for small operations wait for each other.
+        self.actor.follow()
+        self.critic.follow()
 
 
 class _Losses:
@@ -289,6 +324,14 @@ class _Losses:
         self.entropies: list[float] = []
         self.clipped: list[float] = []
         self.divergences: list[float] = []
+
+    def judge(self, acted: _Acted, clip: float) -> None:
+        """Add the actor's losses of a minibatch."""
+        ratio, log_ratio = acted.ratio, acted.log_ratio
+        self.policies.append(-float(np.minimum(acted.free, acted.clipped).mean()))
+        self.clipped.append(float((np.abs(ratio - 1.0) > clip).mean()))
+        self.entropies.append(-float((acted.log_std + (0.5 + HALF_LOG_TAU)).sum()))
+        self.divergences.append(float((ratio - 1.0 - log_ratio).mean()))
 
 
 @contextmanager
