@@ -17,8 +17,8 @@ from pma_gym.kernels.crew import Crew
 from pma_gym.tasks import Task
 
 LEAST_BLOCKS = 2
-"""Blocks of lanes that are not divided among threads: taking a part costs what a block does in some
-hundredths of its time."""
+"""Blocks of lanes that are not divided among threads: a part is taken by a few atomic operations,
+and a block steps in some microseconds."""
 
 
 class ActionError(ValueError):
