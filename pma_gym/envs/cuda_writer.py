@@ -156,7 +156,8 @@ class ThreadWriter(BeginWriter):
         wide = {value.id: known[value.id] for value in live_inputs([one.when])}
         wide = {i: widened(b, number) for i, number in wide.items()}
         wide[self.eq.graph.input("clock", HELD).id] = b.load(self._clock, typ=DOUBLE)
-        found = Lanes(1, fused=FUSED).emit(b, [one.when], wide)
+        # What an attempt's samples share is asked for, or it would be a part of each one's sum.
+        found = Lanes(1, fused=FUSED).emit(b, [one.done, one.when], wide)
         return {one.when.id: narrowed(b, found[one.when.id], self.element)}
 
 

@@ -21,7 +21,7 @@ from torch.autograd.function import once_differentiable
 Layers = Sequence[tuple[Tensor, Tensor]]
 """Weights and biases, or their derivatives: shapes (outputs, inputs) and (outputs,)."""
 
-Scaled = Sequence[tuple[Tensor, Tensor, float, float]]
+Layer = tuple[Tensor, Tensor, float, float]
 """Transposed weights, biases, and factors on the product with the former and on the latter: powers
 of two, with which no bit depends on when they are multiplied in."""
 
@@ -42,7 +42,7 @@ def layers_of(modules: Sequence[nn.Module]) -> Layers:
     return [(one.weight, one.bias) for one in linear]
 
 
-def scaled(layers: Layers) -> Scaled:
+def scaled(layers: Layers) -> Sequence[Layer]:
     """The layers as `passed` wants them, those of s in place of h.
 
     Args:
@@ -56,7 +56,7 @@ def scaled(layers: Layers) -> Scaled:
     ]
 
 
-def passed(x: Tensor, layers: Scaled, out: Sequence[Tensor] = ()) -> list[Tensor]:
+def passed(x: Tensor, layers: Sequence[Layer], out: Sequence[Tensor] = ()) -> list[Tensor]:
     """What every hidden layer passes on, its s, and y.
 
     Args:
@@ -71,7 +71,7 @@ def passed(x: Tensor, layers: Scaled, out: Sequence[Tensor] = ()) -> list[Tensor
     return [*found[1:], _linear(found[-1], last)]
 
 
-def _linear(x: Tensor, layer: tuple[Tensor, Tensor, float, float], out: Any = None) -> Tensor:  # noqa: ANN401
+def _linear(x: Tensor, layer: Layer, out: Tensor | None = None) -> Tensor:
     weight, bias, alpha, beta = layer
     return torch.addmm(bias, x, weight, alpha=alpha, beta=beta, out=out)
 

@@ -93,6 +93,7 @@ class Sampling:
         sums: sums of squared errors by phase, with it if it is due.
         when: time from the attempt's beginning to it (s): a difference of times since the trial
             began, for which single precision is too little.
+        done: how much of the control step lies before the attempt (s).
         ideal: ideal position at it (m or rad), an input that the sums need; None where they know it
             from lines.
     """
@@ -102,6 +103,7 @@ class Sampling:
     sample: Value
     sums: list[Value]
     when: Value
+    done: Value
     ideal: Value | None = None
 
 
@@ -134,7 +136,8 @@ def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Samp
         error = position - (line if moved is None else moved)
         inside = due & (sample >= first) & (sample < first + phase.samples)
         sums.append(graph.select(inside, before + error * error, before))
-    return Sampling(due, position, graph.select(due, sample + 1.0, sample), sums, when, moved)
+    following = graph.select(due, sample + 1.0, sample)
+    return Sampling(due, position, following, sums, when, done, moved)
 
 
 COURSE = ("start", "speed", "bend", "end", "end_speed")

@@ -10,18 +10,23 @@ import pytest
 from benchmarks.reference import TRIALS
 from pma_gym.effects import CATALOGUE
 
-EVERY = (
-    "passive_stretch",
+DELAYING_NOTHING = (
     "drive_dead_zone",
     "drive_saturation",
     "torque_ripple",
     "current_imbalance",
-    "regulator_rate_limit",
-    "regulator_deadband",
     "nonlinear_stiffness",
     "warm_up",
-    "lvdt_error",
     "load_cell_error",
+)
+"""Effects for which no sum has another order."""
+
+EVERY = (
+    *DELAYING_NOTHING,
+    "passive_stretch",
+    "regulator_rate_limit",
+    "regulator_deadband",
+    "lvdt_error",
     "pressure_transducer_error",
     "potentiometer_error",
     "load_dependent_damping",
@@ -50,6 +55,18 @@ def case(request, station):
 
 def kept(plant, station):
     return [plant.states.index(name) for name in station.states]
+
+
+@pytest.mark.parametrize("name", DELAYING_NOTHING)
+def test_a_neutral_effect_leaves_every_bit(name, case, station, station_with):
+    trial, (start, states, truth) = case
+    plant = station_with(name, neutral=True)
+    assert plant.states == station.states
+    begun, found, seen = simulated(plant, *trial)
+    np.testing.assert_array_equal(begun.state, start.state)
+    np.testing.assert_array_equal(found, states)
+    for output, values in truth.items():
+        np.testing.assert_array_equal(seen[output], values)
 
 
 @pytest.mark.parametrize("name", EVERY)
