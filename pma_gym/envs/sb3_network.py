@@ -8,9 +8,12 @@ as much, and what is linear is left to the products of matrices:
     s_k = s(4 W_k s_(k-1) + 2 (b_k - W_k 1))        y = 2 W_n s_(n-1) + b_n - W_n 1
 
 so that h is nowhere computed. Its derivative 1 - h^2 is 4 s (1 - s).
+
+Networks of the same observations whose layers have the same shapes, such as actor and critic, are
+computed side by side: half the calls of PyTorch, and of two threads each has a network.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import chain
 from typing import Any
 
@@ -19,11 +22,14 @@ from torch import Tensor, nn
 from torch.autograd.function import once_differentiable
 
 Layers = Sequence[tuple[Tensor, Tensor]]
-"""Weights and biases, or their derivatives: shapes (outputs, inputs) and (outputs,)."""
+"""Weights and biases, or their derivatives: shapes (outputs, inputs) and (outputs,); of networks
+side by side (networks, outputs, inputs) and (networks, outputs), as everything below has such an
+axis in front then."""
 
 Layer = tuple[Tensor, Tensor, float, float]
-"""Transposed weights, biases, and factors on the product with the former and on the latter: powers
-of two, with which no bit depends on when they are multiplied in."""
+"""Transposed weights, shape (inputs, outputs), biases, shape (outputs,) or (networks, 1, outputs),
+and factors on the product with the former and on the latter: powers of two, with which no bit
+depends on when they are multiplied in."""
 
 
 def is_plain(modules: Sequence[nn.Module]) -> bool:
@@ -42,6 +48,22 @@ def layers_of(modules: Sequence[nn.Module]) -> Layers:
     return [(one.weight, one.bias) for one in linear]
 
 
+def alike(nets: Sequence[Layers]) -> Sequence[Sequence[Layers]]:
+    """Networks in groups that can be side by side: all of them, or each alone."""
+    shapes = {tuple(weight.shape for weight, _ in layers) for layers in nets}
+    return [nets] if len(shapes) == 1 else [[layers] for layers in nets]
+
+
+def side_by_side(nets: Sequence[Layers]) -> Layers:
+    """A copy of networks that are alike; one is left as it is."""
+    if len(nets) == 1:
+        return nets[0]
+    return [
+        (torch.stack([weight for weight, _ in of_one]), torch.stack([bias for _, bias in of_one]))
+        for of_one in zip(*nets, strict=True)
+    ]
+
+
 def scaled(layers: Layers) -> Sequence[Layer]:
     """The layers as `passed` wants them, those of s in place of h.
 
@@ -49,39 +71,53 @@ def scaled(layers: Layers) -> Sequence[Layer]:
         layers: two or more.
     """
     (weight, bias), *between, (last, last_bias) = layers
-    return [
-        (weight.t(), bias, 2.0, 2.0),
-        *((weight.t(), bias - weight.sum(1), 4.0, 2.0) for weight, bias in between),
-        (last.t(), last_bias - last.sum(1), 2.0, 1.0),
+    found = [
+        (weight.mT, bias, 2.0, 2.0),
+        *((weight.mT, bias - weight.sum(-1), 4.0, 2.0) for weight, bias in between),
+        (last.mT, last_bias - last.sum(-1), 2.0, 1.0),
     ]
+    if weight.dim() == 2:
+        return found
+    return [(weight, bias[:, None], alpha, beta) for weight, bias, alpha, beta in found]
 
 
 def passed(x: Tensor, layers: Sequence[Layer], out: Sequence[Tensor] = ()) -> list[Tensor]:
-    """What every hidden layer passes on, its s, and y.
+    """What every hidden layer passes on, its s, and y; shapes (rows, outputs).
 
     Args:
-        x: shape (rows, inputs).
+        x: the same for all networks, shape (rows, inputs).
         layers: scaled ones.
-        out: where to write each s, shapes (rows, outputs); empty for fresh memory.
+        out: where to write each s; empty for fresh memory.
     """
     *hidden, last = layers
-    found = [x]
+    found = [_shared(x, last[0])]
     for layer, place in zip(hidden, out or [None] * len(hidden), strict=True):
         found.append(_linear(found[-1], layer, place).sigmoid_())
     return [*found[1:], _linear(found[-1], last)]
 
 
+def _shared(x: Tensor, among: Tensor) -> Tensor:
+    return x if among.dim() == 2 else x.expand(len(among), *x.shape)
+
+
 def _linear(x: Tensor, layer: Layer, out: Tensor | None = None) -> Tensor:
     weight, bias, alpha, beta = layer
-    return torch.addmm(bias, x, weight, alpha=alpha, beta=beta, out=out)
+    return _added(x)(bias, x, weight, alpha=alpha, beta=beta, out=out)
+
+
+def _added(factor: Tensor) -> Callable[..., Tensor]:
+    """What adds a product to something."""
+    return torch.addmm if factor.dim() == 2 else torch.baddbmm
 
 
 def network(x: Tensor, layers: Layers) -> Tensor:
-    """What the layers say, with derivatives from one node of PyTorch's graph.
+    """What a network says, with derivatives from one node of PyTorch's graph.
 
     Args:
         x: shape (rows, inputs).
         layers: two or more.
+    Returns:
+        Shape (rows, outputs).
     """
     if torch.is_grad_enabled():
         return _Network.apply(x, *chain.from_iterable(layers))
@@ -95,28 +131,28 @@ def derivatives(
 
     Args:
         of_y: shape (rows, outputs).
-        x: shape (rows, inputs).
+        x: the same for all networks, shape (rows, inputs).
         weights: of the layers.
         hidden: what they passed on.
         out: where to write.
     Returns:
-        Those by the first layer's output before its tanh.
+        Those by the first layer's output before its tanh; shape (rows, outputs).
     """
     back = zip(weights[:0:-1], hidden[::-1], out.layers[:0:-1], out.hidden[::-1], strict=True)
     for weight, s, (of_weight, of_bias), place in back:
-        torch.sum(of_y, 0, out=of_bias)
+        torch.sum(of_y, -2, out=of_bias)
         # By h = 2 s - 1.
-        torch.addmm(of_bias[:, None], of_y.t(), s, beta=-1, alpha=2, out=of_weight)
-        if of_y.shape[1] == 1:
+        _added(of_y)(of_bias[..., None], of_y.mT, s, beta=-1, alpha=2, out=of_weight)
+        if of_y.shape[-1] == 1:
             # The same, in 0.4 of the time.
             of_y = torch.mul(of_y, 4.0 * weight, out=place)
         else:
-            of_y = torch.addmm(place, of_y, weight, alpha=4.0, beta=0.0, out=place)
+            of_y = _added(of_y)(place, of_y, weight, alpha=4.0, beta=0.0, out=place)
         torch.ops.aten.sigmoid_backward.grad_input(of_y, s, grad_input=of_y)
     of_weight, of_bias = out.layers[0]
-    torch.sum(of_y, 0, out=of_bias)
+    torch.sum(of_y, -2, out=of_bias)
     # So, and not the other way round: few columns on the left are four times as fast.
-    of_weight.copy_(x.t().mm(of_y).t())
+    of_weight.copy_(_shared(x, of_y).mT.matmul(of_y).mT)
     return of_y
 
 

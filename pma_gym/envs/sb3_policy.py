@@ -11,7 +11,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 from torch import Tensor, nn
 
-from pma_gym.envs.sb3_network import is_plain, layers_of, network, passed, scaled
+from pma_gym.envs.sb3_network import Layers, is_plain, layers_of, network, passed, scaled
 
 HALF_LOG_TAU = 0.5 * math.log(2.0 * math.pi)
 
@@ -27,8 +27,7 @@ class LeanMlpPolicy(ActorCriticPolicy):
     What it leaves to `ActorCriticPolicy`, at that one's speed: networks that are anything but
     Linear layers with Tanh between them, actions that are not Gaussian, gSDE, autocast, what
     `torch.compile` compiles, and devices other than the processor. Derivatives are first ones only,
-    and are not traced. It keeps the memory of two minibatches' hidden layers for the next ones:
-    10 MB for two networks of two layers of 64, and minibatches of 4096.
+    and are not traced.
 
     Example:
         >>> from stable_baselines3 import PPO
@@ -94,13 +93,17 @@ class LeanMlpPolicy(ActorCriticPolicy):
         nets = self.mlp_extractor
         return [*nets.policy_net, self.action_net], [*nets.value_net, self.value_net]
 
+    def layers(self) -> list[Layers]:
+        """Weights and biases of actor and critic."""
+        return [layers_of(modules) for modules in self.networks()]
+
     def _mean_and_values(self, obs: Any) -> tuple[Tensor, Tensor]:  # noqa: ANN401
         features = self.extract_features(obs)
         of_actor, of_critic = features if isinstance(features, tuple) else (features, features)
-        actor, critic = self.networks()
-        mean = network(of_actor, layers_of(actor))
+        actor, critic = self.layers()
+        mean = network(of_actor, actor)
         self.check_mean(mean)
-        return mean, network(of_critic, layers_of(critic))
+        return mean, network(of_critic, critic)
 
     def check_mean(self, mean: Tensor) -> None:
         """Refuse means or deviations that are no numbers, as `ActorCriticPolicy` does.
@@ -126,7 +129,7 @@ class _Held:
         self._versions = [one._version for one in self._parameters]
         self._policy, self._shape = policy, policy.action_space.shape or ()
         with torch.no_grad():
-            self._actor, self._critic = (scaled(layers_of(one)) for one in policy.networks())
+            self._actor, self._critic = (scaled(layers) for layers in policy.layers())
             self._deviation = policy.log_std.exp()
             self._constant = (policy.log_std + HALF_LOG_TAU).sum()
 

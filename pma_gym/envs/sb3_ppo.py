@@ -1,9 +1,10 @@
 """Stable-Baselines3's PPO with less work in its minibatches on a processor."""
 
-from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+import math
+from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, ClassVar
 
 import numpy as np
@@ -18,31 +19,37 @@ from stable_baselines3.common.utils import explained_variance
 from stable_baselines3.common.vec_env import VecEnv
 from torch import Tensor
 
-from pma_gym.envs.sb3_network import Derivatives, Layers, derivatives, layers_of, passed, scaled
+from pma_gym.envs.sb3_network import (
+    Derivatives,
+    Layers,
+    alike,
+    derivatives,
+    passed,
+    scaled,
+    side_by_side,
+)
 from pma_gym.envs.sb3_policy import HALF_LOG_TAU, LeanMlpPolicy
+from pma_gym.envs.sb3_threads import Pace, threads
 
-Numbers = NDArray[np.float32]
-
-Begin = Callable[..., Callable[[], Any]]
-"""Begins a call; returns what waits for its result."""
+Numbers = NDArray[np.floating]
 
 MOST_ALONE = 1 << 22
 """Products of a number and a weight, in a network's pass, up to which a second thread is not worth
-waking: 900 rows of two layers of 64 (EPYC). No bit of what is learned from a rollout depends on it.
+waking: 900 rows of two layers of 64. No bit of what is learned from a rollout depends on it.
 """
 
 
 class LeanPPO(PPO):
-    """PPO that learns from `LeanMlpPolicy` without PyTorch's graph, the critic in a second thread.
+    """PPO that learns from `LeanMlpPolicy` without PyTorch's graph, actor and critic side by side.
 
     It does what `PPO` does, minibatch by minibatch, in the same order of the same random numbers;
     what it has learned from one rollout is the same up to rounding. Its settings, its files and
     what it logs are those of `PPO`. "MlpPolicy" means `LeanMlpPolicy`.
 
     Derivatives are computed by the formulas of loss and layers and written to memory that all
-    minibatches of a rollout share. Actor and critic share nothing but the limit of the gradient's
-    norm: each learns in a thread of its own where PyTorch has two or more and minibatches are
-    large. Each gets half of PyTorch's threads.
+    minibatches of a rollout share. Where PyTorch has two threads or more and minibatches are large,
+    actor and critic get a thread each, if their layers have the same shapes, and while that is
+    faster, which it is not where another program wants the cores; no bit depends on it.
 
     What it leaves to `PPO`, at that one's speed: a policy that is no `LeanMlpPolicy`, or that
     leaves its own work to `ActorCriticPolicy`; feature extractors of one's own, and observations
@@ -59,6 +66,13 @@ class LeanPPO(PPO):
         **PPO.policy_aliases,
         "MlpPolicy": LeanMlpPolicy,
     }
+
+    def _setup_model(self) -> None:
+        super()._setup_model()
+        self._pace = Pace()
+
+    def _excluded_save_params(self) -> list[str]:
+        return [*super()._excluded_save_params(), "_pace"]
 
     def is_lean(self) -> bool:
         """Whether it learns so, or as `PPO` does."""
@@ -84,7 +98,7 @@ class LeanPPO(PPO):
         assert isinstance(self.policy, LeanMlpPolicy)
         # Threads that have few rows each only wait for each other.
         few = env.num_envs * self._weights() <= MOST_ALONE
-        with self.policy.held(), _threads(1 if few else torch.get_num_threads()):
+        with self.policy.held(), threads(1 if few else torch.get_num_threads()):
             return super().collect_rollouts(env, *args, **kwargs)
 
     def train(self) -> None:
@@ -110,70 +124,77 @@ class LeanPPO(PPO):
         """Go through the rollout `n_epochs` times, or until the policy has changed too much."""
         rollout = _Rollout(self.rollout_buffer, self.normalize_advantage)
         most = min(self.batch_size, rollout.rows)
-        updates, losses = _Updates(policy, most), _Losses()
-        with _two_at_once(most * self._weights()) as begin:
+        updates, losses = _Updates(policy), _Losses()
+        large = most * self._weights() > MOST_ALONE and torch.get_num_threads() > 1
+        pace = self._pace.work if large and updates.are_together else nullcontext
+        with threads(1):
             for epoch in range(self.n_epochs):
                 losses.divergences.clear()
-                acted: list[_Acted] = []
                 order = np.random.permutation(rollout.rows)
-                rows = [order[i : i + most] for i in range(0, rollout.rows, most)]
-                waiting = begin(rollout.part, rows[0])
-                for following in [*rows[1:], None]:
-                    part = waiting()
-                    critic = begin(self._criticise, updates.critic, part, clip_values)
-                    if following is not None:
-                        # Behind the critic, while the optimiser works.
-                        waiting = begin(rollout.part, following)
-                    acted.append(self._act(updates, part, clip))
-                    losses.values.append(critic())
-                    if self.target_kl is not None:
-                        losses.judge(acted.pop(), clip)
-                        divergence = losses.divergences[-1]
-                        if divergence > 1.5 * self.target_kl:
+                for start in range(0, rollout.rows, most):
+                    rows = order[start : start + most]
+                    with pace(len(rows)):
+                        part = rollout.part(rows)
+                        of_y = self._derivatives(updates, part, clip, clip_values, losses)
+                        if self._has_changed_too_much(losses.divergences[-1], epoch):
                             self._n_updates += 1
-                            if self.verbose >= 1:
-                                print(
-                                    f"Early stopping at step {epoch} due to reaching max kl: "
-                                    f"{divergence:.2f}"
-                                )
                             return losses
-                    updates.make(self.max_grad_norm)
-                # Not in between, where Python's threads wait for each other.
-                for one in acted:
-                    losses.judge(one, clip)
+                        updates.make(of_y, part.observations, self.max_grad_norm)
                 self._n_updates += 1
         return losses
 
-    def _act(self, updates: "_Updates", part: "_Part", clip: float) -> "_Acted":
-        """The actor's derivatives, and what its losses follow from."""
-        mean = updates.actor.passed(part.observations)
+    def _derivatives(
+        self,
+        updates: "_Updates",
+        part: "_Part",
+        clip: float,
+        clip_values: float | None,
+        losses: "_Losses",
+    ) -> Sequence[Numbers]:
+        """Those of the losses by what actor and critic say, shapes (rows, outputs)."""
+        mean, values = updates.passed(part.observations)
         updates.policy.check_mean(mean)
+        by_mean = self._act(updates, part, mean.numpy(), clip, losses)
+        return by_mean, self._criticise(part, values.numpy()[:, 0], clip_values, losses)
+
+    def _has_changed_too_much(self, divergence: float, epoch: int) -> bool:
+        stops = self.target_kl is not None and divergence > 1.5 * self.target_kl
+        if stops and self.verbose >= 1:
+            print(f"Early stopping at step {epoch} due to reaching max kl: {divergence:.2f}")
+        return stops
+
+    def _act(
+        self, updates: "_Updates", part: "_Part", mean: Numbers, clip: float, losses: "_Losses"
+    ) -> Numbers:
+        """Derivatives of the actor's loss by the means; those by `log_std` are written."""
         log_std = updates.log_std
-        deviations = (part.actions - mean.numpy()) * np.exp(-log_std)
+        deviations = (part.actions - mean) * np.exp(-log_std)
         squares = np.square(deviations)
         constant = (log_std + HALF_LOG_TAU).sum()
         log_ratio = -0.5 * squares.sum(1) - constant - part.likelihoods
         ratio = np.exp(log_ratio)
         free = part.advantages * ratio
         clipped = part.advantages * np.clip(ratio, 1.0 - clip, 1.0 + clip)
+        losses.policies.append(-float(np.minimum(free, clipped).mean()))
+        losses.clipped.append(float((np.abs(ratio - 1.0) > clip).mean()))
+        losses.entropies.append(-float((log_std + (0.5 + HALF_LOG_TAU)).sum()))
+        losses.divergences.append(float((ratio - 1.0 - log_ratio).mean()))
         # By the logarithm of the likelihood; none where the clipped ratio counts.
         by_likelihood = (np.where(free > clipped, 0.0, free) / -len(free))[:, None]
         updates.of_log_std[:] = (by_likelihood * (squares - 1.0)).sum(0) - self.ent_coef
-        by_mean = by_likelihood * deviations * np.exp(-log_std)
-        updates.actor.derive(torch.from_numpy(by_mean), part.observations)
-        return _Acted(log_std.copy(), log_ratio, ratio, free, clipped)
+        return by_likelihood * deviations * np.exp(-log_std)
 
-    def _criticise(self, critic: "_Net", part: "_Part", clip: float | None) -> float:
-        """The critic's derivatives; its loss."""
-        values = critic.passed(part.observations).numpy()[:, 0]
+    def _criticise(
+        self, part: "_Part", values: Numbers, clip: float | None, losses: "_Losses"
+    ) -> Numbers:
+        """Derivatives of the critic's loss by the values; shape (rows, 1)."""
         errors = by_value = values - part.returns
         if clip is not None:
             changes = values - part.values
             errors = part.values + np.clip(changes, -clip, clip) - part.returns
             by_value = np.where(np.abs(changes) > clip, 0.0, errors)
-        by_value = by_value * (2.0 * self.vf_coef / len(values))
-        critic.derive(torch.from_numpy(by_value[:, None]), part.observations)
-        return float(np.square(errors).mean())
+        losses.values.append(float(np.square(errors).mean()))
+        return by_value[:, None] * (2.0 * self.vf_coef / len(values))
 
     def _log(self, losses: "_Losses", clip: float, clip_values: float | None) -> None:
         buffer, record = self.rollout_buffer, self.logger.record
@@ -212,24 +233,6 @@ class _Part:
     returns: Numbers
 
 
-@dataclass(frozen=True)
-class _Acted:
-    """What the actor's losses in a minibatch follow from.
-
-    Attributes:
-        log_std: logarithms of the actions' standard deviations, shape (entries,).
-        log_ratio, ratio: of the actions' likelihood now to that when they were drawn,
-            shape (rows,).
-        free, clipped: advantages times the ratio, and times the clipped one, shape (rows,).
-    """
-
-    log_std: Numbers
-    log_ratio: Numbers
-    ratio: Numbers
-    free: Numbers
-    clipped: Numbers
-
-
 class _Rollout:
     """What a buffer holds, a row a step, all of a step side by side.
 
@@ -257,62 +260,103 @@ class _Rollout:
         return _Part(torch.from_numpy(observations), actions, likelihoods, advantages, *others)
 
 
-class _Net:
-    """A network, with memory for a minibatch's pass and derivatives."""
+class _Group:
+    """Networks side by side, with memory for a minibatch's pass and derivatives.
 
-    def __init__(self, layers: Layers, most: int) -> None:
-        self._layers = layers
-        self.weights = [weight for weight, _ in layers]
+    Args:
+        nets: they are alike.
+    """
+
+    def __init__(self, nets: Sequence[Layers]) -> None:
+        self._nets, self.count = nets, len(nets)
         self.follow()
-        self._memory = [
-            [weight.new_empty((most, len(weight))) for weight in self.weights[:-1]]
-            for _ in range(2)
-        ]
-        self._gradients = [(_gradient(weight), _gradient(bias)) for weight, bias in layers]
+        self._memory: dict[int, list[list[Tensor]]] = {}
         self._hidden: list[Tensor] = []
+        self._gradients: Layers = []
+
+    def shapes(self) -> list[torch.Size]:
+        """Of weights and biases, layer after layer."""
+        return [shape for one in self._weights for shape in (one.shape, one.shape[:-1])]
+
+    def take(self, gradients: Sequence[Tensor]) -> None:
+        """Write derivatives there from now on, of the `shapes`; they are the parameters' own."""
+        self._gradients = list(zip(gradients[::2], gradients[1::2], strict=True))
+        parameters = [chain.from_iterable(layers) for layers in self._nets]
+        for of_nets, pieces in zip(zip(*parameters, strict=True), gradients, strict=True):
+            for parameter, piece in zip(of_nets, self._each(pieces), strict=True):
+                parameter.grad = piece
 
     def follow(self) -> None:
         """What follows from the parameters, once they have changed."""
-        self._scaled = scaled(self._layers)
+        layers = side_by_side(self._nets)
+        self._weights = [weight for weight, _ in layers]
+        self._scaled = scaled(layers)
 
-    def passed(self, seen: Tensor) -> Tensor:
-        out = [one[: len(seen)] for one in self._memory[0]]
-        *self._hidden, y = passed(seen, self._scaled, out)
-        return y
+    def passed(self, seen: Tensor) -> Sequence[Tensor]:
+        *self._hidden, y = passed(seen, self._scaled, self._places(len(seen))[0])
+        return self._each(y)
 
-    def derive(self, of_y: Tensor, seen: Tensor) -> None:
-        places = [one[: len(seen)] for one in self._memory[1]]
-        out = Derivatives(self._gradients, places)
-        derivatives(of_y, seen, self.weights, self._hidden, out)
+    def derive(self, of_y: Sequence[Tensor], seen: Tensor) -> None:
+        together = of_y[0] if self.count == 1 else torch.stack(list(of_y))
+        out = Derivatives(self._gradients, self._places(len(seen))[1])
+        derivatives(together, seen, self._weights, self._hidden, out)
 
+    def _each(self, together: Tensor) -> Sequence[Tensor]:
+        return [together] if self.count == 1 else list(together)
 
-def _gradient(parameter: Tensor) -> Tensor:
-    assert parameter.grad is not None
-    return parameter.grad
+    def _places(self, rows: int) -> list[list[Tensor]]:
+        """Memory for what hidden layers pass on, and for derivatives by it."""
+        if rows not in self._memory:
+            hidden = [weight[..., 0] for weight in self._weights[:-1]]
+            shapes = [(*one.shape[:-1], rows, one.shape[-1]) for one in hidden]
+            both = [[hidden[0].new_empty(shape) for shape in shapes] for _ in range(2)]
+            self._memory[rows] = both
+        return self._memory[rows]
 
 
 class _Updates:
     """The policy's networks, its derivatives in one piece of memory, and its optimiser."""
 
-    def __init__(self, policy: LeanMlpPolicy, most: int) -> None:
+    def __init__(self, policy: LeanMlpPolicy) -> None:
         self.policy = policy
         self.log_std = policy.log_std.detach().numpy()
-        parameters = list(policy.parameters())
-        self._gradient = parameters[0].new_zeros(sum(one.numel() for one in parameters))
-        pieces = self._gradient.split([one.numel() for one in parameters])
-        for parameter, piece in zip(parameters, pieces, strict=True):
-            parameter.grad = piece.view_as(parameter)
-        self.of_log_std = _gradient(policy.log_std).numpy()
-        actor, critic = policy.networks()
-        self.actor, self.critic = _Net(layers_of(actor), most), _Net(layers_of(critic), most)
+        self._groups = [_Group(nets) for nets in alike(policy.layers())]
+        shapes = [policy.log_std.shape, *(one for group in self._groups for one in group.shapes())]
+        sizes = [math.prod(shape) for shape in shapes]
+        self._gradient = policy.log_std.new_zeros(sum(sizes))
+        both = zip(self._gradient.split(sizes), shapes, strict=True)
+        policy.log_std.grad, *others = (piece.view(shape) for piece, shape in both)
+        self.of_log_std = policy.log_std.grad.numpy()
+        for group in self._groups:
+            count = len(group.shapes())
+            group.take(others[:count])
+            del others[:count]
 
-    def make(self, most: float) -> None:
-        """An update, by derivatives whose norm is limited."""
+    @property
+    def are_together(self) -> bool:
+        """Whether actor and critic are in one group."""
+        return len(self._groups) == 1
+
+    def passed(self, seen: Tensor) -> list[Tensor]:
+        """What actor and critic say; shapes (rows, outputs)."""
+        return [y for group in self._groups for y in group.passed(seen)]
+
+    def make(self, of_y: Sequence[Numbers], seen: Tensor, most: float) -> None:
+        """An update, by derivatives whose norm is limited.
+
+        Args:
+            of_y: the loss's derivatives by what actor and critic said.
+            seen: what they said it of.
+            most: of the norm.
+        """
+        left = [torch.from_numpy(one) for one in of_y]
+        for group in self._groups:
+            group.derive(left[: group.count], seen)
+            del left[: group.count]
         self._gradient.mul_((most / (self._gradient.norm() + 1e-6)).clamp(max=1.0))
         self.policy.optimizer.step()
-        # Here, where no other thread of Python's works, for small operations wait for each other.
-        self.actor.follow()
-        self.critic.follow()
+        for group in self._groups:
+            group.follow()
 
 
 class _Losses:
@@ -324,45 +368,3 @@ class _Losses:
         self.entropies: list[float] = []
         self.clipped: list[float] = []
         self.divergences: list[float] = []
-
-    def judge(self, acted: _Acted, clip: float) -> None:
-        """Add the actor's losses of a minibatch."""
-        ratio, log_ratio = acted.ratio, acted.log_ratio
-        self.policies.append(-float(np.minimum(acted.free, acted.clipped).mean()))
-        self.clipped.append(float((np.abs(ratio - 1.0) > clip).mean()))
-        self.entropies.append(-float((acted.log_std + (0.5 + HALF_LOG_TAU)).sum()))
-        self.divergences.append(float((ratio - 1.0 - log_ratio).mean()))
-
-
-@contextmanager
-def _threads(count: int) -> Iterator[None]:
-    """PyTorch has so many threads meanwhile."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(count)
-    try:
-        yield
-    finally:
-        torch.set_num_threads(before)
-
-
-@contextmanager
-def _two_at_once(work: int) -> Iterator[Begin]:
-    """What begins calls in a second thread.
-
-    Args:
-        work: products in a network's pass. Where they are few, or PyTorch has one thread, what is
-            begun is done at once.
-    """
-    threads = torch.get_num_threads()
-    if threads == 1 or work <= MOST_ALONE:
-        with _threads(1):
-            yield lambda call, *arguments: _result(torch.no_grad()(call)(*arguments))
-        return
-    each = threads // 2
-    with ThreadPoolExecutor(1, "pma_gym critic", torch.set_num_threads, (each,)) as pool:
-        with _threads(each):
-            yield lambda call, *arguments: pool.submit(torch.no_grad()(call), *arguments).result
-
-
-def _result(found: object) -> Callable[[], Any]:
-    return lambda: found

@@ -1,7 +1,5 @@
 """The lean PPO learns what Stable-Baselines3's does."""
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 import pytest
 
@@ -15,7 +13,9 @@ from stable_baselines3.common.torch_layers import FlattenExtractor
 from torch import nn
 
 import pma_gym.envs.sb3_ppo as sb3_ppo
+import pma_gym.envs.sb3_threads as sb3_threads
 from pma_gym.envs.sb3 import SB3VecEnv
+from pma_gym.envs.sb3_network import derivatives
 from pma_gym.envs.sb3_policy import LeanMlpPolicy
 from pma_gym.envs.sb3_ppo import LeanPPO
 
@@ -109,28 +109,40 @@ def test_clipping_counts_in_what_is_compared():
 
 
 def test_one_thread_and_two_learn_the_same_bits(monkeypatch):
-    begun, before, found = [], torch.get_num_threads(), []
+    had, before, found = [], torch.get_num_threads(), []
 
-    class Counted(ThreadPoolExecutor):
-        def submit(self, *args):
-            begun.append(args)
-            return super().submit(*args)
+    def watched(*args):
+        had.append(torch.get_num_threads())
+        return derivatives(*args)
 
-    models = [learned(LeanPPO, seed=4) for _ in range(2)]
-    monkeypatch.setattr(sb3_ppo, "MOST_ALONE", 0)
-    monkeypatch.setattr(sb3_ppo, "ThreadPoolExecutor", Counted)
+    def trained(allowed, most_alone, first, **options):
+        """Parameters after a training of 6 minibatches, so large that threads do share them."""
+        options = {"n_steps": 1500, "batch_size": 1000, "steps": 1500, "seed": 4} | options
+        model = learned(LeanPPO, **options)
+        monkeypatch.setattr(sb3_ppo, "derivatives", watched)
+        monkeypatch.setattr(sb3_ppo, "MOST_ALONE", most_alone)
+        monkeypatch.setattr(sb3_threads, "FIRST", first)
+        # However long two threads take here.
+        monkeypatch.setattr(sb3_threads, "PATIENCE", 1e9)
+        torch.set_num_threads(allowed)
+        np.random.seed(5)
+        model.train()
+        assert torch.get_num_threads() == allowed
+        monkeypatch.undo()
+        torch.set_num_threads(before)
+        return [one.clone() for one in model.policy.state_dict().values()]
+
     try:
-        for threads, model in enumerate(models, start=1):
-            torch.set_num_threads(threads)
-            np.random.seed(5)
-            model.train()
-            assert torch.get_num_threads() == threads
-            assert bool(begun) == (threads == 2)
-            found.append([one.clone() for one in model.policy.state_dict().values()])
+        for settings in ((1, 0, 1), (2, 0, 1), (5, 0, 4), (2, 1 << 40, 1)):
+            found.append(trained(*settings, env=Mass(actions=1)))
+        trained(2, 0, 1, env=Mass(actions=2))
     finally:
         torch.set_num_threads(before)
-    for one, two in zip(*found, strict=True):
-        assert torch.equal(one, two)
+    assert had[:24] == [1] * 6 + [1] + [2] * 5 + [1] * 4 + [2] * 2 + [1] * 6
+    # Those of other shapes are not shared: their bits do depend on the number of threads.
+    assert had[24:] == [1] * 12
+    for same in zip(*found, strict=True):
+        assert all(torch.equal(same[0], one) for one in same)
 
 
 class Doubling(FlattenExtractor):
