@@ -73,8 +73,12 @@ class BeginningWriter(BlockMemory):
         return [self.force, *self.reach, *self.line]
 
     def _begin(self) -> None:
-        """Begin trials of environments, at rest wherever their states are not set already."""
-        b, (arguments,) = function(self.module, "begin", [("arguments", POINTER)])
+        """Begin trials of environments, at rest wherever their states are not set already.
+
+        It is a function for a `Crew`, which takes no other part itself.
+        """
+        both = [("arguments", POINTER), ("crew", POINTER)]
+        b, (arguments, _) = function(self.module, "begin", both, INTEGER)
         given = self._arguments(b, arguments)
         lanes = Lanes(1, fused=FUSED)
         settles = b.icmp_signed("!=", given["settles"], integer(0))
@@ -87,7 +91,7 @@ class BeginningWriter(BlockMemory):
                     self._settle(b, given, records, tables, lane, row)
             self._zero_sensors(b, records, tables, lane)
             self._first(b, lanes, given, records, tables, lane, index)
-        b.ret_void()
+        b.ret(integer(0))
 
     def _settle(
         self,

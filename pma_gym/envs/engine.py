@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pma_gym.envs.advance import BOUND
 from pma_gym.envs.block_memory import ARGUMENTS
-from pma_gym.envs.episodes import Episodes
+from pma_gym.envs.episodes import FIRST, LAST, SETTLES, Episodes
 from pma_gym.envs.options import Options, Pressure
 from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import builtin
@@ -19,6 +19,15 @@ from pma_gym.tasks import Task
 LEAST_BLOCKS = 2
 """Blocks of lanes that are not divided among threads: a part is taken by a few atomic operations,
 and a block steps in some microseconds."""
+
+LEAST_BEGUN = 32
+"""Episodes that begin at once that threads share: each takes about a microsecond."""
+
+BEGUN_PARTS = 8
+"""Parts of a thread's share of these."""
+
+_BEGINNING = 1
+"""The crew's second work; the first is a step."""
 
 
 class ActionError(ValueError):
@@ -70,11 +79,15 @@ class Engine(Episodes):
     ) -> None:
         """Compile, make room, and send threads to work."""
         super().__init__(task, options, count, single, pressures)
-        self._crew = Crew(self.kernel.library.address("step"), self._parts(threads))
+        threads = max(1, min(threads, self.blocks))
+        self._beginnings = np.tile(self._beginning, (threads * BEGUN_PARTS, 1))
+        shares = [list(share) for share in np.split(self._beginnings, threads)]
+        address = self.kernel.library.address
+        self._crew = Crew((address("step"), self._parts(threads)), (address("begin"), shares))
+        self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def _parts(self, threads: int) -> list[list[NDArray[np.int64]]]:
         """The arguments of a step, of every part of each thread's share of the blocks."""
-        threads = max(1, min(threads, self.blocks))
         edges = np.linspace(0, self.blocks, threads + 1).round().astype(int).tolist()
         shares = [_halves(*ends) if threads > 1 else [ends] for ends in pairwise(edges)]
         self._count_attempts(sum(map(len, shares)))
@@ -102,6 +115,15 @@ class Engine(Episodes):
         if self._has_idle_lanes:
             self._idle_lanes[:] = 0
         return self._crew.run()
+
+    def _begin(self, count: int, settles: bool) -> None:
+        if count < self._least_shared:
+            super()._begin(count, settles)
+            return
+        parts = self._beginnings
+        edges = np.arange(len(parts) + 1) * count // len(parts)
+        parts[:, FIRST], parts[:, LAST], parts[:, SETTLES] = edges[:-1], edges[1:], settles
+        self._crew.run(_BEGINNING)
 
     def close(self) -> None:
         """End the threads."""

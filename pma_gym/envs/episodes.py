@@ -26,7 +26,8 @@ from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
 
-_LAST, _SETTLES = (ARGUMENTS.index(name) for name in ("last", "settles"))
+FIRST, LAST, SETTLES = (ARGUMENTS.index(name) for name in ("first", "last", "settles"))
+"""Places in a beginning's arguments: of which indices, and whether it draws pressures itself."""
 
 _DRAWN_BY = "key_0", "key_1", "episode"
 
@@ -98,12 +99,16 @@ class Episodes(EngineMemory):
                     self._episodes[indices] -= 1
                     raise
         self._indices[:count] = indices
-        self._beginning[_LAST], self._beginning[_SETTLES] = count, settles
-        self.kernel.begin(self._begin_address)
+        self._begin(count, settles)
         if settles and count == self.count:
             self.pressures[:] = self.numbers("pressure")
         elif settles:
             self.pressures[indices] = self._of("pressure", indices)
+
+    def _begin(self, count: int, settles: bool) -> None:
+        """Have compiled code begin the episodes of the first `count` indices."""
+        self._beginning[LAST], self._beginning[SETTLES] = count, settles
+        self.kernel.begin(self._begin_address, None)
 
     def _settles(self, asked: Sequence[Pressure]) -> bool:
         """Write ranges of pressures for compiled beginnings; whether they find a rest in all."""

@@ -41,7 +41,7 @@ class Kernel:
         self.library: Library = compiled(self._key(), lambda: Writer(self).module, "environment")
         get = self.library.function
         self.check = get("check", [ctypes.c_void_p], ctypes.c_int64)
-        self.begin = get("begin", [ctypes.c_void_p])
+        self.begin = get("begin", [ctypes.c_void_p, ctypes.c_void_p], ctypes.c_int64)
         self.table = get("table", [ctypes.c_void_p, ctypes.c_void_p])
         self.table_size = int(get("table_size", [], ctypes.c_int64)())
 

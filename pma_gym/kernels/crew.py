@@ -1,4 +1,4 @@
-"""Threads that run one compiled function together, awake between calls.
+"""Threads that run compiled functions together, awake between calls.
 
 A thread that sleeps is awakened on the processor of the one that calls it, and waits there until
 that is done: too late for work of less than a millisecond. So these look for work for a while
@@ -38,50 +38,54 @@ from pma_gym.kernels.native import Library, compiled
 SPINS = 100_000
 """Looks for work before a thread sleeps: 0.1 to 0.3 ms."""
 
-TAKEN, GIVEN, DONE, RESULT, PARTS, ARGUMENTS, SHARE = 0, 8, 16, 17, 24, 25, 32
+TAKEN, GIVEN, DONE, RESULT, PARTS, ARGUMENTS, FUNCTION, SHARE = 0, 8, 16, 17, 24, 25, 26, 32
 """Places of a share's numbers, in lines of the cache of their own, and how many there are: parts
 that someone has taken on, that have been given, and that are done, all since the beginning; what
-the function returned; how many parts there are, and the address of the addresses of their
-arguments."""
+the function returned; how many parts there are, the address of the addresses of their arguments,
+and that of the function."""
 
 ANOTHER, SHARES, THREADS, OWN, FROM = range(5)
 """What a thread keeps while it works, in 64-bit integers: address of the function that takes
 another part, address and number of the shares, its own, and address of the share that it took a
 part from last."""
 
+Work = tuple[int, Sequence[Sequence[np.ndarray]]]
+"""Address of a function of two pointers, the arguments of a part and what `write_another` asks for,
+that returns a 64-bit integer; and its arguments for each part of every thread's share, first of the
+thread that calls."""
+
 _POINTER, _INTEGER = ctypes.c_void_p, ctypes.c_int64
 
 
 class Crew:
-    """Runs a compiled function on all parts of some work, in several threads.
+    """Runs compiled functions on all parts of some work, in several threads.
 
     Args:
-        address: address of a function of two pointers, the arguments of a part and what
-            `write_another` asks for, that returns a 64-bit integer.
-        shares: its arguments for each part of every thread's share; the first share is of the
-            thread that calls.
+        works: one or more, with a share for each thread.
     """
 
-    def __init__(self, address: int, shares: Sequence[Sequence[np.ndarray]]) -> None:
+    def __init__(self, *works: Work) -> None:
         """Start a thread for every share but the first."""
-        self._shares, self._address = shares, address
-        self._lead = _library().function("lead", [_POINTER, _POINTER, _INTEGER, _INTEGER], _INTEGER)
+        self._works = works
+        self._lead = _library().function("lead", [_POINTER, _POINTER, _INTEGER], _INTEGER)
         self._begin()
 
     def _begin(self) -> None:
         self._process = os.getpid()
-        self._board = _Board(self._address, self._shares)
-        self._hands = [_Hand(self._board, own) for own in range(1, len(self._shares))]
+        self._board = _Board(self._works)
+        self._hands = [_Hand(self._board, own) for own in range(1, self._board.threads)]
         # Threads know nothing of the crew, so that it can be forgotten, and they with it.
         self.close = weakref.finalize(self, _dismiss, self._hands)
         self.close.atexit = False
 
-    def run(self) -> int:
-        """Do all parts; the bits of what the function returned, together."""
+    def run(self, work: int = 0) -> int:
+        """Do all parts of a work; the bits of what its function returned, together."""
+        # A process that was forked from this one has the hands but not their threads.
+        if self._hands and (self._process != os.getpid() or not self.close.alive):
+            self._begin()
+        if work != self._board.ready:
+            self._board.prepare(work)
         if self._hands:
-            # A process that was forked from this one has the hands but not their threads.
-            if self._process != os.getpid() or not self.close.alive:
-                self._begin()
             # Announced first: a thread that is about to sleep looks at this once more.
             self._board.announce()
             for hand in self._hands:
@@ -94,21 +98,33 @@ class _Board:
     """The work, as all threads see it.
 
     Attributes:
+        threads: how many there are.
         wanted: number of works that there are to do, also those that begin at once.
+        ready: the work that they would do.
         call: the first arguments of `lead` and `serve`.
     """
 
-    def __init__(self, address: int, shares: Sequence[Sequence[np.ndarray]]) -> None:
-        self._arguments = shares
+    def __init__(self, works: Sequence[Work]) -> None:
+        self._arguments = works
         self._tables = [
-            np.array([part.ctypes.data for part in share], np.int64) for share in shares
+            [np.array([part.ctypes.data for part in share], np.int64) for share in shares]
+            for _, shares in works
         ]
+        self._told = [
+            np.array([(len(table), table.ctypes.data, address) for table in tables], np.int64)
+            for (address, _), tables in zip(works, self._tables, strict=True)
+        ]
+        self.threads = len(self._tables[0])
         self._works = np.zeros(SHARE, np.int64)
-        self._numbers = np.zeros((len(shares), SHARE), np.int64)
-        for numbers, table in zip(self._numbers, self._tables, strict=True):
-            numbers[PARTS], numbers[ARGUMENTS] = len(table), table.ctypes.data
+        self._numbers = np.zeros((self.threads, SHARE), np.int64)
         self.wanted = 0
-        self.call = self._works.ctypes.data, self._numbers.ctypes.data, len(shares), address
+        self.call = self._works.ctypes.data, self._numbers.ctypes.data, self.threads
+        self.prepare(0)
+
+    def prepare(self, work: int) -> None:
+        """Have that work done from now on; nobody looks at it before the next is announced."""
+        self._numbers[:, PARTS : FUNCTION + 1] = self._told[work]
+        self.ready = work
 
     def announce(self) -> None:
         """There is one more work to do than were begun; again, should Ctrl-C come before that."""
@@ -128,7 +144,7 @@ class _Hand:
         self._board = board
         self.asleep = self.dismissed = False
         self.bell = threading.Event()
-        kinds = [_POINTER, _POINTER, *[_INTEGER] * 5]
+        kinds = [_POINTER, _POINTER, *[_INTEGER] * 4]
         self._serve = _library().function("serve", kinds, _INTEGER)
         self._own = own
         threading.Thread(target=self._work, daemon=True).start()
@@ -165,7 +181,7 @@ def _build() -> ir.Module:
     return module
 
 
-_BOARD = [("works", POINTER), ("shares", POINTER), ("threads", INTEGER), ("address", INTEGER)]
+_BOARD = [("works", POINTER), ("shares", POINTER), ("threads", INTEGER)]
 
 
 def _now(b: Builder, numbers: Operand, place: int) -> Operand:
@@ -241,7 +257,7 @@ def _done(b: Builder, crew: Operand) -> None:
 def _write_work(module: ir.Module) -> None:
     """Do what nobody has taken on."""
     given = [*_BOARD[1:], ("own", INTEGER)]
-    b, (shares, threads, address, own) = function(module, "work", given)
+    b, (shares, threads, own) = function(module, "work", given)
     crew = variable(b, ir.ArrayType(INTEGER, FROM + 1))
     crew.type = POINTER
     another = b.ptrtoint(module.get_global("another"), INTEGER)
@@ -253,11 +269,12 @@ def _write_work(module: ir.Module) -> None:
     ):
         b.store(value, offset(b, crew, place, INTEGER))
     kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER, POINTER]))
-    work = b.inttoptr(address, kind)
     with repeat(b) as leave_if:
         part = b.call(module.get_global("take"), [crew])
         leave_if(b.icmp_signed("==", part, integer(0)))
         share = _from(b, crew)
+        # Not before there is a part: the next work may have begun, which is another.
+        work = b.inttoptr(b.load(atomic(b, share, FUNCTION), typ=INTEGER), kind)
         result = b.call(work, [b.inttoptr(part, POINTER), crew])
         b.atomic_rmw("or", atomic(b, share, RESULT), result, "monotonic")
         b.atomic_rmw("add", atomic(b, share, DONE), integer(1), "release")
@@ -267,9 +284,7 @@ def _write_work(module: ir.Module) -> None:
 def _write_serve(module: ir.Module) -> None:
     """Work whenever there is any; return the number of works seen once there is none for long."""
     given = [*_BOARD, ("own", INTEGER), ("spins", INTEGER), ("seen", INTEGER)]
-    b, (works, shares, threads, address, own, spins, before) = function(
-        module, "serve", given, INTEGER
-    )
+    b, (works, shares, threads, own, spins, before) = function(module, "serve", given, INTEGER)
     left, seen = variable(b, INTEGER, spins), variable(b, INTEGER, before)
     with repeat(b) as leave_if:
         now = _now(b, works, 0)
@@ -277,7 +292,7 @@ def _write_serve(module: ir.Module) -> None:
         with b.if_else(there) as (yes, no):
             with yes:
                 b.store(now, seen)
-                b.call(module.get_global("work"), [shares, threads, address, own])
+                b.call(module.get_global("work"), [shares, threads, own])
                 b.store(spins, left)
             with no:
                 b.store(b.sub(b.load(left, typ=INTEGER), integer(1)), left)
@@ -287,14 +302,14 @@ def _write_serve(module: ir.Module) -> None:
 
 def _write_lead(module: ir.Module) -> None:
     """Give all parts, work, wait for the rest."""
-    b, (works, shares, threads, address) = function(module, "lead", _BOARD, INTEGER)
+    b, (works, shares, threads) = function(module, "lead", _BOARD, INTEGER)
     with loop(b, threads) as k:
         share = _share(b, shares, k)
         b.store(integer(0), atomic(b, share, RESULT))
         more = b.load(atomic(b, share, PARTS), typ=INTEGER)
         b.store_atomic(b.add(_now(b, share, GIVEN), more), atomic(b, share, GIVEN), "release", 8)
     b.store_atomic(b.add(_now(b, works, 0), integer(1)), atomic(b, works, 0), "release", 8)
-    b.call(module.get_global("work"), [shares, threads, address, integer(0)])
+    b.call(module.get_global("work"), [shares, threads, integer(0)])
     result = variable(b, INTEGER, integer(0))
     with loop(b, threads) as k:
         share = _share(b, shares, k)

@@ -28,6 +28,32 @@ def test_a_batch_is_gymnasiums_own_loop(twins, fragile, count, threads):
     assert both.ends[0].sum() > 2 * count
 
 
+@pytest.mark.parametrize("options", [{}, {"randomisation": "varied", "noise": False}], ids=str)
+@pytest.mark.parametrize("threads", [2, 5])
+def test_threads_begin_many_episodes_as_one_does(monkeypatch, threads, options):
+    made = {"model": "serres2008", "control_rate_hz": 10.0, "pressure_kpa": "random"}
+    one, many = (
+        PMAVectorEnv(70, autoreset_mode="Disabled", threads=count, **made, **options)
+        for count in (1, threads)
+    )
+    # What it does alone is what few episodes are worth.
+    alone, begun = many.engine.kernel.begin, []
+    monkeypatch.setattr(
+        many.engine.kernel, "begin", lambda *given: (begun.append(given), alone(*given))
+    )
+    mask = np.random.default_rng(3).uniform(size=70) < 0.7
+    few = np.arange(70) % 9 == 4
+    assert few.sum() < 32 < mask.sum()
+    for turn, given in enumerate(({}, {"reset_mask": mask}, {"reset_mask": few})):
+        first, again = (envs.reset(seed=turn, options=given)[0] for envs in (one, many))
+        np.testing.assert_array_equal(first, again)
+        np.testing.assert_array_equal(one.engine.records, many.engine.records)
+        np.testing.assert_array_equal(one.pressures, many.pressures)
+        assert len(begun) == (turn == 2)
+        actions = np.linspace(-1.0, 1.0, 70)[:, None]
+        np.testing.assert_array_equal(one.step(actions)[0], many.step(actions)[0])
+
+
 @pytest.mark.parametrize("width", [4, 8, 16])
 def test_the_lanes_of_any_processor_give_the_same_bits(monkeypatch, twins, fragile, width):
     monkeypatch.setattr("pma_gym.envs.engine_memory.simd_lanes", lambda single: width)

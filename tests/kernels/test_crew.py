@@ -99,7 +99,7 @@ def library() -> Library:
 def crew() -> Iterator[tuple[Crew, list[np.ndarray]]]:
     """Four threads, the parts of their work."""
     parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
-    crew = Crew(library().address("add"), [[part] for part in parts])
+    crew = Crew((library().address("add"), [[part] for part in parts]))
     yield crew, parts
     crew.close()
 
@@ -115,7 +115,7 @@ def test_what_no_thread_takes_on_is_done_all_the_same(monkeypatch):
     # As on a machine that is busy with something else: the threads never come.
     monkeypatch.setattr(threading.Thread, "start", lambda _: None)
     parts = [np.array([0, 1 << k], np.int64) for k in range(7)]
-    crew = Crew(library().address("add"), [parts[:1], parts[1:3], parts[3:6], parts[6:]])
+    crew = Crew((library().address("add"), [parts[:1], parts[1:3], parts[3:6], parts[6:]]))
     for calls in range(1, 4):
         assert crew.run() == 127
         assert [part[COUNTER] for part in parts] == [calls << k for k in range(7)]
@@ -129,7 +129,7 @@ def test_parts_of_any_length_are_done_once_whoever_does_them(threads):
         for count in generator.integers(1, 9, threads)
     ]
     parts = [part for share in shares for part in share]
-    crew = Crew(library().address("add_often"), shares)
+    crew = Crew((library().address("add_often"), shares))
     bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
     for calls in range(1, 400):
         assert crew.run() == bits
@@ -146,11 +146,33 @@ def test_parts_that_a_function_takes_itself_are_done_once_and_waited_for(threads
         for count in generator.integers(1, 9, threads)
     ]
     parts = [part for share in shares for part in share]
-    crew = Crew(library().address("add_all"), shares)
+    crew = Crew((library().address("add_all"), shares))
     bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
     for calls in range(1, 2000):
         assert crew.run() == bits
         assert all(part[COUNTER] == calls * part[SECOND] for part in parts)
+    crew.close()
+
+
+@pytest.mark.parametrize("threads", [1, 2, 5])
+def test_works_that_follow_each_other_are_not_mixed_up(threads):
+    generator = np.random.default_rng(threads)
+    works = []
+    for name in ("add", "add_often", "add_all"):
+        shares = [
+            [np.array([0, 1 << int(generator.integers(50)), 3]) for _ in range(count)]
+            for count in generator.integers(1, 9, threads)
+        ]
+        works.append((library().address(name), shares))
+    crew = Crew(*works)
+    parts = [[part for share in shares for part in share] for _, shares in works]
+    calls = np.zeros(3, int)
+    for which in generator.integers(3, size=3000):
+        bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts[which]]))
+        assert crew.run(which) == bits
+        calls[which] += 1
+        for number, own, times in zip(calls, parts, (1, 3, 1), strict=True):
+            assert all(part[COUNTER] == number * times * part[SECOND] for part in own)
     crew.close()
 
 
@@ -161,7 +183,7 @@ def test_who_is_done_takes_what_another_has_not_begun():
         np.array([flags[mine].ctypes.data, flags[other].ctypes.data])
         for mine, other in ((0, 0), (1, 2), (2, 2))
     )
-    crew = Crew(library().address("await_other"), [[alone], [first, second]])
+    crew = Crew((library().address("await_other"), [[alone], [first, second]]))
     for _ in range(50):
         flags[:] = 0
         assert crew.run() == 0, "waited in vain"
@@ -204,13 +226,13 @@ def begun() -> Callable[[], list[threading.Thread]]:
 
 
 def test_a_crew_of_one_needs_no_thread(begun):
-    assert Crew(library().address("add"), [[np.array([0, 3], np.int64)]]).run() == 3
+    assert Crew((library().address("add"), [[np.array([0, 3], np.int64)]])).run() == 3
     assert not begun()
 
 
 @pytest.mark.parametrize("asleep", [False, True])
 def test_threads_end_with_their_crew(begun, asleep):
-    crew = Crew(library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)])
+    crew = Crew((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
     crew.run()
     threads = begun()
     assert len(threads) == 2
@@ -223,7 +245,7 @@ def test_threads_end_with_their_crew(begun, asleep):
 
 
 def test_a_closed_crew_begins_again(begun):
-    crew = Crew(library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)])
+    crew = Crew((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
     for _ in range(2):
         assert crew.run() == 1
         threads = begun()
