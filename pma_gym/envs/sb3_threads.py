@@ -32,9 +32,9 @@ class Pace:
     """Chooses by how long the work has taken.
 
     PyTorch's threads wait for each other many times in a minibatch. Where another program wants a
-    core too, they often wait for a whole turn of that one's: of two trainings at once on two cores,
-    each with two threads, each took 5 times as long as alone with minibatches of 4096, and more
-    than 50 times with 1024. So two threads are given up as soon as they have lost more than
+    core too, they often wait for a whole turn of that one's: of two trainings at once on two cores
+    (Xeon), with two threads each, each took 5 times as long as alone with minibatches of 4096, and
+    more than 50 times with 1024. So two threads are given up as soon as they have lost more than
     `PATIENCE`, and tried again after a pause, which doubles while they go on losing.
 
     It is for work whose result does not depend on the number of threads.
