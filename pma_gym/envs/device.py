@@ -94,7 +94,7 @@ class DeviceEngine:
         if precision not in ("double", "single"):
             raise ValueError(f"precision must be double or single, got {precision!r}")
         self.task, self.options, self.count, self._device = task, options, count, device
-        self.nominal = Plant(rig_model(task, options))
+        self.nominal = Plant(rig_model(task, options), options.tolerance)
         self.record = Record(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self._own_tables = options.randomisation != "none"

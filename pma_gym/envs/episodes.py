@@ -46,7 +46,8 @@ class Episodes(EngineMemory):
         """Check the pressures that are asked for, then compile."""
         self.task, self.told = task, told_model(task, load_model(options.model))
         # The very same model where nothing is added: its plant is known by that.
-        nominal = Plant(rig_model(task, replace(options, model=self.told)))
+        rig = rig_model(task, replace(options, model=self.told))
+        nominal = Plant(rig, options.tolerance)
         self.rest_motor = motor_at_rest(self.told, task)
         # Never written to: what follows from them is kept.
         usual = [options.pressure_kpa] * count if pressures is None else pressures

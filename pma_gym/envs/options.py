@@ -11,6 +11,7 @@ import numpy as np
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.plant import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,
@@ -60,6 +61,9 @@ class Options:
         human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
             `pma_gym.tasks.Human` (which does not survive JSON).
         safety: whether an exercise has its safety layer between agent and regulator.
+        tolerance: largest error of an internal step of the integrator, as a share of what the
+            plant's states are counted against (`Plant`); a larger one is faster, a smaller one
+            more exact.
     """
 
     pressure_kpa: Pressure = "random"
@@ -76,6 +80,7 @@ class Options:
     disturbances: str = "none"
     human: str | Human = "random"
     safety: bool = True
+    tolerance: float = DEFAULT_TOLERANCE
 
     @property
     def disturbing(self) -> Disturbances:
@@ -132,6 +137,7 @@ def parse_options(given: Mapping[str, Any]) -> Options:
             f"{options.human!r}"
         )
     check_pressure(options.pressure_kpa)
+    check_tolerance(options.tolerance)
     return options
 
 

@@ -310,7 +310,8 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     def plant(self) -> Plant:
         """The Plant of this episode; differs from the nominal one with `randomisation`."""
         model = self._engine.models[0]
-        return self.nominal_plant if model is self.nominal_plant.model else Plant(model)
+        nominal = self.nominal_plant
+        return nominal if model is nominal.model else Plant(model, nominal.tolerance)
 
     @property
     def pressure(self) -> float:

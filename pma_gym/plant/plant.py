@@ -80,12 +80,13 @@ class Plant:
     def __init__(
         self, model: str | Path | Model = "serres2008", tolerance: float = DEFAULT_TOLERANCE
     ) -> None:
-        """Compile the model's equations, or load them from the cache."""
-        if not 1e-10 <= tolerance <= 0.1:
-            raise ValueError(
-                f"tolerance must be a share in 1e-10 to 0.1 of the states' scales, got "
-                f"{tolerance!r}; the default is {DEFAULT_TOLERANCE:g}"
-            )
+        """Compile the model's equations, or load them from the cache.
+
+        Raises:
+            ModelError: no such model, or one that cannot be used.
+            ValueError: a tolerance that is none.
+        """
+        check_tolerance(tolerance)
         self.model = load_model(model)
         self.tolerance = tolerance
         self.program = program(self.model)
@@ -313,6 +314,21 @@ def regulator_voltage(model: Model, pressure: float) -> float:
             "whose regulator reaches it"
         )
     return voltage
+
+
+def check_tolerance(tolerance: object) -> None:
+    """Refuse what is no tolerance of the integrator.
+
+    Raises:
+        ValueError: it is no number, or too small or large for one.
+    """
+    is_number = isinstance(tolerance, int | float | np.floating)
+    # `not <=`: NaN is out of every range, as is true or false.
+    if not (is_number and 1e-10 <= float(tolerance) <= 0.1):
+        raise ValueError(
+            f"tolerance must be a share in 1e-10 to 0.1 of the states' scales, got "
+            f"{tolerance!r}; the default is {DEFAULT_TOLERANCE:g}"
+        )
 
 
 def check_voltages(motor_voltage: float, regulator_voltage: float) -> None:

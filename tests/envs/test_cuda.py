@@ -84,7 +84,7 @@ def actions_of(generator, pair, step, rough):
     ("task", "options", "steps", "rough", "threads"),
     [
         ("displacement", {}, 300, True, None),
-        ("displacement", {"control_rate_hz": 50.0}, 320, False, 3),
+        ("displacement", {"control_rate_hz": 50.0, "tolerance": 5e-3}, 320, False, 3),
         ("displacement", {"model": "serres2008"}, 60, True, 32),
         ("rotation", EVERYTHING, 60, False, 8),
         (

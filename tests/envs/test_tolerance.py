@@ -1,0 +1,76 @@
+"""An environment's tolerance: how exact the integration is, and at what price."""
+
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAVectorEnv
+from pma_gym.plant.plant import DEFAULT_TOLERANCE
+
+TOLERANCES = 3e-2, 1e-3, DEFAULT_TOLERANCE, 1e-5
+
+
+def driven(env, steps=150):
+    """True positions under random voltages, and how many attempts at internal steps it took."""
+    voltages = np.random.default_rng(5).uniform(0.0, 3.0, steps)
+    env.reset(seed=2)
+    positions, attempts = [], 0
+    for voltage in voltages:
+        env.step(env.action(voltage))
+        positions.append(env.position)
+        attempts += env._engine.attempts
+    return np.array(positions), attempts
+
+
+def test_the_error_follows_the_tolerance_and_costs_steps(make):
+    true, _ = driven(make(noise=False, tolerance=1e-8))
+    found = [driven(make(noise=False, tolerance=value)) for value in TOLERANCES]
+    errors = [np.abs(positions - true).max() / np.ptp(true) for positions, _ in found]
+    assert errors == sorted(errors, reverse=True) and errors[0] > 30.0 * errors[-1] > 0.0
+    attempts = [made for _, made in found]
+    assert attempts == sorted(attempts) and attempts[0] < 0.9 * attempts[2]
+
+
+def test_the_default_is_the_plants(make):
+    given, left_out = (driven(make(**options)) for options in ({"tolerance": 2.3e-4}, {}))
+    assert DEFAULT_TOLERANCE == 2.3e-4
+    np.testing.assert_array_equal(given[0], left_out[0])
+    assert given[1] == left_out[1]
+
+
+def test_stations_that_are_drawn_have_it_too(make):
+    env = make(randomisation="intervals", tolerance=2e-3)
+    for seed in (1, 2):
+        env.reset(seed=seed)
+        assert env.plant is not env.nominal_plant
+        assert env.plant.tolerance == env.nominal_plant.tolerance == 2e-3
+    fine = driven(make(randomisation="intervals", noise=False, tolerance=1e-6))[0]
+    rough = driven(make(randomisation="intervals", noise=False, tolerance=3e-2))[0]
+    assert 1e-6 < np.abs(rough - fine).max() / np.ptp(fine) < 1e-2
+
+
+@pytest.mark.parametrize("randomisation", ["none", "intervals"])
+def test_a_batch_has_the_bits_of_one(make, randomisation):
+    options = {"randomisation": randomisation, "tolerance": 5e-3}
+    one = make(**options)
+    many = PMAVectorEnv(5, model="serres2008", pressure_kpa=300.0, threads=2, **options)
+    first, _ = one.reset(seed=7)
+    both, _ = many.reset(seed=7)
+    np.testing.assert_array_equal(first, both[0])
+    for action in np.random.default_rng(0).uniform(-1.0, -0.4, (40, 1)).astype(np.float32):
+        alone = one.step(action)
+        together = many.step(np.tile(action, (5, 1)))
+        np.testing.assert_array_equal(alone[0], together[0][0])
+        assert alone[1] == together[1][0]
+
+
+def test_it_compiles_nothing_anew(make):
+    one, other = make(), make(tolerance=1e-3)
+    assert one._engine.kernel.library is other._engine.kernel.library
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1e-3, 0.2, 1e-11, float("nan"), "1e-3", None, True])
+def test_what_is_no_tolerance_is_refused(make, tolerance):
+    words = r"tolerance must be a share in 1e-10 to 0\.1 of the states' scales, got "
+    with pytest.raises(ValueError, match=words) as caught:
+        make(tolerance=tolerance)
+    assert f"got {tolerance!r}; the default is 0.00023" in str(caught.value)
