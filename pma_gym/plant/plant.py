@@ -322,9 +322,8 @@ def check_tolerance(tolerance: object) -> None:
     Raises:
         ValueError: it is no number, or too small or large for one.
     """
-    is_number = isinstance(tolerance, int | float | np.floating)
-    # `not <=`: NaN is out of every range, as is true or false.
-    if not (is_number and 1e-10 <= float(tolerance) <= 0.1):
+    # `not`: NaN is out of every range, as is true or false.
+    if not (isinstance(tolerance, int | float | np.floating) and 1e-10 <= tolerance <= 0.1):
         raise ValueError(
             f"tolerance must be a share in 1e-10 to 0.1 of the states' scales, got "
             f"{tolerance!r}; the default is {DEFAULT_TOLERANCE:g}"
