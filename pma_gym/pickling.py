@@ -36,7 +36,8 @@ def packed(name: str, value: object) -> Packed:
     from gymnasium.vector.utils import CloudpickleWrapper
 
     try:
-        return Packed(CloudpickleWrapper(value).__getstate__())
+        # Made for functions that make environments; it takes any value.
+        return Packed(CloudpickleWrapper(value).__getstate__())  # type: ignore[arg-type]
     except Exception as error:
         raise pickle.PicklingError(
             f"{name} cannot be pickled, got {value!r} ({error}); give a function or an object that "

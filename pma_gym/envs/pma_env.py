@@ -25,9 +25,9 @@ from pma_gym.envs.options import (
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
 from pma_gym.envs.seeding import SeededByReset
-from pma_gym.envs.setup import Setup, setup
+from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.snapshot import put, take
-from pma_gym.envs.state import EnvState, check_state, generator_of, generator_state
+from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task
@@ -354,14 +354,15 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         put(self._engine, state.simulation)
         self.__dict__.pop("plant", None)
         self.ended_by = state.ended_by
-        self._np_random_seed, self._np_random = state.seeds[0], generator_of(state.generator)
+        self._np_random_seed = state.seeds[0]
+        self._np_random = generator_at(state.generator, self._np_random)
         self._commands.begin(self._number("rest_regulator"))
         ended = f"the episode ended at {self.time:g} s" if any(state.ended) else None
         self._wait(ended if any(state.begun) else NOT_BEGUN)
 
     @cached_property
     def _setup(self) -> Setup:
-        return setup(self._engine)
+        return setup(self._engine, num_envs=SINGLE, precision="double")
 
     # -- what the agent, a controller and the reader see -------------------------------------------
 

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from pma_gym.effects.own import source_of
-from pma_gym.envs.engine_memory import EngineMemory
+from pma_gym.envs.engine import Engine
 from pma_gym.plant.model import Model
 
 Setup = tuple[tuple[str, str], ...]
 """Names and values: the task, the options, the model's parameters."""
+
+SINGLE = "a PMAEnv"
+"""Text of `num_envs` of an environment that is no batch."""
 
 FEW = 4
 """Differences that a message names."""
@@ -21,7 +24,7 @@ FEW = 4
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
-def setup(engine: EngineMemory, **others: object) -> Setup:
+def setup(engine: Engine, **others: object) -> Setup:
     """What decides how an engine's environments go on from a state.
 
     Args:
@@ -55,6 +58,9 @@ def differences(theirs: Setup, ours: Setup) -> str:
     known, here = dict(theirs), dict(ours)
     names = [*known, *(name for name in here if name not in known)]
     odd = [name for name in names if known.get(name) != here.get(name)]
+    # A state of a PMAEnv has no mode to differ in.
+    if SINGLE in (known.get("num_envs"), here.get("num_envs")) and "autoreset_mode" in odd:
+        odd.remove("autoreset_mode")
     # What differs in its task or its model keeps other numbers too.
     if len(odd) > 1 and "numbers" in odd:
         odd.remove("numbers")
@@ -74,7 +80,7 @@ def _shortened(text: str | None) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def _task(engine: EngineMemory) -> dict[str, str]:
+def _task(engine: Engine) -> dict[str, str]:
     """The task by its name, by what is compiled of it, and by the references that it gives."""
     task = engine.task
     said = {"task": task.name, "task.load": _text(task.load), "task.starts": _text(task.starts)}

@@ -130,10 +130,12 @@ def _put_numbers(engine: "EngineMemory", numbers: NDArray[np.float64]) -> None:
     else:
         block, lane = np.divmod(np.arange(engine.count), engine.width)
         engine.records[block, :, lane] = numbers
-    keys = wholes[:, places["key_0"] : places["key_0"] + 2]
-    engine._keys[:] = keys
+    for i in range(2):
+        engine._keys[:, i] = wholes[:, places[f"key_{i}"]]
+    engine._episodes[:] = wholes[:, places["episode"]]
     # Before the first seed there is no key, and no episode either.
-    engine._episodes[:] = np.where(keys.any(axis=1), wholes[:, places["episode"]], -1)
+    if not engine._keys[:, 0].all():
+        engine._episodes[~engine._keys.any(axis=1)] = -1
 
 
 def _check_numbers(engine: "EngineMemory", numbers: NDArray[np.float64]) -> None:
@@ -141,19 +143,31 @@ def _check_numbers(engine: "EngineMemory", numbers: NDArray[np.float64]) -> None
     places, wholes = engine.record.places, numbers.view(np.int64)
     steps = engine.task.steps(engine.options.control_rate_hz)
     counts, samples = wholes[:, places["count"]], numbers[:, places["sample"]]
-    keys = wholes[:, places["key_0"] : places["key_0"] + 2]
-    reached = counts * (engine.options.period * SAMPLE_RATE_HZ) + 3.0
-    if not (0 <= counts.min() and counts.max() <= steps):
-        rule = f"control steps must lie in 0-{steps}, got {counts.min()} to {counts.max()}"
-    elif not ((samples >= 0.0) & (samples <= reached)).all():
+    lowest, highest = _range(counts)
+    # Samples are counted up to the control step's end; a few are rounding.
+    early = counts * (engine.options.period * SAMPLE_RATE_HZ) + 3.0 - samples
+    keys = [n for i in range(2) for n in _range(wholes[:, places[f"key_{i}"]])]
+    if not (0 <= lowest and highest <= steps):
+        rule = f"control steps must lie in 0-{steps}, got {lowest} to {highest}"
+    # `not >=`: NaN is out of every range.
+    elif not (_range(samples)[0] >= 0.0 and _range(early)[0] >= 0.0):
         rule = "samples at 384 Hz must go with the control steps"
-    elif not (numbers[:, places["size"]] >= 0.0).all():
+    elif not _range(numbers[:, places["size"]])[0] >= 0.0:
         rule = "the integrator's next step must be 0 s or longer"
-    elif not (0 <= keys.min() and keys.max() < _WORD and wholes[:, places["episode"]].min() >= -1):
-        rule = "keys of random numbers must lie in 0-4294967295, and episodes count from 0"
+    elif not (0 <= min(keys) and max(keys) < _WORD):
+        rule = f"keys of random numbers must lie in 0-{_WORD - 1}, got {keys}"
+    elif not _range(wholes[:, places["episode"]])[0] >= -1:
+        rule = "episodes must count from 0"
     else:
         return
     raise StateError(f"{rule}: the state is damaged; take it anew with get_state()")
+
+
+def _range(column: NDArray[Any]) -> tuple[Any, Any]:
+    """Smallest and largest; of one number without the cost of an array's."""
+    if len(column) == 1:
+        return (column.item(),) * 2
+    return column.min().item(), column.max().item()
 
 
 def _check_models(engine: "EngineMemory", models: tuple[Model | None, ...]) -> None:

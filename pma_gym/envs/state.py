@@ -51,6 +51,27 @@ class EnvState(NamedTuple):
     seeds: tuple[int | None, ...]
     generator: tuple[int, int, int, int] | None
 
+    def spread(self, setup: Setup, count: int) -> "EnvState":
+        """The state of so many environments that all stand where this single one does.
+
+        Args:
+            setup: what they were made with.
+            count: how many they are.
+        """
+        one = self.simulation
+        simulation = Snapshot(
+            one.numbers * count,
+            one.pressures * count,
+            one.observations * count,
+            one.rewards * count,
+            one.flags[:1] * count + one.flags[1:] * count,
+            b"",
+            b"",
+            one.models * count,
+        )
+        flags = self.begun * count, self.ended * count
+        return EnvState(setup, simulation, *flags, None, self.seeds * count, self.generator)
+
     def to_json(self) -> str:
         """The state as JSON text; arrays stand in it as base64."""
         simulation: dict[str, Any] = {
@@ -176,19 +197,23 @@ def generator_state(generator: np.random.Generator | None) -> tuple[int, int, in
     return inner["state"], inner["inc"], state["has_uint32"], state["uinteger"]
 
 
-def generator_of(numbers: tuple[int, int, int, int] | None) -> np.random.Generator | None:
-    """The generator of these numbers."""
+def generator_at(
+    numbers: tuple[int, int, int, int] | None, present: np.random.Generator | None
+) -> np.random.Generator | None:
+    """A generator that goes on from these numbers: the present one, if there is any."""
+    if numbers == generator_state(present):
+        return present
     if numbers is None:
         return None
-    bits = np.random.PCG64(0)
+    generator = present or np.random.Generator(np.random.PCG64(0))
     state, increment, has, left = numbers
-    bits.state = {
+    generator.bit_generator.state = {
         "bit_generator": "PCG64",
         "state": {"state": state, "inc": increment},
         "has_uint32": has,
         "uinteger": left,
     }
-    return np.random.Generator(bits)
+    return generator
 
 
 def _encoded(data: bytes) -> str:

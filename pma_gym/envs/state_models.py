@@ -1,5 +1,6 @@
 """Models of drawn stations as plain documents: exact in SI, where files for people round."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,7 +19,7 @@ def model_document(model: Model) -> dict[str, Any]:
         "name": model.name,
         "title": model.title,
         "plant": model.plant,
-        "parameters": {effect: p._asdict() for effect, p in model.parameters.items()},
+        "parameters": {effect: _floats(p) for effect, p in model.parameters.items()},
         "notes": {path: [n.source, n.low, n.high] for path, n in model.notes.items()},
     }
 
@@ -32,8 +33,15 @@ def parse_model_document(document: Mapping[str, Any]) -> Model:
     """
     parameters = {name: _parameters(name, p) for name, p in document["parameters"].items()}
     notes = {path: _note(path, note) for path, note in document["notes"].items()}
-    head = (str(document[key]) for key in ("name", "title", "plant"))
-    return Model(*head, parameters, notes)
+    name, title, plant = (str(document[key]) for key in ("name", "title", "plant"))
+    return Model(name, title, plant, parameters, notes)
+
+
+def _floats(parameters: Any) -> dict[str, Any]:  # noqa: ANN401
+    return {
+        field: list(map(float, value)) if isinstance(value, tuple) else float(value)
+        for field, value in parameters._asdict().items()
+    }
 
 
 def _note(path: str, given: Any) -> Note:  # noqa: ANN401
@@ -67,9 +75,8 @@ def _parameters(name: str, given: Mapping[str, Any]) -> Any:  # noqa: ANN401
 
 
 def _within(quantity: Quantity, number: object) -> bool:
-    if type(number) not in (int, float):
+    if not isinstance(number, float) or not math.isfinite(number):
         return False
     lower = quantity.lower - ROUNDING * abs(quantity.lower)
     upper = quantity.upper + ROUNDING * abs(quantity.upper)
-    # NaN is out of every range.
-    return lower <= quantity.from_si(number) <= upper  # type: ignore[arg-type]
+    return lower <= quantity.from_si(number) <= upper

@@ -27,9 +27,9 @@ from pma_gym.envs.options import (
 )
 from pma_gym.envs.record import PARTS
 from pma_gym.envs.seeding import SeededByReset, own_seeds
-from pma_gym.envs.setup import Setup, setup
+from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.snapshot import put, take
-from pma_gym.envs.state import EnvState, check_state, generator_of, generator_state
+from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
 
@@ -216,27 +216,39 @@ class PMAVectorEnv(
         """Go on from a state, of these environments or of others that were made as these.
 
         Args:
-            state: what `get_state` gave.
+            state: what `get_state` gave; or what `PMAEnv.get_state` gave, and all of them go on
+                from there, for as many trials of what to do next.
         Raises:
             TypeError: no state.
             StateError: a state of another task, other options or another model, naming what
                 differs; or a damaged one. Nothing has changed then.
         """
-        state = check_state(state, self._setup, self.num_envs)
+        state = check_state(self._spread(state), self._setup, self.num_envs)
         put(self.engine, state.simulation)
         self._begun = np.frombuffer(state.begun, np.bool_).copy()
         self._ended = np.frombuffer(state.ended, np.bool_).copy()
         self._idle = not self._begun.all()
         self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
-        self._seeds, self._np_random = state.seeds, generator_of(state.generator)
+        self._seeds = state.seeds
+        self._np_random = generator_at(state.generator, self._np_random)
+
+    def _spread(self, state: EnvState) -> EnvState:
+        """The state of a PMAEnv that was made as these as one of them all; others as they came."""
+        if not isinstance(state, EnvState) or state.setup != self._single_setup:
+            return state
+        return check_state(state, self._single_setup, 1).spread(self._setup, self.num_envs)
+
+    @cached_property
+    def _single_setup(self) -> Setup:
+        own = {name: text for name, text in self._setup if name != "autoreset_mode"}
+        return tuple((own | {"num_envs": SINGLE}).items())
 
     @cached_property
     def _setup(self) -> Setup:
         precision = "single" if self.engine.kernel.single else "double"
         mode = self.autoreset_mode.value
-        return setup(
-            self.engine, num_envs=str(self.num_envs), autoreset_mode=mode, precision=precision
-        )
+        count = str(self.num_envs)
+        return setup(self.engine, num_envs=count, precision=precision, autoreset_mode=mode)
 
     def step(
         self, actions: NDArray[np.floating]
