@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.plant.program import vector
+from pma_gym.tasks import PACE
 
 if TYPE_CHECKING:
     from pma_gym.envs.engine_memory import EngineMemory
@@ -154,6 +155,8 @@ def _check_numbers(engine: "EngineMemory", numbers: NDArray[np.float64]) -> None
         rule = "samples at 384 Hz must go with the control steps"
     elif not _range(numbers[:, places["size"]])[0] >= 0.0:
         rule = "the integrator's next step must be 0 s or longer"
+    elif any(_range(numbers[:, places[name]])[0] < 0.0 for name in _squares(engine)):
+        rule = "sums of squares must not be negative"
     elif not (0 <= min(keys) and max(keys) < _WORD):
         rule = f"keys of random numbers must lie in 0-{_WORD - 1}, got {keys}"
     elif not _range(wholes[:, places["episode"]])[0] >= -1:
@@ -161,6 +164,12 @@ def _check_numbers(engine: "EngineMemory", numbers: NDArray[np.float64]) -> None
     else:
         return
     raise StateError(f"{rule}: the state is damaged; take it anew with get_state()")
+
+
+def _squares(engine: "EngineMemory") -> list[str]:
+    pace = PACE.phases if engine.task.exercise else ()
+    sums = [f"sum_{phase.name}" for phase in engine.task.protocol.phases]
+    return [*sums, *(f"pace_{phase.name}" for phase in pace)]
 
 
 def _range(column: NDArray[Any]) -> tuple[Any, Any]:
