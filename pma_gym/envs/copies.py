@@ -4,6 +4,8 @@ import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
+from pma_gym.envs.options import Options
+from pma_gym.envs.setup import Setup
 from pma_gym.pickling import Packed, packed
 
 
@@ -16,6 +18,20 @@ class Copies:
 
     _ATTACHED: ClassVar[frozenset[str]] = frozenset()
     """Attributes that point into the engine: `_attach` makes them."""
+
+    options: Options
+    _setup_of: tuple[Options | None, Setup] = (None, ())
+
+    def _made_as(self) -> Setup:
+        """What decides how the environment goes on from a state."""
+        raise NotImplementedError
+
+    @property
+    def _setup(self) -> Setup:
+        """`_made_as` of the present options, made once: every state has it."""
+        if self._setup_of[0] is not self.options:
+            self._setup_of = self.options, self._made_as()
+        return self._setup_of[1]
 
     def _attach(self) -> None:
         """Make what points into the engine."""

@@ -360,8 +360,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         ended = f"the episode ended at {self.time:g} s" if any(state.ended) else None
         self._wait(ended if any(state.begun) else NOT_BEGUN)
 
-    @cached_property
-    def _setup(self) -> Setup:
+    def _made_as(self) -> Setup:
         return setup(self._engine, num_envs=SINGLE, precision="double")
 
     # -- what the agent, a controller and the reader see -------------------------------------------

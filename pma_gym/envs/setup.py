@@ -58,9 +58,11 @@ def differences(theirs: Setup, ours: Setup) -> str:
     known, here = dict(theirs), dict(ours)
     names = [*known, *(name for name in here if name not in known)]
     odd = [name for name in names if known.get(name) != here.get(name)]
-    # A state of a PMAEnv has no mode to differ in.
-    if SINGLE in (known.get("num_envs"), here.get("num_envs")) and "autoreset_mode" in odd:
-        odd.remove("autoreset_mode")
+    # A PMAEnv has no mode to differ in, and any batch of the same kind takes its state.
+    without = {"autoreset_mode"} if here.get("num_envs") == SINGLE else set()
+    if known.get("num_envs") == SINGLE:
+        without = {"autoreset_mode", "num_envs"}
+    odd = [name for name in odd if name not in without]
     # What differs in its task or its model keeps other numbers too.
     if len(odd) > 1 and "numbers" in odd:
         odd.remove("numbers")

@@ -1,7 +1,6 @@
 """Many environments that step together, in SIMD lanes and threads."""
 
 from collections.abc import Mapping, Sequence
-from functools import cached_property
 from typing import Any
 
 import gymnasium as gym
@@ -234,17 +233,18 @@ class PMAVectorEnv(
 
     def _spread(self, state: EnvState) -> EnvState:
         """The state of a PMAEnv that was made as these as one of them all; others as they came."""
-        if not isinstance(state, EnvState) or state.setup != self._single_setup:
+        if not isinstance(state, EnvState) or ("num_envs", SINGLE) not in state.setup:
+            return state
+        if state.setup != self._single_setup:
             return state
         return check_state(state, self._single_setup, 1).spread(self._setup, self.num_envs)
 
-    @cached_property
+    @property
     def _single_setup(self) -> Setup:
         own = {name: text for name, text in self._setup if name != "autoreset_mode"}
         return tuple((own | {"num_envs": SINGLE}).items())
 
-    @cached_property
-    def _setup(self) -> Setup:
+    def _made_as(self) -> Setup:
         precision = "single" if self.engine.kernel.single else "double"
         mode = self.autoreset_mode.value
         count = str(self.num_envs)

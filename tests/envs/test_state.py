@@ -159,7 +159,7 @@ def test_a_batch_looks_ahead_from_where_one_environment_is(randomisation, course
         env.set_state(state)
         seen = env.step([action])
         assert same(seen[0], observations[i]) and seen[1] == rewards[i]
-    with pytest.raises(StateError, match=r"precision is double there and single here; make"):
+    with pytest.raises(StateError, match=r"environment: precision is double there and single here"):
         PMAVectorEnv(2, "displacement", precision="single", **made).set_state(state)
 
 
