@@ -129,7 +129,7 @@ class PMAVectorEnv(
         self._idle = True
         self._attach()
 
-    _ATTACHED = frozenset({"table", "_given"})
+    _ATTACHED = frozenset({"table", "_given", "_advance", "_rewards", "_picture"})
 
     def _attach(self) -> None:
         """Point into the engine."""

@@ -1,5 +1,8 @@
 """Stable-Baselines3's SubprocVecEnv hands environments and what they hold over from its workers."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 
@@ -8,6 +11,7 @@ pytest.importorskip("stable_baselines3")
 from stable_baselines3.common.vec_env import SubprocVecEnv
 
 from pma_gym.envs import PMAEnv
+from pma_gym.envs.sb3 import SB3VecEnv
 from pma_gym.plant.plant import Plant
 
 
@@ -44,3 +48,20 @@ def test_get_attr_of_what_workers_hold(start_method):
         assert envs.env_method("get_state") == [state, state]
     finally:
         envs.close()
+
+
+@pytest.mark.parametrize("made", [copy.deepcopy, lambda envs: pickle.loads(pickle.dumps(envs))])
+def test_copies_of_a_vec_env_go_on_with_the_same_bits(made):
+    envs = SB3VecEnv(3, "displacement", model="serres2008", control_rate_hz=10.0)
+    envs.seed(1)
+    envs.reset()
+    actions = np.random.default_rng(1).uniform(-1.0, 0.0, (70, 3, 1))
+    for action in actions[:45]:
+        envs.step(action)
+    other = made(envs)
+    for action in actions[45:]:
+        seen, its = envs.step(action), other.step(action)
+        for one, two in zip(seen[:3], its[:3], strict=True):
+            np.testing.assert_array_equal(one, two)
+        returns = [[info.get("episode", {}).get(key) for info in seen[3]] for key in "rl"]
+        assert returns == [[info.get("episode", {}).get(key) for info in its[3]] for key in "rl"]
