@@ -1,13 +1,14 @@
 """What the ideal motion of a task is, phase by phase; the two tasks of the dissertation."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any, Literal
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ
+from pma_gym.pickling import Packed, packed
 from pma_gym.units import SI_FACTORS
 
 _MM = SI_FACTORS["mm"]
@@ -118,6 +119,27 @@ class Protocol:
                 f"phases of {self.name} must be one or more, all lines or all of one motion; write "
                 "it as one function of the trial's time"
             )
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Its fields for pickle, the motion once for all phases: it may be any function."""
+        if self.motion is None:
+            return vars(self)
+        phases = tuple(replace(phase, motion=None) for phase in self.phases)
+        motion = packed(f"the motion of {self.name}", self.motion)
+        return vars(self) | {"phases": phases, "motion": motion}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take what `__getstate__` gave."""
+        given = dict(state)
+        motion = given.pop("motion", None)
+        if isinstance(motion, Packed):
+            function: Any = motion.value()
+            given["phases"] = tuple(replace(phase, motion=function) for phase in given["phases"])
+        self.__dict__.update(given)
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Itself: nothing of it changes."""
+        return self
 
     @property
     def suffix(self) -> str:

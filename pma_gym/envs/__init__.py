@@ -5,6 +5,8 @@ import gymnasium as gym
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.snapshot import StateError
+from pma_gym.envs.state import EnvState
 from pma_gym.envs.vector import PMAVectorEnv
 
 ENVIRONMENTS = {
@@ -29,4 +31,13 @@ for _name, _task in ENVIRONMENTS.items():
             kwargs={"task": _task},
         )
 
-__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "PMAVectorEnv", "Reading", "Station"]
+__all__ = [
+    "ENVIRONMENTS",
+    "EnvState",
+    "Options",
+    "PMAEnv",
+    "PMAVectorEnv",
+    "Reading",
+    "StateError",
+    "Station",
+]

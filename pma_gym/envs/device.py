@@ -6,7 +6,7 @@ the processor makes the beginnings; then a step waits for the flags of those tha
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -115,6 +115,14 @@ class DeviceEngine:
         self._allocate(pressures)
         self._host = None if self._draws else Engine(task, options, count)
         self._begun = False
+
+    def __reduce__(self) -> NoReturn:
+        """Refused: the numbers lie on a device, at addresses of this process."""
+        raise TypeError(
+            f"a {type(self).__name__} cannot be copied or pickled, its numbers lie on a device; "
+            "make another one of the same options and reset both with the same seed, or take a "
+            "PMAVectorEnv, which can be"
+        )
 
     def _pressures(self) -> NDArray[np.float64]:
         """Range of the episodes' pressures, or those they are drawn from (Pa)."""

@@ -11,6 +11,7 @@ from pma_gym.envs.advance import BOUND
 from pma_gym.envs.block_memory import ARGUMENTS
 from pma_gym.envs.episodes import FIRST, LAST, SETTLES, Episodes
 from pma_gym.envs.options import Options, Pressure
+from pma_gym.envs.snapshot import Snapshot, put, take
 from pma_gym.kernels import arrays
 from pma_gym.kernels.builtin import builtin
 from pma_gym.kernels.crew import Crew
@@ -50,6 +51,7 @@ class Engine(Episodes):
 
     Attributes:
         count: how many environments.
+        threads: how many threads step them.
         record: places of an environment's numbers.
         table: the observation's entries.
         width: environments that share a block, one lane each.
@@ -79,12 +81,21 @@ class Engine(Episodes):
     ) -> None:
         """Compile, make room, and send threads to work."""
         super().__init__(task, options, count, single, pressures)
-        threads = max(1, min(threads, self.blocks))
+        self.threads = threads = max(1, min(threads, self.blocks))
         self._beginnings = np.tile(self._beginning, (threads * BEGUN_PARTS, 1))
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._crew = Crew((address("step"), self._parts(threads)), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copy and pickle by construction: addresses and compiled code belong to their process."""
+        made_with = self.task, self.options, self.count, self.threads, self.kernel.single
+        return type(self), (*made_with, self.wanted), take(self)
+
+    def __setstate__(self, state: Snapshot) -> None:
+        """Go on from a state that `__reduce__` gave."""
+        put(self, state)
 
     def _parts(self, threads: int) -> list[list[NDArray[np.int64]]]:
         """The arguments of a step, of every part of each thread's share of the blocks."""

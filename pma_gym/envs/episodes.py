@@ -66,12 +66,16 @@ class Episodes(EngineMemory):
     def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:
         """Begin the random numbers of environments anew; None keeps an environment's own."""
         for index, seed in zip(indices.tolist(), seeds, strict=True):
-            if seed is not None or self._episodes[index] < 0 and not self._keys[index].any():
+            if seed is not None or not self.is_seeded(index):
                 self._keys[index] = np.random.SeedSequence(seed).generate_state(2)
                 self._episodes[index] = -1
                 block, lane = divmod(index, self.width)
                 for name, number in zip(_DRAWN_BY, (*self._keys[index], -1), strict=True):
                     self.integers[block, self.record.places[name], lane] = number
+
+    def is_seeded(self, index: int) -> bool:
+        """Whether an environment has random numbers to go on with."""
+        return bool(self._episodes[index] >= 0 or self._keys[index].any())
 
     def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
         """Begin an episode: draw pressure and station, settle, zero the sensors.

@@ -1,15 +1,17 @@
 """The environments' options: checked once, with errors that say how to mend them."""
 
+import copy
 import difflib
 import numbers
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any, Self, TypeGuard
 
 import numpy as np
 
 from pma_gym.effects import CATALOGUE
+from pma_gym.pickling import Packed, packed
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.tasks import (
@@ -81,6 +83,19 @@ class Options:
     human: str | Human = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Its fields for pickle; functions among them need no module."""
+        return {n: packed(n, v) if callable(v) else v for n, v in vars(self).items()}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Take what `__getstate__` gave."""
+        given = {n: v.value() if isinstance(v, Packed) else v for n, v in state.items()}
+        self.__dict__.update(given)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A copy that keeps functions, and copies objects that act as one."""
+        return replace(self, **{n: copy.deepcopy(v, memo) for n, v in vars(self).items()})
 
     @property
     def disturbing(self) -> Disturbances:

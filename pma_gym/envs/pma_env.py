@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from pma_gym.envs.advance import NOT_READ
 from pma_gym.envs.command import CommandLine
+from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.knowledge import Reading, Station
@@ -23,6 +24,10 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
+from pma_gym.envs.seeding import SeededByReset
+from pma_gym.envs.setup import SINGLE, Setup, setup
+from pma_gym.envs.snapshot import put, take
+from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task
@@ -34,7 +39,7 @@ RESET_OPTIONS = ("pressure_kpa",)
 NOT_BEGUN = "no episode has begun"
 
 
-class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """Tracking with a pneumatic muscle that a servo drive pulls through a cable.
 
     In every control step kT the agent commands a voltage, which is held until (k+1)T; a position is
@@ -201,13 +206,24 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.options = parse_options(options)
         self.task = parse_task(task, self.options)
         self._engine = Engine(self.task, self.options)
-        self.nominal_plant = self._engine.nominal
-        self.table = self._engine.table
-        self.observation_space = self.table.space
+        self.observation_space = self._engine.table.space
         self._commands = CommandLine(self.options, self.task.actuator)
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
+        self.ended_by: str | None = None
+        self._idle: str | None = NOT_BEGUN
+        self._attach()
+
+    _ATTACHED = frozenset(
+        {"nominal_plant", "table", "plant", "_places", "_row", "_heard", "_observed", "_given"}
+        | {"_made", "_datum", "_picture", "_advance"}
+    )
+
+    def _attach(self) -> None:
+        """Point into the engine."""
+        self.nominal_plant = self._engine.nominal
+        self.table = self._engine.table
         record = self._engine.record
         self._places = record.places
         self._row = self._engine.records[0, :, 0]
@@ -219,7 +235,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self._made = self._engine.advance(self._observed.copy, self._given)
         self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
-        self._wait(NOT_BEGUN)
+        self._wait(self._idle)
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -238,7 +254,9 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         wanted = self._wanted_pressure(options or {})
         super().reset(seed=seed)
         self._wait(NOT_BEGUN)
-        self._engine.seed(_FIRST, [seed])
+        # Unseeded, it begins with the seed that `np_random_seed` says.
+        begins = seed is None and not self._engine.is_seeded(0)
+        self._engine.seed(_FIRST, [self.np_random_seed if begins else seed])
         self._engine.reset(_FIRST, [wanted])
         self.ended_by = None
         self._wait(None)
@@ -303,6 +321,47 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _number(self, name: str) -> float:
         return float(self._row[self._places[name]])
+
+    # -- states ------------------------------------------------------------------------------------
+
+    def get_state(self) -> EnvState:
+        """All that the environment needs to go on from here with the same bits, as a value.
+
+        Before the first `reset` too: then it is the state of an environment that waits for it.
+        """
+        begun, ended = self._idle != NOT_BEGUN, self._idle not in (NOT_BEGUN, None)
+        return EnvState(
+            self._setup,
+            take(self._engine),
+            _FLAGS[begun],
+            _FLAGS[ended],
+            self.ended_by,
+            (self._np_random_seed,),
+            generator_state(self._np_random),
+        )
+
+    def set_state(self, state: EnvState) -> None:
+        """Go on from a state, of this environment or of another one that was made as this.
+
+        Args:
+            state: what `get_state` gave.
+        Raises:
+            TypeError: no state.
+            StateError: a state of another task, other options or another model, naming what
+                differs; or a damaged one. Nothing has changed then.
+        """
+        state = check_state(state, self._setup, 1)
+        put(self._engine, state.simulation)
+        self.__dict__.pop("plant", None)
+        self.ended_by = state.ended_by
+        self._np_random_seed = state.seeds[0]
+        self._np_random = generator_at(state.generator, self._np_random)
+        self._commands.begin(self._number("rest_regulator"))
+        ended = f"the episode ended at {self.time:g} s" if any(state.ended) else None
+        self._wait(ended if any(state.begun) else NOT_BEGUN)
+
+    def _made_as(self) -> Setup:
+        return setup(self._engine, num_envs=SINGLE, precision="double")
 
     # -- what the agent, a controller and the reader see -------------------------------------------
 
@@ -503,3 +562,4 @@ def _no_step(_: object) -> int:
 
 
 _FIRST = np.zeros(1, np.int64)
+_FLAGS = (b"\x00", b"\x01")

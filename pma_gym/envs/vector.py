@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pma_gym.envs.advance import TRUTHS
 from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
 from pma_gym.envs.command import CommandLine
+from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import ActionError, Engine
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import (
@@ -24,13 +25,19 @@ from pma_gym.envs.options import (
     parse_task,
 )
 from pma_gym.envs.record import PARTS
+from pma_gym.envs.seeding import SeededByReset, own_seeds
+from pma_gym.envs.setup import SINGLE, Setup, setup
+from pma_gym.envs.snapshot import put, take
+from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
 
-class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]):
+class PMAVectorEnv(
+    Copies, SeededByReset, VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[Any]]
+):
     """As `PMAEnv`, n times: the same actions, observations, rewards and ends, side by side.
 
     An environment gives the same bits here as alone with the same seed, whatever n and the number
@@ -108,19 +115,28 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             check_pressures(pressures_kpa, num_envs)
         single = precision == "single"
         self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
-        self.table: ObservationTable = self.engine.table
-        self.single_observation_space = self.table.space
+        self.single_observation_space = self.engine.table.space
         self.single_action_space = CommandLine(self.options, self.task.actuator).space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.arange(num_envs)
         self._shape = (num_envs, *self.single_action_space.shape)
-        self._given = self.engine.actions[:num_envs]
+        self._seeds: tuple[int | None, ...] = (None,) * num_envs
         self._begun = np.zeros(num_envs, np.bool_)
         self._ended = np.zeros(num_envs, np.bool_)
         # Which of them have ended, None if none has: looking through them takes a microsecond.
         self._waiting: NDArray[np.int64] | None = None
         self._idle = True
+        self._attach()
+
+    _ATTACHED = frozenset({"table", "_given", "_advance", "_rewards", "_picture"})
+
+    def _attach(self) -> None:
+        """Point into the engine."""
+        self.table: ObservationTable = self.engine.table
+        self._given = self.engine.actions[: self.num_envs]
+        if self.closed:
+            self.engine.close()
 
     def reset(
         self,
@@ -143,16 +159,96 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         check_known("reset option", given, RESET_OPTIONS)
         indices = masked(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._all
         wanted = wanted_pressures(given, indices, self.num_envs)
-        seeds = all_seeds(seed, self.num_envs)
-        super().reset(seed=seeds[0])
+        seeds = self._own_seeds(all_seeds(seed, self.num_envs), indices)
         # Should it fail on the way, these have no episode.
         self._begun[indices], self._idle = False, True
-        self.engine.seed(indices, [seeds[i] for i in indices.tolist()])
+        self.engine.seed(indices, seeds)
         self.engine.reset(indices, wanted)
         self._begun[indices], self._ended[indices] = True, False
         self._idle = not self._begun.all()
         self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
         return self.engine.observations.copy(), {}
+
+    def _own_seeds(
+        self, given: Sequence[int | None], indices: NDArray[np.int64]
+    ) -> list[int | None]:
+        """Seeds for the engine, in the order of indices; `np_random` begins anew with the first."""
+        super().reset(seed=given[0])
+        fresh = not any(seed is not None for seed in (*given, *self._seeds))
+        first = VectorEnv.np_random_seed.fget(self) if fresh else None  # type: ignore[attr-defined]
+        seeds = own_seeds(given, self._seeds, indices, first)
+        known = list(self._seeds)
+        for i, seed in zip(indices.tolist(), seeds, strict=True):
+            known[i] = known[i] if seed is None else seed
+        self._seeds = tuple(known)
+        return seeds
+
+    @property
+    def np_random_seed(self) -> int | tuple[int | None, ...]:  # type: ignore[override]
+        """What `reset(seed=...)` takes to begin again as it did.
+
+        The first environment's seed where the others count up from it, else all of them.
+        """
+        first = self._seeds[0]
+        if not any(seed is not None for seed in self._seeds):
+            return super().np_random_seed  # type: ignore[return-value]
+        if first is not None and self._seeds == tuple(range(first, first + self.num_envs)):
+            return first
+        return self._seeds
+
+    def get_state(self) -> EnvState:
+        """All that the environments need to go on from here with the same bits, as a value.
+
+        Before the first `reset` too: then it is the state of environments that wait for it.
+        """
+        return EnvState(
+            self._setup,
+            take(self.engine),
+            self._begun.tobytes(),
+            self._ended.tobytes(),
+            None,
+            self._seeds,
+            generator_state(self._np_random),
+        )
+
+    def set_state(self, state: EnvState) -> None:
+        """Go on from a state, of these environments or of others that were made as these.
+
+        Args:
+            state: what `get_state` gave; or what `PMAEnv.get_state` gave, and all of them go on
+                from there, for as many trials of what to do next.
+        Raises:
+            TypeError: no state.
+            StateError: a state of another task, other options or another model, naming what
+                differs; or a damaged one. Nothing has changed then.
+        """
+        state = check_state(self._spread(state), self._setup, self.num_envs)
+        put(self.engine, state.simulation)
+        self._begun = np.frombuffer(state.begun, np.bool_).copy()
+        self._ended = np.frombuffer(state.ended, np.bool_).copy()
+        self._idle = not self._begun.all()
+        self._waiting = np.flatnonzero(self._ended) if self._ended.any() else None
+        self._seeds = state.seeds
+        self._np_random = generator_at(state.generator, self._np_random)
+
+    def _spread(self, state: EnvState) -> EnvState:
+        """The state of a PMAEnv that was made as these as one of them all; others as they came."""
+        if not isinstance(state, EnvState) or ("num_envs", SINGLE) not in state.setup:
+            return state
+        if state.setup != self._single_setup:
+            return state
+        return check_state(state, self._single_setup, 1).spread(self._setup, self.num_envs)
+
+    @property
+    def _single_setup(self) -> Setup:
+        own = {name: text for name, text in self._setup if name != "autoreset_mode"}
+        return tuple((own | {"num_envs": SINGLE}).items())
+
+    def _made_as(self) -> Setup:
+        precision = "single" if self.engine.kernel.single else "double"
+        mode = self.autoreset_mode.value
+        count = str(self.num_envs)
+        return setup(self.engine, num_envs=count, precision=precision, autoreset_mode=mode)
 
     def step(
         self, actions: NDArray[np.floating]

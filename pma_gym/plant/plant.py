@@ -99,6 +99,10 @@ class Plant:
             for name in sensors.SENSORS
         ]
 
+    def __reduce__(self) -> "tuple[type[Plant], tuple[Model, float]]":
+        """Copy and pickle by construction: compiled functions belong to their process."""
+        return type(self), (self.model, self.tolerance)
+
     def regulator_voltage(self, pressure: float) -> float:
         """Regulator voltage (V) that settles at a pressure (Pa).
 

@@ -78,6 +78,10 @@ class Program:
         self.library = compiled(key, self._build, f"plant {model.name}", brief=True)
         self._functions()
 
+    def __reduce__(self) -> "tuple[Callable[[Model], Program], tuple[Model]]":
+        """Copy and pickle by structure: compiled functions belong to their process."""
+        return program, (self.model,)
+
     def key(self) -> list[str]:
         """What the compiled functions depend on, beside this package's text."""
         return structure(self.model)

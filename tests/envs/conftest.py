@@ -153,3 +153,120 @@ def twins() -> type[Twins]:
 def fragile() -> Model:
     """A model whose episodes soon break a limit."""
     return load_model("serres2008").replace({"limits.tension_n": 450.0})
+
+
+SINGLES = [
+    {},
+    {"task": "rotation", "randomisation": "varied", "pressure_kpa": "random"},
+    {"disturbances": "regulator_and_operator", "model": "station"},
+    {"action_delay_s": 0.1, "observation_delay_s": 0.2, "history": 2, "preview": 3},
+    {"regulator_action": True, "noise": False, "reward": "smooth"},
+    {"task": "isotonic", "model": "station", "pressure_kpa": "random"},
+    {"task": "displacement_multisine_3", "tolerance": 1e-3},
+    {"model": "cascade"},
+    {
+        "task": "isokinetic_exercise",
+        "model": "station",
+        "control_rate_hz": 50.0,
+        "randomisation": "intervals",
+        "disturbances": "regulator",
+    },
+    {
+        "task": "profile_exercise",
+        "model": "station",
+        "control_rate_hz": 50.0,
+        "pressure_kpa": "random",
+        "safety": False,
+    },
+]
+BATCHES = [
+    {"autoreset_mode": mode, "threads": threads, "precision": precision}
+    for mode, threads, precision in [
+        (AutoresetMode.NEXT_STEP, 1, "double"),
+        (AutoresetMode.SAME_STEP, 2, "double"),
+        (AutoresetMode.DISABLED, 1, "single"),
+        (AutoresetMode.SAME_STEP, 3, "single"),
+    ]
+]
+
+
+@pytest.fixture(params=SINGLES, ids=lambda options: ",".join(options) or "defaults")
+def options(request) -> dict:
+    """Options of single environments, of every kind that a state depends on."""
+    return request.param
+
+
+@pytest.fixture(params=BATCHES, ids=lambda options: "-".join(map(str, options.values())))
+def batch_options(request, fragile) -> dict:
+    """Options of batches: every autoreset mode, threads and precisions, ends of both kinds."""
+    made = {"control_rate_hz": 4.0, "model": fragile, "pressure_kpa": [250.0, 300.0]}
+    return request.param | made
+
+
+def _single(options: dict) -> PMAEnv:
+    """An environment at 300 kPa and 10 Hz, unless told otherwise."""
+    usual = {"model": "serres2008", "pressure_kpa": 300.0, "control_rate_hz": 10.0}
+    return PMAEnv(**(usual | options))
+
+
+def _course(env, steps: int = 12, seed: int = 5) -> list:
+    """What an environment gives in some steps, across an episode's end and the next reset."""
+    generator, seen = np.random.default_rng(seed), []
+    for _ in range(steps):
+        if env.unwrapped._idle is not None:
+            seen.append(env.reset())
+        size = env.action_space.shape[0]
+        seen.append(env.step(generator.uniform(-1.0, 1.0, size)))
+    return seen
+
+
+def _batch_course(envs, steps: int = 12, seed: int = 5) -> list:
+    """What environments give in some steps."""
+    generator, seen = np.random.default_rng(seed), []
+    disabled = envs.metadata["autoreset_mode"] == AutoresetMode.DISABLED
+    over = np.zeros(envs.num_envs, np.bool_)
+    if envs._waiting is not None:
+        over[envs._waiting] = True
+    for _ in range(steps):
+        if disabled and over.any():
+            seen.append(envs.reset(options={"reset_mask": over}))
+        seen.append(envs.step(generator.uniform(-1.0, 1.0, envs.action_space.shape)))
+        over = seen[-1][2] | seen[-1][3]
+    return seen
+
+
+def _same(first: object, second: object) -> bool:
+    """Whether two values have the same bits, whatever they consist of."""
+    if isinstance(first, np.ndarray) and first.dtype.kind == "O":
+        return first.shape == second.shape and all(map(_same, first, second))
+    if isinstance(first, np.ndarray):
+        return first.dtype == second.dtype and first.tobytes() == second.tobytes()
+    if isinstance(first, dict):
+        return first.keys() == second.keys() and all(_same(first[k], second[k]) for k in first)
+    if isinstance(first, tuple | list):
+        return len(first) == len(second) and all(map(_same, first, second))
+    return repr(first) == repr(second)
+
+
+@pytest.fixture
+def single() -> Callable[[dict], PMAEnv]:
+    """Makes an environment of some options."""
+    return _single
+
+
+@pytest.fixture
+def course() -> Callable[..., list]:
+    """Steps an environment; what it gives."""
+    return _course
+
+
+@pytest.fixture
+def batch_course() -> Callable[..., list]:
+    """Steps a batch; what it gives."""
+    return _batch_course
+
+
+@pytest.fixture
+def same() -> Callable[[object, object], bool]:
+    """Whether two values have the same bits."""
+    return _same

@@ -1,0 +1,65 @@
+"""What Gymnasium's `np_random` and `np_random_seed` mean where episodes draw by a counter."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class SeededByReset:
+    """Everything random in an episode follows from the seed that `reset` was given last.
+
+    Compiled code draws by that seed, the episode's number and the step's, and never from
+    `np_random`: that generator begins anew with each seed, and is there for wrappers and users.
+    """
+
+    @property
+    def np_random(self) -> np.random.Generator:
+        """A generator of the last seed, for wrappers and users; episodes do not draw from it."""
+        return super().np_random  # type: ignore[misc]
+
+    @np_random.setter
+    def np_random(self, value: object) -> None:
+        raise AttributeError(
+            "np_random cannot be set: everything random in an episode follows from the seed that "
+            f"reset(seed=...) is given, not from a generator; got {type(value).__name__}; call "
+            "reset(seed=...) with a whole number instead, such as "
+            "reset(seed=int(generator.integers(2**31)))"
+        )
+
+
+def own_seeds(
+    given: Sequence[int | None],
+    known: Sequence[int | None],
+    indices: NDArray[np.int64],
+    first: int | None,
+) -> list[int | None]:
+    """The seeds that environments of a batch begin anew with, None for those that go on.
+
+    Args:
+        given: of every environment, the seed that a reset was given, or None.
+        known: of every environment, the seed that it goes by so far, or None.
+        indices: which environments the reset is for.
+        first: seed of the first environment, the others counting up from it, where nobody gave any;
+            None to draw one for each.
+    Returns:
+        Seeds in the order of indices.
+
+    >>> both = np.arange(2)
+    >>> own_seeds([None, None], [None, None], both, 40), own_seeds([7, None], [3, 4], both, None)
+    ([40, 41], [7, None])
+    """
+    seeds = []
+    for i in indices.tolist():
+        seed = given[i]
+        if seed is None and known[i] is None:
+            seed = drawn_seed() if first is None else first + i
+        seeds.append(seed)
+    return seeds
+
+
+def drawn_seed() -> int:
+    """A seed that nobody chose, from the operating system."""
+    entropy: Any = np.random.SeedSequence().entropy
+    return int(entropy)

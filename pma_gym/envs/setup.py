@@ -1,0 +1,130 @@
+"""What an environment was made with, as words that can be compared and stored."""
+
+import hashlib
+import re
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from pma_gym.effects.own import source_of
+from pma_gym.envs.engine import Engine
+from pma_gym.plant.model import Model
+
+Setup = tuple[tuple[str, str], ...]
+"""Names and values: the task, the options, the model's parameters."""
+
+SINGLE = "a PMAEnv"
+"""Text of `num_envs` of an environment that is no batch."""
+
+FEW = 4
+"""Differences that a message names."""
+
+_ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
+
+
+def setup(engine: Engine, **others: object) -> Setup:
+    """What decides how an engine's environments go on from a state.
+
+    Args:
+        engine: the engine.
+        others: what else does, by name.
+    """
+    said = {name: _text(value) for name, value in others.items()}
+    said |= _task(engine)
+    # The told model stands below, number by number, wherever it was read from.
+    skipped = ("model", "pressure_kpa")
+    said |= {
+        field.name: _text(getattr(engine.options, field.name))
+        for field in fields(engine.options)
+        if field.name not in skipped
+    }
+    several = len(set(map(repr, engine.wanted))) > 1
+    said["pressures_kpa" if several else "pressure_kpa"] = _text(
+        engine.wanted if several else engine.wanted[0]
+    )
+    said |= _model(engine.told)
+    said["numbers"] = " ".join(engine.record.places)
+    return tuple(said.items())
+
+
+def differences(theirs: Setup, ours: Setup) -> str:
+    """What two environments were made with differently, in words; empty if nothing.
+
+    >>> differences((("num_envs", "2"), ("noise", "True")), (("num_envs", "2"), ("noise", "False")))
+    'noise is True there and False here'
+    """
+    known, here = dict(theirs), dict(ours)
+    names = [*known, *(name for name in here if name not in known)]
+    odd = [name for name in names if known.get(name) != here.get(name)]
+    # A PMAEnv has no mode to differ in, and any batch of the same kind takes its state.
+    without = {"autoreset_mode"} if here.get("num_envs") == SINGLE else set()
+    if known.get("num_envs") == SINGLE:
+        without = {"autoreset_mode", "num_envs"}
+    odd = [name for name in odd if name not in without]
+    # What differs in its task or its model keeps other numbers too.
+    if len(odd) > 1 and "numbers" in odd:
+        odd.remove("numbers")
+    if "task" in odd:
+        odd = [name for name in odd if not name.startswith("task.")]
+    told = [
+        f"{name} is {_shortened(known.get(name))} there and {_shortened(here.get(name))} here"
+        for name in odd[:FEW]
+    ]
+    more = [f"{len(odd) - FEW} more"] if len(odd) > FEW else []
+    return ", ".join(told + more)
+
+
+def _shortened(text: str | None) -> str:
+    if text is None:
+        return "absent"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _task(engine: Engine) -> dict[str, str]:
+    """The task by its name, by what is compiled of it, and by the references that it gives."""
+    task = engine.task
+    said = {"task": task.name, "task.load": _text(task.load), "task.starts": _text(task.starts)}
+    if task.exercise is not None:
+        said["task.exercise"] = _text(task.exercise)
+    told = hashlib.sha256(repr(task.structure).encode())
+    told.update(engine.table.references.tobytes())
+    told.update(engine._ideals.tobytes())
+    return said | {"task.reference": f"{task.name} {told.hexdigest()[:12]}"}
+
+
+def _model(model: Model) -> dict[str, str]:
+    """A model's parameters and intervals, and the text of the effects that users brought."""
+    said = {"model.plant": model.plant}
+    for effect in model.parameters:
+        for door, value in model.at_the_door(effect).items():
+            note = model.notes.get(f"{effect}.{door}")
+            bounds = "" if note is None or note.low is None else f" ({note.low!r}-{note.high!r})"
+            said[f"model.{effect}.{door}"] = _text(value) + bounds
+        text = source_of(effect)
+        if text:
+            said[f"model.{effect}"] = hashlib.sha256(text.encode()).hexdigest()[:12]
+    return said
+
+
+def _text(value: Any) -> str:  # noqa: ANN401
+    """A value as text that is the same in every process.
+
+    >>> _text(300), _text([1, 2.5]), _text(np.float64(0.1)), _text(max)
+    ('300.0', '[1.0, 2.5]', '0.1', '<built-in function max>')
+    """
+    if isinstance(value, bool | np.bool_):
+        return repr(bool(value))
+    if isinstance(value, int | float | np.number):
+        return repr(float(value))
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return type(value).__name__ + _text(value._asdict())  # type: ignore[attr-defined]
+    if isinstance(value, list | tuple | range | np.ndarray):
+        return f"[{', '.join(map(_text, value))}]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {_text(one)}" for key, one in value.items()) + "}"
+    if is_dataclass(value) and not isinstance(value, type):
+        parts = {field.name: getattr(value, field.name) for field in fields(value)}
+        return type(value).__name__ + _text(parts)
+    return value if isinstance(value, str) else _ADDRESS.sub("", repr(value))

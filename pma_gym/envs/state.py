@@ -1,0 +1,226 @@
+"""The state of an environment as a value, for planners and checkpoints."""
+
+import base64
+import json
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from pma_gym.envs.setup import Setup, differences
+from pma_gym.envs.snapshot import Snapshot, StateError
+from pma_gym.envs.state_models import model_document, parse_model_document
+
+FORM = "pma-gym environment state 1"
+"""First entry of a state in JSON: what it is, and which form it has."""
+
+
+class EnvState(NamedTuple):
+    """All that an environment needs to go on with the same bits.
+
+    `get_state()` of `PMAEnv` and `PMAVectorEnv` gives one, `set_state(state)` takes it. A state is
+    immutable, can be compared and pickled, and is text by `to_json`. It holds nothing of a policy
+    and nothing of the spaces, whose `sample` has a generator of its own.
+
+    Attributes:
+        setup: the task, the options and the model that it belongs to, as names and texts.
+        simulation: the numbers of the simulation.
+        begun: of every environment whether it has begun an episode, bool as bytes.
+        ended: of every environment whether its episode has ended, bool as bytes.
+        ended_by: the limit that ended a single environment's episode, in words, or None.
+        seeds: of every environment the seed that it was reset with, None before.
+        generator: state of `np_random`: the PCG64's state and increment, whether it has a 32-bit
+            number left, and that number; None where there is no generator yet.
+
+    Example:
+        >>> from pma_gym.envs import PMAEnv
+        >>> env = PMAEnv("displacement", pressure_kpa=300)
+        >>> _ = env.reset(seed=1)
+        >>> state = env.get_state()
+        >>> first = env.step(env.action(2.0))
+        >>> env.set_state(state)
+        >>> again = env.step(env.action(2.0))
+        >>> bool((first[0] == again[0]).all()), first[1:] == again[1:]
+        (True, True)
+    """
+
+    setup: Setup
+    simulation: Snapshot
+    begun: bytes
+    ended: bytes
+    ended_by: str | None
+    seeds: tuple[int | None, ...]
+    generator: tuple[int, int, int, int] | None
+
+    def spread(self, setup: Setup, count: int) -> "EnvState":
+        """The state of so many environments that all stand where this single one does.
+
+        Args:
+            setup: what they were made with.
+            count: how many they are.
+        """
+        one = self.simulation
+        simulation = Snapshot(
+            one.numbers * count,
+            one.pressures * count,
+            one.observations * count,
+            one.rewards * count,
+            one.flags[:1] * count + one.flags[1:] * count,
+            b"",
+            b"",
+            one.models * count,
+        )
+        flags = self.begun * count, self.ended * count
+        return EnvState(setup, simulation, *flags, None, self.seeds * count, self.generator)
+
+    def to_json(self) -> str:
+        """The state as JSON text; arrays stand in it as base64."""
+        simulation: dict[str, Any] = {
+            name: _encoded(value)
+            for name, value in self.simulation._asdict().items()
+            if name != "models"
+        }
+        models = [None if m is None else model_document(m) for m in self.simulation.models]
+        document = {
+            "form": FORM,
+            "setup": dict(self.setup),
+            "simulation": simulation | {"models": models},
+            "begun": _encoded(self.begun),
+            "ended": _encoded(self.ended),
+            "ended_by": self.ended_by,
+            "seeds": self.seeds,
+            "generator": self.generator,
+        }
+        return json.dumps(document)
+
+    @classmethod
+    def from_json(cls, text: str) -> "EnvState":
+        """A state from the text that `to_json` gave; nothing in it is run.
+
+        Raises:
+            StateError: text that is no state; says where.
+        """
+        try:
+            document = json.loads(text)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise StateError(f"a state must be JSON text that to_json() gave: {error}") from None
+        if not isinstance(document, dict) or document.get("form") != FORM:
+            came = document.get("form") if isinstance(document, dict) else type(document).__name__
+            raise StateError(
+                f"a state's form must be {FORM!r}, got {came!r}; give to_json()'s text"
+            )
+        try:
+            return cls._parsed(document)
+        except StateError:
+            raise
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise StateError(
+                f"the state is damaged ({type(error).__name__}: {error}); write it anew with "
+                "get_state().to_json()"
+            ) from None
+
+    @classmethod
+    def _parsed(cls, document: dict[str, Any]) -> "EnvState":
+        given = dict(document["simulation"])
+        models = tuple(None if m is None else parse_model_document(m) for m in given.pop("models"))
+        arrays = {name: _decoded(value) for name, value in given.items()}
+        generator = document["generator"]
+        return cls(
+            tuple((str(name), str(value)) for name, value in document["setup"].items()),
+            Snapshot(**arrays, models=models),
+            _decoded(document["begun"]),
+            _decoded(document["ended"]),
+            document["ended_by"],
+            tuple(document["seeds"]),
+            None if generator is None else tuple(generator),  # type: ignore[arg-type]
+        )
+
+
+def check_state(state: object, ours: Setup, count: int) -> EnvState:
+    """A state, if it is one of environments that were made as these.
+
+    Args:
+        state: what came.
+        ours: what these were made with.
+        count: how many there are.
+    Raises:
+        TypeError: no state.
+        StateError: one of another task, of other options or another model, with all that differs;
+            or a damaged one.
+    """
+    if not isinstance(state, EnvState):
+        raise TypeError(
+            f"set_state takes what get_state() gave, or EnvState.from_json(text); got "
+            f"{type(state).__name__}"
+        )
+    if state.setup is not ours and state.setup != ours:
+        raise StateError(
+            f"the state belongs to another environment: {differences(state.setup, ours)}; make "
+            "this one with the task, the options and the model of that one"
+        )
+    _check_rest(state, count)
+    return state
+
+
+def _check_rest(state: EnvState, count: int) -> None:
+    """Refuse flags, seeds and a generator that no environment has."""
+    flags = all(isinstance(one, bytes) and len(one) == count for one in (state.begun, state.ended))
+    seeds = isinstance(state.seeds, tuple) and len(state.seeds) == count
+    if not flags or not seeds or not all(map(_is_seed, state.seeds)):
+        raise StateError(
+            f"begun, ended and seeds of a state must have {count} entries here, seeds being whole "
+            "numbers from 0 on: the state is damaged; take it anew with get_state()"
+        )
+    given, limits = state.generator, (1 << 128, 1 << 128, 2, 1 << 32)
+    if given is not None and not (
+        isinstance(given, tuple)
+        and len(given) == len(limits)
+        and all(type(n) is int and 0 <= n < end for n, end in zip(given, limits, strict=True))
+    ):
+        raise StateError(
+            "generator of a state must be None or the four whole numbers of a PCG64, got "
+            f"{given!r}: the state is damaged; take it anew with get_state()"
+        )
+    if not isinstance(state.ended_by, str | None):
+        raise StateError(f"ended_by of a state must be words or None, got {state.ended_by!r}")
+
+
+def _is_seed(seed: object) -> bool:
+    return seed is None or (type(seed) is int and seed >= 0)
+
+
+def generator_state(generator: np.random.Generator | None) -> tuple[int, int, int, int] | None:
+    """The numbers of Gymnasium's generator, which is a PCG64."""
+    if generator is None:
+        return None
+    state: Any = generator.bit_generator.state
+    inner = state["state"]
+    return inner["state"], inner["inc"], state["has_uint32"], state["uinteger"]
+
+
+def generator_at(
+    numbers: tuple[int, int, int, int] | None, present: np.random.Generator | None
+) -> np.random.Generator | None:
+    """A generator that goes on from these numbers: the present one, if there is any."""
+    if numbers == generator_state(present):
+        return present
+    if numbers is None:
+        return None
+    generator = present or np.random.Generator(np.random.PCG64(0))
+    state, increment, has, left = numbers
+    generator.bit_generator.state = {
+        "bit_generator": "PCG64",
+        "state": {"state": state, "inc": increment},
+        "has_uint32": has,
+        "uinteger": left,
+    }
+    return generator
+
+
+def _encoded(data: bytes) -> str:
+    return base64.b64encode(data).decode("ascii")
+
+
+def _decoded(text: object) -> bytes:
+    if not isinstance(text, str):
+        raise StateError(f"a state's arrays must be base64 text, got {type(text).__name__}")
+    return base64.b64decode(text, validate=True)

@@ -1,0 +1,282 @@
+"""Copies and pickles of environments go on with the same bits, independently of the original."""
+
+import copy
+import functools
+import pickle
+import subprocess
+import sys
+import threading
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import data_equivalence
+
+from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+from pma_gym.envs.device import DeviceEngine
+from pma_gym.envs.options import Options
+from pma_gym.envs.stand_in import StandIn
+from pma_gym.plant.model import load_model
+from pma_gym.tasks import EVERY_TASK, TASKS, following, varied_station
+
+WAYS = {
+    "pickle": lambda env: pickle.loads(pickle.dumps(env)),
+    "deepcopy": copy.deepcopy,
+    "copy": copy.copy,
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_copy_goes_on_with_the_same_bits(way, options, single, course, same):
+    made, env = WAYS[way], single(options)
+    # Before the first reset.
+    begun = made(env)
+    assert same(begun.reset(seed=3), env.reset(seed=3))
+    # In the midst of an episode, the original moved in between.
+    course(env)
+    other = made(env)
+    before = other.trajectory()
+    ahead = course(env, 7)
+    np.testing.assert_array_equal(other.trajectory(), before)
+    assert same(course(other, 7), ahead)
+    assert other.plant.model == env.plant.model
+    assert (other.plant is other.nominal_plant) == (env.plant is env.nominal_plant)
+    # After an episode's end, and on through the next resets.
+    while env._idle is None:
+        env.step(env.action_space.high)
+    ended = made(env)
+    assert (ended.ended_by, ended._idle) == (env.ended_by, env._idle)
+    assert same(ended.episode_summary(), env.episode_summary())
+    with pytest.raises(gym.error.ResetNeeded, match="the episode ended at"):
+        ended.step(ended.action_space.low)
+    assert same(course(ended, 80), course(env, 80))
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("randomisation", ["none", "varied"])
+def test_a_copy_of_a_batch_goes_on_with_the_same_bits(
+    way, batch_options, randomisation, batch_course, same
+):
+    made = WAYS[way]
+    envs = PMAVectorEnv(21, randomisation=randomisation, **batch_options)
+    assert same(made(envs).reset(seed=3), envs.reset(seed=3))
+    ends = 0
+    for _ in range(4):
+        for seen in batch_course(envs, 9):
+            ends += int(np.sum(seen[2] | seen[3])) if len(seen) == 5 else 0
+        other = made(envs)
+        assert other.engine.threads == envs.engine.threads
+        ahead = batch_course(envs, 25)
+        assert same(batch_course(other, 25), ahead)
+        other.close()
+    assert ends > 5
+    envs.close()
+
+
+def test_a_batch_copied_where_episodes_have_just_ended_goes_on(batch, batch_course, same):
+    envs = batch(5)
+    envs.reset(seed=1)
+    while envs._waiting is None:
+        envs.step(np.full((5, 1), -0.8))
+    other = copy.deepcopy(envs)
+    assert same(batch_course(other), batch_course(envs))
+
+
+def test_pressures_of_each_are_copied(same):
+    envs = PMAVectorEnv(3, model="serres2008", pressures_kpa=[200.0, [300.0, 400.0], "random"])
+    envs.reset(seed=1)
+    other = pickle.loads(pickle.dumps(envs))
+    assert same(other.reset(), envs.reset())
+    assert other.options == envs.options
+
+
+def test_a_closed_batch_is_copied_closed():
+    envs = PMAVectorEnv(40, threads=2, model="serres2008")
+    envs.reset(seed=1)
+    envs.close()
+    assert copy.copy(envs).closed
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_pickle_env(name):
+    """To the effect of Gymnasium's `tests/envs/test_envs.py::test_pickle_env`."""
+    env = gym.make(name)
+    action = env.action_space.sample()
+    env_reset = env.reset(seed=123)
+    env_step = env.step(action)
+    pickled = pickle.loads(pickle.dumps(env))
+    assert data_equivalence(env_reset, pickled.reset(seed=123))
+    assert data_equivalence(env_step, pickled.step(action))
+    assert pickled.spec == env.spec
+    env.close()
+    pickled.close()
+
+
+@pytest.mark.parametrize("way", ["pickle", "deepcopy"])
+def test_wrapped_environments_are_copied(way, same):
+    env = gym.make("pma_gym/IsokineticRotation-v0", control_rate_hz=10.0, render_mode="rgb_array")
+    env = gym.wrappers.TimeLimit(gym.wrappers.FrameStackObservation(env, 3), 40)
+    env = gym.wrappers.NormalizeObservation(gym.wrappers.RecordEpisodeStatistics(env))
+    env.reset(seed=1)
+    for _ in range(20):
+        env.step(env.action_space.sample())
+    env.render()
+    other = WAYS[way](env)
+    actions = [other.action_space.sample() for _ in range(15)]
+    # Spaces go on with the same draws too, each with its own.
+    assert same([env.action_space.sample() for _ in range(15)], actions)
+    for action in actions:
+        seen, its = env.step(action), other.step(action)
+        assert same(seen[:4], its[:4])
+    np.testing.assert_array_equal(env.render(), other.render())
+
+
+def test_a_shallow_copy_is_independent():
+    """`env_faults/shallow_copy_shares_state.py`: a copy's step moved the original."""
+    env = gym.make("pma_gym/IsokineticDisplacement-v0").unwrapped
+    env.reset(seed=3)
+    other = copy.copy(env)
+    other.step([1.0])
+    assert (env.time, other.time) == (0.0, 0.01)
+    other.action_space.seed(1)
+    assert other.action_space is not env.action_space
+
+
+def test_pickles_and_deep_copies_of_made_environments(same):
+    """`env_faults/pickle_deepcopy.py`: "ctypes objects containing pointers cannot be pickled"."""
+    env = gym.make("pma_gym/IsokineticDisplacement-v0")
+    env.reset(seed=3)
+    for made in WAYS.values():
+        assert same(made(env).step([0.5]), copy.deepcopy(env).step([0.5]))
+
+
+def test_subclasses_keep_what_they_add(course, same):
+    class Own(PMAEnv):
+        def __init__(self, weights):
+            super().__init__("displacement", model="serres2008")
+            self.weights = weights
+
+    env = Own([1.0, 2.0])
+    env.reset(seed=1)
+    other = copy.deepcopy(env)
+    assert type(other) is Own and other.weights == env.weights and other.weights is not env.weights
+    assert same(course(other, 3), course(env, 3))
+
+
+@pytest.mark.parametrize("name", sorted(EVERY_TASK))
+def test_tasks_pickle(name):
+    task = EVERY_TASK[name]
+    assert pickle.loads(pickle.dumps(task)) == copy.deepcopy(task) == task
+
+
+def test_plants_and_what_controllers_get_pickle(single, same):
+    env = single({"randomisation": "varied", "model": "station"})
+    env.reset(seed=1)
+    env.step([0.1])
+    for made in (WAYS["pickle"], copy.deepcopy, copy.copy):
+        plant = made(env.plant)
+        assert plant.model == env.plant.model and plant.tolerance == env.plant.tolerance
+        states, again = plant.settle(0.0, pressure=300e3), env.plant.settle(0.0, pressure=300e3)
+        np.testing.assert_array_equal(states.state, again.state)
+        assert made(env.station) == env.station and made(env.reading) == env.reading
+        assert made(env.options) == env.options and made(env.task) == env.task
+        assert made(env.events).step_times.size == 0
+        assert same(made(env.condition).state, env.condition.state)
+        assert made(env.table).describe() == env.table.describe()
+    assert pickle.loads(pickle.dumps(load_model("station"))) == load_model("station")
+
+
+def heavier(nominal, generator, most=1.0):
+    """A slide of up to twice the mass."""
+    mass = nominal.at_the_door("slide")["mass_kg"]
+    return nominal.replace({"slide.mass_kg": mass * (1.0 + most * generator.random())})
+
+
+class Heavier:
+    """A randomisation with numbers of its own."""
+
+    def __init__(self):
+        self.drawn = []
+
+    def __call__(self, nominal, generator):
+        self.drawn.append(generator.random())
+        return heavier(nominal, generator)
+
+
+@pytest.mark.parametrize(
+    "randomisation",
+    [
+        heavier,
+        functools.partial(varied_station, variation=0.5),
+        lambda nominal, generator: heavier(nominal, generator, 0.5),
+        Heavier(),
+    ],
+    ids=["function", "partial", "lambda", "object"],
+)
+@pytest.mark.parametrize("way", WAYS)
+def test_own_randomisations_are_copied(way, randomisation, course, same):
+    env = gym.make("pma_gym/IsokineticDisplacement-v0", randomisation=randomisation)
+    env.reset(seed=2)
+    other = WAYS[way](env)
+    assert same(course(other, 3), course(env, 3))
+    assert same(other.reset(), env.reset())
+    assert other.unwrapped.plant.model == env.unwrapped.plant.model
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_own_tasks_are_copied(way, course, same):
+    task = following("bow", "extension", lambda time: 0.8e-3 * time * (10.0 - time))
+    env = PMAEnv(task, model="serres2008", pressure_kpa=300.0)
+    env.reset(seed=2)
+    other = WAYS[way](env)
+    assert same(course(other, 5), course(env, 5))
+    assert other.reference(3.0) == env.reference(3.0) == pytest.approx(16.8e-3)
+
+
+class Locked:
+    """A randomisation, or a motion, that holds what no pickle takes."""
+
+    def __init__(self):
+        self.lock = threading.Lock()
+
+    def __call__(self, *given):
+        return given[0] * 1e-3 if len(given) == 1 else given[0]
+
+
+def test_what_cannot_be_pickled_is_named_with_the_fix():
+    env = gym.make("pma_gym/IsokineticDisplacement-v0", randomisation=Locked())
+    with pytest.raises(pickle.PicklingError, match=r"^randomisation cannot be pickled, got .*lock"):
+        pickle.dumps(env)
+    env = PMAEnv(following("slow", "extension", Locked()))
+    with pytest.raises(pickle.PicklingError, match=r"the motion of slow cannot.*; give a function"):
+        pickle.dumps(env)
+
+
+def test_environments_on_a_device_say_that_they_cannot_be_copied():
+    engine = DeviceEngine(
+        TASKS["displacement"], Options(model="serres2008"), 2, "double", StandIn()
+    )
+    for made in (pickle.dumps, copy.copy, copy.deepcopy):
+        with pytest.raises(TypeError, match="DeviceEngine cannot be copied or pickled.*; make"):
+            made(engine)
+
+
+ELSEWHERE = """
+import pickle, sys
+import numpy as np
+env = pickle.loads(sys.stdin.buffer.read())
+seen = [env.step(np.full(1, 0.1 * k)) for k in range(5)] + [env.reset()]
+sys.stdout.buffer.write(pickle.dumps(seen))
+"""
+
+
+@pytest.mark.parametrize("randomisation", ["varied", lambda nominal, generator: nominal])
+def test_another_process_goes_on_with_the_same_bits(randomisation, same):
+    env = PMAEnv("displacement", model="serres2008", randomisation=randomisation)
+    env.reset(seed=1)
+    env.step([0.3])
+    found = subprocess.run(
+        [sys.executable, "-c", ELSEWHERE], input=pickle.dumps(env), capture_output=True, check=True
+    )
+    seen = [env.step(np.full(1, 0.1 * k)) for k in range(5)] + [env.reset()]
+    assert same(pickle.loads(found.stdout), seen)
