@@ -26,6 +26,7 @@ from benchmarks.measured.triangles import Held, held_against
 from pma_gym.data.dataset import Dataset
 from pma_gym.data.trial_files import encode_trial
 from pma_gym.discovery.journal import digest
+from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model
 
 GIVEN = "serres2008"
@@ -187,6 +188,7 @@ def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[
 
 
 def _explanations(found: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
+    check_shape(found, ListOf(ListOf(shape_of(Explanation, finite=False))), "found")
     return [[Explanation(**each) for each in every] for every in found]
 
 

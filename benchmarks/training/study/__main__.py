@@ -103,16 +103,17 @@ def report(
     from benchmarks.training.study.judged import PID_FOLDER, SHIPPED
     from benchmarks.training.study.pictures import write_curves
     from benchmarks.training.study.ship import ship as ship_policies
+    from pma_gym.documents import read_json
 
     found = study_figures(out)
     if figures.exists():
-        kept = json.loads(figures.read_text(encoding="utf-8"))["groups"]
+        kept = read_json(figures, "journal_mib", own=True, finite=False)["groups"]
         merged = kept | found["groups"]
         names = dict.fromkeys(cell.group for cell in cells())
         found["groups"] = {name: merged[name] for name in names if name in merged}
     found["pid"] = pid_errors(out)
     found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
-    found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
+    found["robustness"] = read_json(out / CONDITIONS, own=True, finite=False)
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
     for names in SHIPPED if ship else ():
