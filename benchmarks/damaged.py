@@ -34,4 +34,6 @@ def say_damaged(path: Path, why: str, then: str = "what it held is computed anew
         why: what is wrong with it.
         then: what happens now.
     """
+    # A reader names the file itself, and says how a stranger's is put right.
+    why = why.replace(f"{path}: ", "").replace(f"{path} ", "").removesuffix("; write it anew")
     print(f"warning: {path} is damaged ({printable(why)}); {then}", file=sys.stderr)

@@ -49,6 +49,7 @@ from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import Model
 from pma_gym.tasks import phase_errors
+from pma_gym.terminal import SafeConsole
 
 SUITES = ("robust", "hard", "pressure")
 """Suites whose loops and tasks controllers are designed for; on other stations than theirs."""
@@ -146,7 +147,7 @@ def run_design(
     if len(searches) < len(asked):
         there = len(asked) - len(searches)
         print(f"{out} has {there} of {len(asked)} designs asked for; --again makes them anew")
-    with Progress() as progress:
+    with Progress(console=SafeConsole()) as progress:
         bar = progress.add_task("Designing", total=len(searches))
 
         def keep(index: int, result: object) -> None:

@@ -54,6 +54,7 @@ from controllers.pid import PID, FeedforwardPID
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK
+from pma_gym.terminal import SafeConsole
 
 PRESSURES_KPA = {
     "displacement": (150, 200, 250, 300, 400, 575),
@@ -166,7 +167,7 @@ def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
     try:
         if order:
             Plant(order[0].model)  # compiled here, once, so that the processes find it on disk
-        with Progress() as progress:
+        with Progress(console=SafeConsole()) as progress:
             bar = progress.add_task("Tuning", total=len(rows))
 
             def keep(index: int, result: object) -> None:

@@ -15,10 +15,10 @@ WIDTH = 160
 
 
 class SafeConsole(Console):
-    """A Rich console that shows names as they are: no control codes, no emoji codes."""
+    """A Rich console that shows text as it is: no markup, no emoji codes, no control codes."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(**{"emoji": False, **options})
+        super().__init__(**{"markup": False, "emoji": False, **options})
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None

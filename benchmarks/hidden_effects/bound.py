@@ -23,6 +23,9 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
+
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
@@ -68,7 +71,7 @@ FITTED = 4
 NOT_A_MEAN = ("sensor_quantisation",)
 """Effects that change no mean; a likelihood ratio of Gaussian noise says nothing of them."""
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def detected(distance: Array | float) -> Array:
@@ -288,4 +291,5 @@ def _bounds(folder: Path, missing: Sequence[str], jobs: int):  # noqa: ANN202
 
 
 if __name__ == "__main__":
-    app()
+    with safe_streams():
+        app()

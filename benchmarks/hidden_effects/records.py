@@ -80,7 +80,7 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
                 raise ValueError(f"it is of case {entry['number']}")
             found.append(Record(**entry))
         except (ValueError, TypeError) as error:
-            damaged.append(f"{path.name}: {error}")
+            damaged.append(f"{error}".replace(f"{path} ", f"{path.name} "))
     say_lost(folder, damaged)
     return found
 

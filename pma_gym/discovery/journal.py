@@ -11,7 +11,7 @@ import numpy as np
 
 from pma_gym.data.trial import Trial
 from pma_gym.document_shape import check_shape
-from pma_gym.documents import read_json
+from pma_gym.documents import parse_json, read_content
 from pma_gym.files import replace_file
 from pma_gym.plant.model import Model, dump_model
 
@@ -56,7 +56,8 @@ class Journal:
         if path is None or not path.is_file():
             return None
         try:
-            entry = read_json(path, "journal_mib", own=True, finite=False)
+            content = read_content(path, "journal_mib")
+            entry = parse_json(content, path.name, own=True, finite=False)
             check_shape(entry, dict)
             return made(entry)
         # Whatever an entry of another form leads to, its fit can be made again.
@@ -64,8 +65,8 @@ class Journal:
             if not self._warned:
                 self._warned = True
                 warnings.warn(
-                    f"{path} is damaged ({type(error).__name__}: {error}); every damaged fit of "
-                    f"{self._folder} is computed anew",
+                    f"{self._folder} holds a damaged fit ({path.name}: {type(error).__name__}: "
+                    f"{error}); damaged fits are computed anew, the others stay",
                     JournalWarning,
                     stacklevel=3,
                 )
