@@ -43,6 +43,14 @@ class DocumentError(ValueError):
     """A document that cannot be used; the message names file, rule, what came and the fix."""
 
 
+def is_file(path: Path) -> bool:
+    """Whether there is a file; none has a name that the system refuses, as a too long one."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def read_content(path: Path, name: str = "document_kib") -> bytes:
     """The bytes of an ordinary file within a limit.
 

@@ -90,13 +90,13 @@ def lag(
 ) -> None:
     """Bound what the regulator's lag makes impossible in an exercise; a minute an operator."""
     from benchmarks.exercise.lag.job import LagError, run_lag
+    from pma_gym.numerals import parse_numbers
     from pma_gym.terminal import SafeConsole
 
     try:
-        try:
-            listed = [float(part) for part in pressures.split(",") if part.strip()]
-        except ValueError:
-            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}") from None
+        listed = parse_numbers(pressures)
+        if listed is None:
+            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}")
         run_lag(task, operators, listed, safety, out, SafeConsole())
     except ValueError as error:
         refuse(error)

@@ -63,8 +63,9 @@ def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str
 
 def _pressures(text: str) -> list[float]:
     from benchmarks.suite import SuiteError
+    from pma_gym.numerals import parse_numbers
 
-    try:
-        return [float(part) for part in listed(text)]
-    except ValueError:
-        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}") from None
+    found = parse_numbers(text)
+    if found is None:
+        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}")
+    return found

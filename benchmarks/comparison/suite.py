@@ -16,7 +16,7 @@ from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
 from controllers import designs
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
-from pma_gym.documents import DocumentError, read_toml
+from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.envs.options import parse_options
 from pma_gym.limits import LimitError
 from pma_gym.plant.model import Model, load_model
@@ -268,7 +268,7 @@ def frozen_suite(source: str) -> FrozenSuite:
         SuiteError: there is none, or its file is not as it should be; names the file and the mend.
     """
     path = Path(source) if source.endswith(".toml") else SUITES / f"{source}.toml"
-    if not path.is_file():
+    if not is_file(path):
         near = difflib.get_close_matches(source, suite_names(), 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise SuiteError(

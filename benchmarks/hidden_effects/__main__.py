@@ -59,7 +59,9 @@ def take(
     chosen: dict[str, int] = {}
     for item in blocks.split(","):
         name, _, count = item.partition("=")
-        if name not in drawing.EVERY or not count.isdecimal():
+        if name not in drawing.EVERY or not (
+            count.isascii() and count.isdecimal() and len(count) < 10
+        ):
             raise typer.BadParameter(
                 f"must be BLOCK=CASES by commas, such as single=27,nothing=40, got {item!r}; "
                 f"blocks are {', '.join(drawing.EVERY)}",

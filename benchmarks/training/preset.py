@@ -16,7 +16,7 @@ from benchmarks.training.stations import training_recipe
 from controllers.form import Form
 from controllers.pilot import base_of
 from controllers.view import View
-from pma_gym.documents import read_yaml
+from pma_gym.documents import is_file, read_yaml
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.envs.options import parse_options, parse_task
 
@@ -135,7 +135,7 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
             f"{nearest(algorithm, ALGORITHMS)}"
         )
     path = Path(name) if name.endswith((".yml", ".yaml")) else PRESETS / name / f"{algorithm}.yml"
-    if not path.is_file():
+    if not is_file(path):
         names = preset_names()
         if name in names:
             has = ", ".join(sorted(p.stem for p in (PRESETS / name).glob("*.yml")))

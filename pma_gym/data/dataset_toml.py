@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pma_gym.data.trial_columns import ColumnMap, TrialError, sources, suggestion
-from pma_gym.documents import read_toml
+from pma_gym.documents import is_file, read_toml
 
 DESCRIPTION = "dataset.toml"
 _KEYS = ("title", "model", "columns", "trials")
@@ -103,7 +103,7 @@ def _model(folder: Path, given: str | None) -> str | None:
     if given is None or not (given.endswith(".toml") or "/" in given or "\\" in given):
         return given
     path = folder / given
-    if not path.is_file():
+    if not is_file(path):
         raise TrialError(
             f"model in {DESCRIPTION} is {given!r}, but there is no file {path}; a path counts "
             "from the data set's folder"

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from pma_gym.documents import DocumentError, read_toml
+from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.limits import LimitError
@@ -208,12 +208,12 @@ def load_model(source: "str | Path | Model") -> Model:
     if str(source) in shipped:
         return _read(shipped[str(source)])
     path = Path(source)
-    if path.suffix == ".toml" and path.is_file():
+    if path.suffix == ".toml" and is_file(path):
         return _read(path)
     near = difflib.get_close_matches(str(source), list(shipped), 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ModelError(
-        f"no model {str(source)!r}: give a shipped name ({', '.join(shipped)}) "
+        f"no model {str(source)[:200]!r}: give a shipped name ({', '.join(shipped)}) "
         f"or the path of a .toml file{hint}"
     )
 
