@@ -45,6 +45,8 @@ from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from controllers import CONTROLLERS
 from controllers.designs import KINDS, SCHEMA, loop_name
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import read_json
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import Model
@@ -321,7 +323,9 @@ def _read(path: Path) -> dict[str, Any]:
     document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
     if path.exists():
         try:
-            document |= json.loads(path.read_text(encoding="utf-8"))
+            found = read_json(path)
+            check_shape(found, {"controllers?": {"*": {"*": dict}}, "provenance?": dict})
+            document |= found
         except (ValueError, TypeError) as error:
             raise DesignError(
                 f"{path} is no file of settings ({error}); delete it or name another"

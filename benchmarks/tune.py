@@ -51,6 +51,8 @@ from benchmarks.tuning.loop import lambda_tuning
 from benchmarks.worker import ProcessDied
 from controllers.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.pid import PID, FeedforwardPID
+from pma_gym.document_shape import Whole, check_shape
+from pma_gym.documents import read_json
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK
@@ -250,7 +252,8 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {"schema": SCHEMA, "provenance": {}, "models": {}}
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
+        check_shape(document, {"schema": Whole(), "provenance": dict, "models": {"*": dict}})
         if document["schema"] == SCHEMA:
             return document
     except (ValueError, KeyError, TypeError) as error:

@@ -23,7 +23,10 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
+from benchmarks.damaged import say_damaged
 from pma_gym.cli.options import StrictTyper
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import read_json
 from pma_gym.terminal import safe_streams
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
@@ -253,7 +256,7 @@ def main(
     kept = cases / "bounds"
     kept.mkdir(exist_ok=True)
     names = [path.stem for path in sorted((cases / "truth").glob("case_*.json")) if _counts(path)]
-    missing = [name for name in names if not (kept / f"{name}.json").is_file()]
+    missing = [name for name in names if not _is_kept(kept / f"{name}.json")]
     begun = time.monotonic()
     print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
     for done, name in enumerate(_bounds(cases, missing, jobs), 1):
@@ -268,6 +271,18 @@ def main(
         document = {"alarm": ALARM, "effects": by_effect, "cases": found}
         replace_file(json_file, (json.dumps(document, indent=1) + "\n").encode())
     typer.echo(table(by_effect))
+
+
+def _is_kept(path: Path) -> bool:
+    """Whether a bound is there; a damaged one is computed anew."""
+    if not path.is_file():
+        return False
+    try:
+        check_shape(read_json(path, "journal_mib", own=True, finite=False), {"effect": str})
+    except ValueError as error:
+        say_damaged(path, str(error))
+        return False
+    return True
 
 
 def _counts(truth: Path) -> bool:

@@ -80,7 +80,8 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
                 raise ValueError(f"it is of case {entry['number']}")
             found.append(Record(**entry))
         except (ValueError, TypeError) as error:
-            damaged.append(f"{error}".replace(f"{path} ", f"{path.name} "))
+            why = f"{error}".replace(f"{path} ", "").removesuffix("; write it anew")
+            damaged.append(f"{path.name}: {why}")
     say_lost(folder, damaged)
     return found
 

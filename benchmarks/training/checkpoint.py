@@ -17,8 +17,10 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from benchmarks.damaged import reason, say_damaged
 from benchmarks.training.averaging import WeightAverage
 from controllers.tensor_header import LARGEST_HEADER, check_header
+from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.limits import check_limit
 
@@ -86,6 +88,27 @@ def latest(folder: Path) -> tuple[int, Path] | None:
     return (int(found[-1].name), found[-1]) if found else None
 
 
+def usable(folder: Path, keys: Mapping[str, Any]) -> tuple[int, Path, dict[str, Any]] | None:
+    """The newest checkpoint that is not damaged, and what it says besides its tensors.
+
+    Args:
+        folder: of the checkpoints.
+        keys: shapes of what there must be, by key.
+    """
+    for path in reversed(_numbered(folder)):
+        if not (path / "state.json").is_file():
+            continue
+        try:
+            found = told(path, keys)
+            check_shape(found, keys)
+            _check_tensors(path / "state.safetensors")
+        except (CheckpointError, OSError, ValueError) as error:
+            say_damaged(path, reason(error.__cause__ or error), "the one before it serves, if any")
+            continue
+        return int(path.name), path, found
+    return None
+
+
 def _numbered(folder: Path) -> list[Path]:
     """Checkpoints by number; what somebody put beside them is none."""
     return sorted(path for path in folder.glob("*") if re.fullmatch("[0-9]{6}", path.name))
@@ -117,6 +140,7 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | N
         _check_tensors(path / "state.safetensors")
         tensors = load_file(path / "state.safetensors")
         numbers = _words(path)["numbers"]
+        _check_finite(tensors)
         _restore(model, tensors, numbers)
         means = [
             tensors[f"average.{i}"] for i in range(sum(k.startswith("average.") for k in tensors))
@@ -140,6 +164,12 @@ def _check_tensors(path: Path) -> None:
     check_limit(str(path), "weights_mib", size / 2**20)
     with path.open("rb") as file:
         check_header(file.read(8 + LARGEST_HEADER), size)
+
+
+def _check_finite(tensors: Mapping[str, torch.Tensor]) -> None:
+    for name, tensor in tensors.items():
+        if not torch.isfinite(tensor).all():
+            raise ValueError(f"tensor {name} holds NaN or infinity: the training diverged")
 
 
 def _damaged(path: Path, error: Exception) -> CheckpointError:

@@ -48,7 +48,7 @@ class KeptRows:
             return {}
         try:
             document = read_json(self.path, "journal_mib", own=True)
-            check_shape(document, {"made_with": dict, "rows": {"*": list}})
+            check_shape(document, {"made_with": dict, "rows": dict})
         except ValueError as error:
             say_damaged(self.path, str(error))
             return {}
@@ -60,7 +60,7 @@ class KeptRows:
                 check_shape(row, ListOf(object, 2), name)
                 gains, cost = row
                 check_shape([*gains, cost], ListOf(Real()), name)
-                found[name] = Gains(*gains), float(cost)
+                found[name] = Gains._make(gains), float(cost)
             except (ValueError, TypeError) as error:
                 damaged.append(str(error))
         if damaged:
