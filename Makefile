@@ -7,6 +7,7 @@ JOBS ?= 2
 PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+EXAMPLES ?= 100000
 
 EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
@@ -21,7 +22,7 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test lint style types layers pages docs clean distclean
+.PHONY: help bench peers test fuzz lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -36,6 +37,9 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+
+fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
+	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 

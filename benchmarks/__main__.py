@@ -3,8 +3,6 @@
 import os
 import sys
 
-import typer
-
 from benchmarks.commands import (
     dissertation,
     exercise,
@@ -15,12 +13,14 @@ from benchmarks.commands import (
     suites,
     training,
 )
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
 
 # Figures are drawn to files; each process computes on its own core.
 os.environ.setdefault("MPLBACKEND", "Agg")
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-app = typer.Typer(
+app = StrictTyper(
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
@@ -39,11 +39,12 @@ exercise.register(app)
 
 def main() -> None:
     """The whole command; a file that cannot be written ends it with one message."""
-    try:
-        app(prog_name="python -m benchmarks")
-    except OSError as error:
-        print(f"error: {error}", file=sys.stderr)
-        sys.exit(2)
+    with safe_streams():
+        try:
+            app(prog_name="python -m benchmarks")
+        except (OSError, ValueError) as error:
+            print(f"error: {error}", file=sys.stderr)
+            sys.exit(2)
 
 
 if __name__ == "__main__":

@@ -39,6 +39,7 @@ from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, Condition, Plant
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.terminal import SafeConsole
 
 __all__ = [
     "CONTROL_PERIOD",
@@ -148,9 +149,9 @@ def run_accuracy(console: Console | None = None, out: Path | None = None) -> boo
     Returns:
         Whether the default tolerance keeps both limits on every model.
     """
-    console = console or Console()
+    console = console or SafeConsole()
     text = StringIO()
-    places = (console, Console(file=text, width=120))
+    places = (console, SafeConsole(file=text, width=120))
     kept = True
     for model in MODELS:
         ladders = {trial: error_ladder(model, TOLERANCES, trial) for trial in TRIALS}

@@ -45,10 +45,13 @@ from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from controllers import CONTROLLERS
 from controllers.designs import KINDS, SCHEMA, loop_name
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import read_json
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import Model
 from pma_gym.tasks import phase_errors
+from pma_gym.terminal import SafeConsole
 
 SUITES = ("robust", "hard", "pressure")
 """Suites whose loops and tasks controllers are designed for; on other stations than theirs."""
@@ -146,7 +149,7 @@ def run_design(
     if len(searches) < len(asked):
         there = len(asked) - len(searches)
         print(f"{out} has {there} of {len(asked)} designs asked for; --again makes them anew")
-    with Progress() as progress:
+    with Progress(console=SafeConsole()) as progress:
         bar = progress.add_task("Designing", total=len(searches))
 
         def keep(index: int, result: object) -> None:
@@ -320,7 +323,9 @@ def _read(path: Path) -> dict[str, Any]:
     document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
     if path.exists():
         try:
-            document |= json.loads(path.read_text(encoding="utf-8"))
+            found = read_json(path)
+            check_shape(found, {"controllers?": {"*": {"*": dict}}, "provenance?": dict})
+            document |= found
         except (ValueError, TypeError) as error:
             raise DesignError(
                 f"{path} is no file of settings ({error}); delete it or name another"

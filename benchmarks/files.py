@@ -18,5 +18,5 @@ def write_bytes(path: Path, content: bytes) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """As `write_bytes`, for text in UTF-8."""
-    write_bytes(path, text.encode("utf-8"))
+    """As `write_bytes`, for text in UTF-8; bytes of file names that are none become escapes."""
+    write_bytes(path, text.encode("utf-8", "backslashreplace"))

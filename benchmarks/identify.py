@@ -18,6 +18,7 @@ from benchmarks.identification.station import fitted_parameters, identify, leave
 from benchmarks.identification.transients import PressureSteps, pressure_steps
 from benchmarks.processes import run_all
 from pma_gym.plant.model import Model, Note, dump_model
+from pma_gym.terminal import SafeConsole
 
 STUDENT_10 = 2.228
 """97.5 % point of Student's t with 10 degrees of freedom: 11 pressures left out in turn."""
@@ -38,7 +39,7 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     Raises:
         KeyboardInterrupt: Ctrl-C, before anything is written.
     """
-    console = console or Console()
+    console = console or SafeConsole()
     data, steps = station_limits(), pressure_steps()
     whole = identify(data, steps)
     start = fitted_parameters(whole)

@@ -41,6 +41,7 @@ from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import Program, table
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.plant.system import System
+from pma_gym.terminal import SafeConsole
 
 MODEL, PRESSURE, CONTROL_STEPS = "station", 350e3, 60
 TOLERANCES = (3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
@@ -221,7 +222,7 @@ def run_integrators(
         out: CSV file of the curves, if given.
         steps: control steps of a trial.
     """
-    console = console or Console()
+    console = console or SafeConsole()
     points = curves(steps)
     for trial in TRIALS:
         console.print(_curve_table(trial, [point for point in points if point.trial == trial]))

@@ -93,11 +93,11 @@ def _greeting(suite: Suite, out: Path, jobs: int) -> str:
 
 def _progress(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),
-        TextColumn("{task.fields[last]}"),
+        TextColumn("{task.fields[last]}", markup=False),
         console=console,
     )
 
@@ -166,7 +166,7 @@ def _leave_partial(results: Results, out: Path, console: Console) -> int:
     folder = out / PARTIAL
     if not results.scores:
         console.print(
-            "[yellow]Interrupted[/] before the first case was done: nothing was measured, and "
+            "Interrupted before the first case was done: nothing was measured, and "
             f"nothing is written to {out}. Run again for the whole.",
             highlight=False,
         )
@@ -175,7 +175,7 @@ def _leave_partial(results: Results, out: Path, console: Console) -> int:
     write_text(folder / "scores.json", json_text(results))
     total = len(list(results.suite.cases()))
     console.print(
-        f"[yellow]Interrupted:[/] {len(results.scores)} of {total} cases are done; their scores "
+        f"Interrupted: {len(results.scores)} of {total} cases are done; their scores "
         f"are in {folder}. There is no report of a part; run again for the whole.",
         highlight=False,
     )

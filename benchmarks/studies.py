@@ -9,6 +9,7 @@ from rich.table import Table
 
 from benchmarks.profiles import write_csv
 from pma_gym.studies import VERDICTS, Comparison, compare_all
+from pma_gym.terminal import SafeConsole
 
 COLUMNS = ("study", "table", "quantity", "printed", "recomputed", "verdict", "note")
 """Columns of the CSV file."""
@@ -26,7 +27,7 @@ def run_studies(out: Path | None = None, console: Console | None = None) -> list
     Returns:
         The comparisons.
     """
-    console = console or Console()
+    console = console or SafeConsole()
     rows = compare_all()
     for study, group in _by_study(rows).items():
         notes = _notes(group)

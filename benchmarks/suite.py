@@ -1,7 +1,6 @@
 """What the benchmark runs: the frozen suite, and its cases."""
 
 import hashlib
-import tomllib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.contender import Contender
+from pma_gym.documents import read_toml
 from pma_gym.tasks import TASKS
 
 SUITES = Path(__file__).parent / "suites"
@@ -178,7 +178,7 @@ def load_suite(name: str = "reproduction") -> Suite:
     >>> len(list(suite.cases()))
     153
     """
-    document = tomllib.loads((SUITES / f"{name}.toml").read_text(encoding="utf-8"))
+    document = read_toml(SUITES / f"{name}.toml")
     if document["schema"] != SCHEMA:
         raise SuiteError(f"{name}.toml has schema {document['schema']}, known is {SCHEMA}")
     unknown = set(document["tasks"]) - set(TASKS)

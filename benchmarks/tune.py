@@ -51,9 +51,12 @@ from benchmarks.tuning.loop import lambda_tuning
 from benchmarks.worker import ProcessDied
 from controllers.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.pid import PID, FeedforwardPID
+from pma_gym.document_shape import Whole, check_shape
+from pma_gym.documents import read_json
 from pma_gym.plant.model import Model, dump_model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK
+from pma_gym.terminal import SafeConsole
 
 PRESSURES_KPA = {
     "displacement": (150, 200, 250, 300, 400, 575),
@@ -166,7 +169,7 @@ def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
     try:
         if order:
             Plant(order[0].model)  # compiled here, once, so that the processes find it on disk
-        with Progress() as progress:
+        with Progress(console=SafeConsole()) as progress:
             bar = progress.add_task("Tuning", total=len(rows))
 
             def keep(index: int, result: object) -> None:
@@ -249,7 +252,8 @@ def _read(path: Path) -> dict[str, Any]:
     if not path.exists():
         return {"schema": SCHEMA, "provenance": {}, "models": {}}
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = read_json(path)
+        check_shape(document, {"schema": Whole(), "provenance": dict, "models": {"*": dict}})
         if document["schema"] == SCHEMA:
             return document
     except (ValueError, KeyError, TypeError) as error:

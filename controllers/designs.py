@@ -1,6 +1,5 @@
 """Settings of the controllers by loop and task, as `python -m benchmarks design` wrote them."""
 
-import json
 import math
 import re
 from collections.abc import Mapping
@@ -8,6 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
+from pma_gym.documents import read_json
 from pma_gym.envs import Station
 from pma_gym.tasks import Task
 
@@ -124,10 +124,11 @@ def _dead_time(loop: str) -> float:
 
 @cache
 def _read(path: Path) -> dict[str, Any]:
-    document = json.loads(path.read_text(encoding="utf-8"))
-    if document.get("schema") != SCHEMA:
+    document = read_json(path)
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
         raise ValueError(
-            f"{path} must have schema {SCHEMA}, got {document.get('schema')!r}; write it anew: "
+            f"{path} must have schema {SCHEMA}, got {schema!r}; write it anew: "
             "python -m benchmarks design"
         )
     return document

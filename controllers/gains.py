@@ -1,6 +1,5 @@
 """Gains by model, loop, task, controller and pressure, as `benchmarks/tune.py` wrote them."""
 
-import json
 import math
 from functools import cache
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.designs import loop_name, must_give_a_position, nearest_loop, task_kind
+from pma_gym.documents import read_json
 from pma_gym.envs import Station
 from pma_gym.units import SI_FACTORS
 
@@ -129,10 +129,11 @@ def _unit(quantity: str) -> str:
 
 @cache
 def _read(path: Path) -> dict[str, Any]:
-    document = json.loads(path.read_text(encoding="utf-8"))
-    if document.get("schema") != SCHEMA:
+    document = read_json(path)
+    schema = document.get("schema") if isinstance(document, dict) else None
+    if schema != SCHEMA:
         raise ValueError(
-            f"{path} must have schema {SCHEMA}, got {document.get('schema')!r}; write it anew: "
+            f"{path} must have schema {SCHEMA}, got {schema!r}; write it anew: "
             "python -m benchmarks tune"
         )
     return document

@@ -1,6 +1,5 @@
 """The words of a policy file: which keys its JSON has, and what each of them must be."""
 
-import json
 import math
 import reprlib
 from collections.abc import Mapping
@@ -10,6 +9,7 @@ from controllers.designs import EXERCISE_KINDS, KINDS
 from controllers.form import Form
 from controllers.network import ACTIVATIONS, OUTPUTS
 from controllers.view import View
+from pma_gym.documents import parse_json
 
 SCHEMA = 1
 
@@ -63,9 +63,9 @@ def parsed_document(text: bytes) -> dict[str, Any]:
         PolicyError: no JSON, another schema, a key that is missing, unknown or has a wrong value.
     """
     try:
-        document = json.loads(text.decode("utf-8"), parse_constant=_no_number)
-    except (ValueError, RecursionError) as error:
-        raise PolicyError(f"it is no JSON ({error})") from None
+        document = parse_json(text, "the file")
+    except ValueError as error:
+        raise PolicyError(f"it is no JSON that can be used ({error})") from None
     _check(isinstance(document, dict), "it", "a JSON object", document)
     schema = document.get("schema")
     if schema != SCHEMA or isinstance(schema, bool):
@@ -83,10 +83,6 @@ def parsed_document(text: bytes) -> dict[str, Any]:
     _check_observation(document)
     _check_training(document["training"])
     return document
-
-
-def _no_number(text: str) -> None:
-    raise ValueError(f"it has {text}, which JSON does not")
 
 
 def _check_keys(document: Mapping[str, Any], section: str) -> None:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from controllers.network import Layer, Scaling, Weights, check_chain
 from controllers.policy_document import PolicyError
+from controllers.tensor_header import LARGEST_HEADER, check_header
 
 
 def weights_of(document: Mapping[str, Any], blob: bytes) -> Weights:
@@ -75,6 +76,7 @@ def _checked(document: Mapping[str, Any], blob: bytes) -> dict[str, NDArray[Any]
         )
     load = safetensors().load
     try:
+        check_header(blob[: 8 + LARGEST_HEADER], len(blob))
         tensors = load(blob)
     # The package raises errors of its own, and those of NumPy for number formats that it lacks.
     except Exception as error:

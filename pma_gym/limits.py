@@ -34,6 +34,11 @@ LIMITS = {
     "cells": Limit(20_000_000, "cells a table"),
     "cell_characters": Limit(10_000, "characters a cell"),
     "sheets": Limit(200, "sheets a workbook"),
+    "toml_kib": Limit(1024, "KiB a TOML document"),
+    "yaml_kib": Limit(256, "KiB a YAML document"),
+    "values": Limit(200_000, "names or values in a TOML or YAML document"),
+    "journal_mib": Limit(16, "MiB a file of a run's journal"),
+    "weights_mib": Limit(4096, "MiB a file of weights"),
     "nesting": Limit(50, "levels of nesting in a document"),
     "digits": Limit(400, "digits a number"),
 }

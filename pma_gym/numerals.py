@@ -23,3 +23,15 @@ def parse_number(text: str) -> float | None:
         return None
     number = float(bare)
     return number if math.isfinite(number) else None
+
+
+def parse_numbers(text: str) -> list[float] | None:
+    """The numbers between the commas of a text, None if one of them is none.
+
+    Example:
+        >>> parse_numbers("150, 300,"), parse_numbers("150,nan"), parse_numbers("")
+        ([150.0, 300.0], None, [])
+    """
+    numbers = [parse_number(part) for part in text.split(",") if part.strip()]
+    known = [number for number in numbers if number is not None]
+    return known if len(known) == len(numbers) else None

@@ -24,6 +24,7 @@ from benchmarks.budget.trial import Budget, trial_budget
 from benchmarks.files import write_bytes, write_text
 from benchmarks.profiles import write_csv
 from pma_gym.data.serres2008 import pressures
+from pma_gym.terminal import SafeConsole
 
 TASKS = ("displacement", "rotation")
 
@@ -37,7 +38,7 @@ def run_budget(out: Path | None = None, console: Console | None = None) -> dict[
     Returns:
         The budgets by task.
     """
-    console, drawn = console or Console(), drawn_stations()
+    console, drawn = console or SafeConsole(), drawn_stations()
     budgets, contests, text = {}, {}, ["# Error budget of open-loop control"]
     for task in TASKS:
         budgets[task] = [trial_budget(task, pressure) for pressure in pressures(task)]

@@ -41,12 +41,11 @@ def exercise(
     out: Annotated[Path, typer.Option(help="Folder of the report.")] = RESULTS / "exercise",
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
-    from rich.console import Console
-
     from benchmarks.exercise.choice import Choice, ChoiceError
     from benchmarks.exercise.job import run_exercise
     from benchmarks.exercise.profile import ProfileError, held, read_profile
     from pma_gym.plant.prescription import UnreachableError
+    from pma_gym.terminal import SafeConsole
 
     try:
         if out.exists() and not out.is_dir():
@@ -55,7 +54,7 @@ def exercise(
             raise ChoiceError("--moment and --profile are two prescriptions; give one of them")
         choice = Choice(muscles, diameter, length, radius)
         wanted = read_profile(profile) if profile else None if moment is None else held(moment)
-        run_exercise(choice, wanted, out, Console())
+        run_exercise(choice, wanted, out, SafeConsole())
     except (ChoiceError, ProfileError, UnreachableError) as error:
         refuse(error)
 
@@ -67,14 +66,13 @@ def safety(
     out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RESULTS / "safety",
 ) -> None:
     """Count how often wild commands hurt the operator of the exercise device; a minute or two."""
-    from rich.console import Console
-
     from benchmarks.exercise.safety_layer.job import SafetyError, run_safety
+    from pma_gym.terminal import SafeConsole
 
     try:
         if out.exists() and not out.is_dir():
             raise SafetyError(f"--out {out} is a file; name a folder for the results")
-        run_safety(episodes, bare, seed, out, Console())
+        run_safety(episodes, bare, seed, out, SafeConsole())
     except SafetyError as error:
         refuse(error)
 
@@ -91,15 +89,14 @@ def lag(
     out: Annotated[Path, typer.Option(help="Folder of the tables.")] = RESULTS / "lag",
 ) -> None:
     """Bound what the regulator's lag makes impossible in an exercise; a minute an operator."""
-    from rich.console import Console
-
     from benchmarks.exercise.lag.job import LagError, run_lag
+    from pma_gym.numerals import parse_numbers
+    from pma_gym.terminal import SafeConsole
 
     try:
-        try:
-            listed = [float(part) for part in pressures.split(",") if part.strip()]
-        except ValueError:
-            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}") from None
-        run_lag(task, operators, listed, safety, out, Console())
+        listed = parse_numbers(pressures)
+        if listed is None:
+            raise LagError(f"--pressures must be numbers in kPa, got {pressures!r}")
+        run_lag(task, operators, listed, safety, out, SafeConsole())
     except ValueError as error:
         refuse(error)

@@ -41,12 +41,11 @@ def reproduction(
 
 def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str, jobs: int) -> int:
     """The main job; its exit code."""
-    from rich.console import Console
-
     from benchmarks.contender import ControllerError, parse_contenders
     from benchmarks.job import run_job
     from benchmarks.suite import SuiteError, load_suite
     from pma_gym.plant.model import ModelError, load_model
+    from pma_gym.terminal import SafeConsole
 
     suite = load_suite()
     try:
@@ -59,13 +58,14 @@ def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str
             raise SuiteError(f"--out {out} is a file; name a folder for the results")
     except (ControllerError, ModelError, SuiteError) as error:
         refuse(error)
-    return run_job(suite, out, jobs, Console())
+    return run_job(suite, out, jobs, SafeConsole())
 
 
 def _pressures(text: str) -> list[float]:
     from benchmarks.suite import SuiteError
+    from pma_gym.numerals import parse_numbers
 
-    try:
-        return [float(part) for part in listed(text)]
-    except ValueError:
-        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}") from None
+    found = parse_numbers(text)
+    if found is None:
+        raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}")
+    return found

@@ -29,12 +29,11 @@ def run(
     ] = None,
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
-    from rich.console import Console
-
     from benchmarks.comparison.job import chosen, run_comparison
     from benchmarks.comparison.suite import frozen_suite
     from benchmarks.contender import ControllerError
     from benchmarks.suite import SuiteError
+    from pma_gym.terminal import SafeConsole
 
     try:
         if suite == "reproduction":
@@ -42,7 +41,7 @@ def run(
             raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", jobs))
         frozen = frozen_suite(suite)
         entries = chosen(frozen, controllers)
-        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, jobs, Console())
+        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, jobs, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -82,17 +81,16 @@ def add(
     ] = RESULTS,
 ) -> None:
     """Score your own controller on all suites, and say where it stands or what to mend."""
-    from rich.console import Console
-
     from benchmarks.comparison.add import own_contender, run_add
     from benchmarks.comparison.suite import frozen_suite, suite_names
     from benchmarks.contender import ControllerError
     from benchmarks.suite import SuiteError
+    from pma_gym.terminal import SafeConsole
 
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
         frozen = [one for one in frozen if suite or not one.only_by_name]
-        code = run_add(own_contender(controller), frozen, results, jobs, Console())
+        code = run_add(own_contender(controller), frozen, results, jobs, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -103,8 +101,7 @@ def add(
 
 def suites() -> None:
     """List the frozen suites: their versions, cases and controllers."""
-    from rich.console import Console
-
     from benchmarks.comparison.listing import print_suites
+    from pma_gym.terminal import SafeConsole
 
-    print_suites(Console())
+    print_suites(SafeConsole())

@@ -42,7 +42,7 @@ def train(
     ] = 0,
 ) -> None:
     """Train a policy on stations that no suite has; an interrupted training goes on."""
-    from rich.console import Console
+    from pma_gym.terminal import SafeConsole
 
     try:
         from benchmarks.training.checkpoint import CheckpointError
@@ -60,7 +60,7 @@ def train(
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
         order = ordered(algo, task, preset, seed, steps, device, threads, patience)
-        run_train(order, folder, Console())
+        run_train(order, folder, SafeConsole())
     except PresetError as error:
         refuse(error)
     except CheckpointError as error:

@@ -5,6 +5,7 @@ from functools import partial
 from pathlib import Path
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 
 from benchmarks.comparison.case import BY_LIMIT, Row
@@ -80,7 +81,7 @@ def run_add(
         todo = plan(suite, [suite.entry(contender)], out)
         rows = list(todo.known.values())
         console.print(
-            f"[bold]{suite.name}[/] version {suite.version}: {len(todo.cases)} cases of "
+            f"{suite.name} version {suite.version}: {len(todo.cases)} cases of "
             f"{contender.label}, {len(rows)} of them done before",
             highlight=False,
         )
@@ -92,7 +93,7 @@ def run_add(
         print_failures(rows, console)
         if complete is None:
             console.print(
-                f"[yellow]Interrupted:[/] {len(rows)} of {len(todo.cases)} cases are done and "
+                f"Interrupted: {len(rows)} of {len(todo.cases)} cases are done and "
                 "stay; the same command goes on from there.",
                 highlight=False,
             )
@@ -114,7 +115,7 @@ def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) ->
     with console.status("drawing the stations, compiling their equations"):
         compile_kernels(todo.suite)
     with Progress(console=console, transient=True) as progress:
-        bar = progress.add_task(todo.suite.name, total=len(todo.cases), completed=len(rows))
+        bar = progress.add_task(escape(todo.suite.name), total=len(todo.cases), completed=len(rows))
 
         def on_done(row: Row) -> None:
             nonlocal troubles
@@ -128,7 +129,7 @@ def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) ->
             done = execute(todo, jobs, out, on_done, wary=True)
         except _EnoughError:
             console.print(
-                f"  [red]{ENOUGH} cases failed[/]: the other {len(todo.cases) - len(rows)} are "
+                f"  {ENOUGH} cases failed: the other {len(todo.cases) - len(rows)} are "
                 "not run; mend it and run the same command again",
                 highlight=False,
             )

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks.comparison.case import Case, Row, cases, failed_row, run_case
 from benchmarks.comparison.fingerprint import key
-from benchmarks.comparison.journal import JOURNAL, Journal, read_rows
+from benchmarks.comparison.journal import JOURNAL, Journal, case_rows
 from benchmarks.comparison.suite import Entry, Episode, FrozenSuite
 from benchmarks.processes import run_all
 from benchmarks.worker import ProcessDied
@@ -60,7 +60,7 @@ def plan(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Plan:
     keys = {entry.contender.name: key(suite, entry.contender) for entry in entries}
     wanted = tuple(cases(suite, entries))
     known, outdated = dict[Identity, Row](), 0
-    for row in read_rows(out / JOURNAL):
+    for row in case_rows(out / JOURNAL):
         if row.get("controller") not in keys:
             continue
         if row.get("key") != keys[row["controller"]]:

@@ -122,11 +122,11 @@ def _greeting(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> str
 
 def _progress(console: Console) -> Progress:
     return Progress(
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[failed]}"),
+        TextColumn("{task.fields[failed]}", markup=False),
         console=console,
     )
 
@@ -159,7 +159,7 @@ def _bars(progress: Progress, todo: Plan, entries: Sequence[Entry]) -> Callable[
 
 def _leave(todo: Plan, rows: Sequence[Row], out: Path, console: Console) -> int:
     console.print(
-        f"[yellow]Interrupted:[/] {len(rows)} of {len(todo.cases)} cases are done and stay in "
+        f"Interrupted: {len(rows)} of {len(todo.cases)} cases are done and stay in "
         f"{out / JOURNAL}. The same command goes on from there.",
         highlight=False,
     )

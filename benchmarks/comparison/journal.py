@@ -8,8 +8,47 @@ from pathlib import Path
 from types import TracebackType
 
 from benchmarks.comparison.case import Row
+from benchmarks.damaged import say_damaged
+from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape
+from pma_gym.documents import parse_json
+from pma_gym.limits import limit
 
 JOURNAL = "journal.jsonl"
+
+_ROW = {
+    "key?": Maybe(str),
+    "suite": str,
+    "version": Whole(),
+    "controller": str,
+    "station": Whole(),
+    "task": str,
+    "pressure_kpa": Real(),
+    "repeat": Whole(),
+    "seed": Whole(),
+    "failure": str,
+}
+"""Shape of a case's row."""
+
+_FIGURES = {
+    "unit": str,
+    "phases": {"*": {"rmse": Real(), "percent_of_range": Real(), "largest_error": Real()}},
+    **{
+        name: Real()
+        for name in (
+            "rmse",
+            "start_rmse",
+            "steady_rmse",
+            "effort_v",
+            "variation_v_per_s",
+            "saturation_share",
+            "violation",
+            "act_us",
+            "act_us_worst",
+        )
+    },
+    "exercise?": {"*": Maybe(Real())},
+}
+"""Shape of the figures of a case that has some."""
 
 SYNC_S = 2.0
 """How much of the work a crash of the machine may cost (s); a killed process costs none."""
@@ -67,15 +106,54 @@ class Journal:
 def read_rows(path: Path) -> Iterator[Row]:
     """The rows of a journal, in the order in which they came; none if there is no file.
 
-    What is no whole row, as a line that a crash tore, is passed over: its case counts as not run.
+    What is no whole row, as a line that a crash tore, is passed over: its case counts as not run,
+    and one line on standard error says so.
     """
+    damaged: list[str] = []
+    for number, line in _lines(path):
+        try:
+            row = parse_json(line, f"line {number}", own=True)
+        except ValueError as error:
+            damaged.append(str(error))
+            continue
+        if isinstance(row, dict):
+            yield row
+        elif line.strip():
+            damaged.append(f"line {number} is no row")
+    _say_damaged(path, damaged)
+
+
+def case_rows(path: Path) -> Iterator[Row]:
+    """As `read_rows`, those alone that are rows of cases, with figures or a reason for none."""
+    damaged: list[str] = []
+    for number, row in enumerate(read_rows(path), start=1):
+        try:
+            check_shape(row, _ROW)
+            if not row["failure"]:
+                check_shape(row, _FIGURES)
+        except ShapeError as error:
+            damaged.append(f"row {number}: {error}")
+            continue
+        yield row
+    _say_damaged(path, damaged)
+
+
+def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Lines of a file with their numbers; of one that is too long its beginning."""
     if not path.is_file():
         return
-    with path.open("rb") as lines:
-        for line in lines:
-            try:
-                row = json.loads(line)
-            except ValueError:
-                continue
-            if isinstance(row, dict):
-                yield row
+    most, number = limit("document_kib") * 1024, 0
+    with path.open("rb") as file:
+        while line := file.readline(most):
+            number += 1
+            rest = line
+            while len(rest) == most and not rest.endswith(b"\n"):
+                rest = file.readline(most)
+            if line.strip():
+                yield number, line
+
+
+def _say_damaged(path: Path, damaged: list[str]) -> None:
+    if damaged:
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        say_damaged(path, f"{damaged[0]}{more}", "those cases count as not run, the others stay")

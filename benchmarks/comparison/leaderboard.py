@@ -15,7 +15,7 @@ from benchmarks.comparison.errors import (
     pooled_measure,
     task_of,
 )
-from benchmarks.comparison.provenance import finished_rows, read_run
+from benchmarks.comparison.provenance import check_run, finished_rows, read_run
 from benchmarks.comparison.standings import Standings
 from benchmarks.comparison.suite import Entry, FrozenSuite
 from benchmarks.comparison.verdicts import Verdict, verdicts
@@ -166,4 +166,5 @@ def read_leaderboard(suite: FrozenSuite, folder: Path) -> Leaderboard:
             f"other numbers than {suite.source} version {suite.version} has now; run it again: "
             f"python -m benchmarks run --suite {suite.source}"
         )
+    check_run(folder, info, suite.source)
     return Leaderboard(Record.of(suite, rows), info)

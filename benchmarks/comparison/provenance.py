@@ -12,14 +12,35 @@ from typing import Any
 from benchmarks.comparison.case import Row
 from benchmarks.comparison.execution import Plan, row_identity
 from benchmarks.comparison.fingerprint import code_digest
-from benchmarks.comparison.journal import JOURNAL, read_rows
+from benchmarks.comparison.journal import JOURNAL, case_rows
 from benchmarks.comparison.suite import Entry, FrozenSuite
+from benchmarks.damaged import say_damaged
 from benchmarks.environment_info import environment_info
 from benchmarks.files import write_text
 from benchmarks.suite import SuiteError
+from pma_gym.document_shape import ShapeError, Whole, check_shape
+from pma_gym.documents import read_json
 
 RUN, STATIONS = "run.json", "stations.json"
 SCHEMA = 1
+
+_KNOWN = {
+    "suite?": {"name?": str, "digest?": str, "version?": Whole()},
+    "contenders?": {"*": {"title": str, "source": str, "key": str}},
+    "code?": str,
+}
+"""Shape of what another run needs of a `run.json`."""
+
+_REPORTED = {
+    "suite": {"name": str, "digest": str, "version": Whole()},
+    "contenders": {"*": {"title": str, "source": str, "key": str, "command": str, "started": str}},
+    "code": str,
+    "git": dict,
+    "versions": {"*": str},
+    "platform": str,
+    "processors": Whole(),
+}
+"""Shape of what a report says of a run."""
 
 
 def check_folder(suite: FrozenSuite, out: Path) -> None:
@@ -37,12 +58,32 @@ def check_folder(suite: FrozenSuite, out: Path) -> None:
 
 
 def read_run(out: Path) -> dict[str, Any]:
-    """What is known of the last run into a folder; empty if there is none."""
-    try:
-        document = json.loads((out / RUN).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    """What is known of the last run into a folder; empty if there is none, or a damaged one."""
+    path = out / RUN
+    if not path.exists():
         return {}
-    return document if isinstance(document, dict) else {}
+    try:
+        document = read_json(path, "journal_mib", own=True)
+        check_shape(document, _KNOWN)
+    except ValueError as error:
+        say_damaged(path, str(error), "a run writes it anew; sound rows of the journal stay")
+        return {}
+    return document
+
+
+def check_run(out: Path, info: Mapping[str, Any], source: str) -> None:
+    """Refuse what is known of a run if it lacks what a report says.
+
+    Raises:
+        SuiteError: what is missing, and how it is written anew.
+    """
+    try:
+        check_shape(info, _REPORTED)
+    except ShapeError as error:
+        raise SuiteError(
+            f"{out / RUN} is damaged ({error}); a run writes it anew: python -m benchmarks run "
+            f"--suite {source}"
+        ) from None
 
 
 def finished_rows(out: Path) -> list[Row]:
@@ -54,7 +95,7 @@ def finished_rows(out: Path) -> list[Row]:
     keys = {name: entry["key"] for name, entry in read_run(out).get("contenders", {}).items()}
     found = {
         row_identity(row): row
-        for row in read_rows(out / JOURNAL)
+        for row in case_rows(out / JOURNAL)
         if row.get("key") is not None and keys.get(row.get("controller")) == row["key"]
     }
     return list(found.values())

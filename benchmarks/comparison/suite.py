@@ -3,7 +3,6 @@
 import difflib
 import hashlib
 import json
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,7 +15,10 @@ from benchmarks.comparison.target import Target, parse_target
 from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
 from controllers import designs
+from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
+from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.envs.options import parse_options
+from pma_gym.limits import LimitError
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EVERY_TASK, named_task
 
@@ -25,6 +27,55 @@ SCHEMA = 2
 
 UNFROZEN = ("title", "controllers", "targets", "only_by_name")
 """Entries of a suite's file that move no figure: they may change without a new version."""
+
+MOST_EPISODES = 1_000_000
+"""Most episodes of a suite."""
+
+_TABLE_OF_NUMBERS = {"*": ListOf(Real(), 1)}
+_STATIONS = {
+    "seed": Whole(0),
+    "training_seed": Whole(0),
+    "widening": Real(0),
+    "variation": Real(0),
+    "reach_v": Real(0),
+    "trials": _TABLE_OF_NUMBERS,
+    "effects?": ListOf(
+        {
+            "name": str,
+            "share": Real(0, 1),
+            "ranges": _TABLE_OF_NUMBERS,
+            "tied?": {"*": {"to": str, "factor": Real()}},
+        }
+    ),
+}
+"""Shape of a recipe of stations."""
+
+_SHAPE = {
+    "name": str,
+    "title": str,
+    "version": Whole(0),
+    "seed": Whole(0),
+    "model": str,
+    "environment": {"control_rate_hz": Real()},
+    "stations?": {"count?": Whole(0, MOST_EPISODES), "nominal?": bool, "of?": str},
+    "episodes": ListOf(
+        {
+            "tasks": ListOf(str, 1),
+            "pressures_kpa": ListOf(Real(), 1),
+            "per_station?": Whole(0, MOST_EPISODES),
+            "repeats?": Whole(1, MOST_EPISODES),
+        },
+        1,
+    ),
+    "controllers": ListOf({"name": str, "title": str, "only?": ListOf(str)}),
+    "targets?": ListOf(
+        {"figure": str, "measure": str, "most?": Maybe(Real()), "controllers?": ListOf(str)}
+    ),
+    "only_by_name?": bool,
+}
+"""Shape of a suite's file."""
+
+_LINE_FORM = "a line is a table, [stations], or name = value; see benchmarks/suites/robust.toml"
 
 NOMINAL = -1
 """Number of the station that is as its model."""
@@ -206,7 +257,7 @@ def suite_names() -> list[str]:
 
 
 def _schema(path: Path) -> object:
-    return tomllib.loads(path.read_text(encoding="utf-8")).get("schema")
+    return read_toml(path).get("schema")
 
 
 @lru_cache(maxsize=16)
@@ -217,7 +268,7 @@ def frozen_suite(source: str) -> FrozenSuite:
         SuiteError: there is none, or its file is not as it should be; names the file and the mend.
     """
     path = Path(source) if source.endswith(".toml") else SUITES / f"{source}.toml"
-    if not path.is_file():
+    if not is_file(path):
         near = difflib.get_close_matches(source, suite_names(), 1)
         hint = f"; did you mean {near[0]}?" if near else ""
         raise SuiteError(
@@ -225,9 +276,11 @@ def frozen_suite(source: str) -> FrozenSuite:
             f".toml file{hint}"
         )
     try:
-        return parse_suite(source, tomllib.loads(path.read_text(encoding="utf-8")))
-    except tomllib.TOMLDecodeError as error:
-        raise SuiteError(f"{path} is no TOML: {error}") from error
+        return parse_suite(source, read_toml(path, _LINE_FORM))
+    except (DocumentError, LimitError) as error:
+        raise SuiteError(str(error)) from error
+    except RecursionError:
+        raise SuiteError(f"{path}: stations.of leads back to this file; name another") from None
     except KeyError as error:
         raise SuiteError(f"{path} lacks {error.args[0]}; see {SUITES}/robust.toml") from error
     except (TypeError, ValueError) as error:
@@ -242,10 +295,21 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
     """
     if document.get("schema") != SCHEMA:
         raise SuiteError(f"schema must be {SCHEMA}, got {document.get('schema')!r}")
+    check_shape(document, _SHAPE)
     stations = dict(document.get("stations", {}))
     numbers = tuple(range(int(stations.get("count", 0))))
     if not numbers or stations.get("nominal", False):
         numbers = (NOMINAL, *numbers)
+    deals = tuple(_deal(entry) for entry in document["episodes"])
+    episodes = len(numbers) * sum(
+        deal.repeats * (deal.per_station or len(deal.tasks) * len(deal.pressures_kpa))
+        for deal in deals
+    )
+    if episodes > MOST_EPISODES:
+        raise ValueError(
+            f"a suite must have at most {MOST_EPISODES} episodes, got {episodes}; lower "
+            "stations.count, per_station or repeats"
+        )
     frozen = {key: value for key, value in document.items() if key not in UNFROZEN}
     if "of" in stations:
         frozen["of"] = frozen_suite(stations["of"]).digest
@@ -260,7 +324,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         environment=dict(document["environment"]),
         stations=numbers,
         recipe=_recipe(stations, document["model"]),
-        deals=tuple(_deal(entry) for entry in document["episodes"]),
+        deals=deals,
         entries=tuple(_entry(entry) for entry in document["controllers"]),
         targets=tuple(parse_target(given) for given in document.get("targets", ())),
         digest=_digest(json.dumps(frozen, sort_keys=True)),
@@ -273,6 +337,7 @@ def _recipe(stations: Mapping[str, Any], model: str) -> Recipe | None:
     if not stations:
         return None
     if "of" not in stations:
+        check_shape(stations, _STATIONS, "stations")
         return parse_recipe(stations, model)
     other = frozen_suite(stations["of"])
     if other.recipe is None or other.model != model:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from itertools import product
 
+from pma_gym.numerals import parse_numbers
 from pma_gym.plant.exercise import RADIUS, Device, own_device
 from pma_gym.plant.model import Model
 from pma_gym.plant.muscles import MusclesError, muscles
@@ -74,10 +75,10 @@ def numbers(option: str, text: str) -> list[float]:
     Raises:
         ChoiceError: something in it is no number.
     """
-    try:
-        return [float(part) for part in text.split(",") if part.strip()]
-    except ValueError:
+    found = parse_numbers(text)
+    if found is None:
         raise ChoiceError(
             f"--{option} must be a number, or several by commas, got {text!r}; for example "
             f"--{option} {'1,2' if option == 'muscles' else '20,40'}"
-        ) from None
+        )
+    return found

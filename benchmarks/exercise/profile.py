@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.documents import read_content
+from pma_gym.numerals import parse_number
 from pma_gym.plant.exercise import FULL_ANGLE
 from pma_gym.units import SI_FACTORS
 
@@ -68,11 +70,21 @@ def read_profile(path: Path) -> Prescription:
 
 def _rows(path: Path) -> list[tuple[float, float]]:
     """Angles (deg) and moments (N m) of the file, checked row by row."""
+    if not path.exists():
+        raise ProfileError(f"--profile {path}: No such file or directory; name a CSV file in UTF-8")
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ProfileError(f"--profile {path}: {_why(error)}; name a CSV file in UTF-8") from None
-    reader = csv.DictReader(lines)
+        lines = read_content(path).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ProfileError(f"--profile {path}: not UTF-8 text; name a CSV file in UTF-8") from None
+    except ValueError as error:
+        raise ProfileError(f"--profile {error}; name a CSV file in UTF-8") from None
+    try:
+        return _parsed(csv.DictReader(lines), path)
+    except csv.Error as error:
+        raise ProfileError(f"--profile {path}: {error}; name a CSV file in UTF-8") from None
+
+
+def _parsed(reader: csv.DictReader, path: Path) -> list[tuple[float, float]]:
     names = [name.strip() for name in reader.fieldnames or ()]
     if set(names) != set(COLUMNS):
         raise ProfileError(
@@ -97,18 +109,11 @@ def _rows(path: Path) -> list[tuple[float, float]]:
 
 def _number(row: dict, column: str, largest: float, place: str) -> float:
     """A cell as a number in 0 to a largest."""
-    try:
-        value = float(row[column])
-    except (TypeError, ValueError):
-        value = math.nan
-    if not 0.0 <= value <= largest:
+    value = parse_number(row[column] or "")
+    if value is None or not 0.0 <= value <= largest:
         raise ProfileError(
             f"{column} must be a number in 0 to {largest:g} "
             f"{'deg' if column == 'angle_deg' else 'N m'}, {place} has {row[column]!r}; check "
             "unit, sign and decimal point"
         )
     return value
-
-
-def _why(error: OSError | UnicodeDecodeError) -> str:
-    return error.strerror or str(error) if isinstance(error, OSError) else "not UTF-8 text"

@@ -6,6 +6,9 @@ from typing import Annotated
 
 import typer
 
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
+
 # Each process computes on its own core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
@@ -14,7 +17,7 @@ from benchmarks.hidden_effects import speed as timing  # noqa: E402
 from benchmarks.hidden_effects.cases import BLOCKS  # noqa: E402
 from benchmarks.hidden_effects.effects import ALL  # noqa: E402
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 Folder = Annotated[Path, typer.Argument(help="Folder that `draw` wrote.", exists=True)]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
@@ -56,7 +59,9 @@ def take(
     chosen: dict[str, int] = {}
     for item in blocks.split(","):
         name, _, count = item.partition("=")
-        if name not in drawing.EVERY or not count.isdecimal():
+        if name not in drawing.EVERY or not (
+            count.isascii() and count.isdecimal() and len(count) < 10
+        ):
             raise typer.BadParameter(
                 f"must be BLOCK=CASES by commas, such as single=27,nothing=40, got {item!r}; "
                 f"blocks are {', '.join(drawing.EVERY)}",
@@ -101,4 +106,5 @@ def speed(
 
 
 if __name__ == "__main__":
-    app()
+    with safe_streams():
+        app()

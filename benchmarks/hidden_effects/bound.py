@@ -23,6 +23,12 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
+from benchmarks.damaged import say_damaged
+from pma_gym.cli.options import StrictTyper
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import read_json
+from pma_gym.terminal import safe_streams
+
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np  # noqa: E402
@@ -68,7 +74,7 @@ FITTED = 4
 NOT_A_MEAN = ("sensor_quantisation",)
 """Effects that change no mean; a likelihood ratio of Gaussian noise says nothing of them."""
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 
 def detected(distance: Array | float) -> Array:
@@ -250,7 +256,7 @@ def main(
     kept = cases / "bounds"
     kept.mkdir(exist_ok=True)
     names = [path.stem for path in sorted((cases / "truth").glob("case_*.json")) if _counts(path)]
-    missing = [name for name in names if not (kept / f"{name}.json").is_file()]
+    missing = [name for name in names if not _is_kept(kept / f"{name}.json")]
     begun = time.monotonic()
     print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
     for done, name in enumerate(_bounds(cases, missing, jobs), 1):
@@ -265,6 +271,18 @@ def main(
         document = {"alarm": ALARM, "effects": by_effect, "cases": found}
         replace_file(json_file, (json.dumps(document, indent=1) + "\n").encode())
     typer.echo(table(by_effect))
+
+
+def _is_kept(path: Path) -> bool:
+    """Whether a bound is there; a damaged one is computed anew."""
+    if not path.is_file():
+        return False
+    try:
+        check_shape(read_json(path, "journal_mib", own=True, finite=False), {"effect": str})
+    except ValueError as error:
+        say_damaged(path, str(error))
+        return False
+    return True
 
 
 def _counts(truth: Path) -> bool:
@@ -288,4 +306,5 @@ def _bounds(folder: Path, missing: Sequence[str], jobs: int):  # noqa: ANN202
 
 
 if __name__ == "__main__":
-    app()
+    with safe_streams():
+        app()

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison.fingerprint import code_digest_with
+from benchmarks.damaged import UNREADABLE, reason, say_damaged
 from benchmarks.files import write_text
 from benchmarks.hidden_effects import records, scoring
 from benchmarks.hidden_effects.asking import Judge, diagnosed
@@ -21,6 +22,8 @@ from benchmarks.hidden_effects.targets import RATES
 from benchmarks.hidden_effects.undecidable import BLOCKS
 from benchmarks.hidden_effects.verdicts import Outcome
 from benchmarks.processes import run_all
+from pma_gym.document_shape import Whole, check_shape
+from pma_gym.documents import read_json
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes."""
@@ -91,7 +94,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
     code = fingerprint()
     done = {
         record.number: record
-        for record in records.read(order.folder, order.count)
+        for record in judgeable(order)
         if (record.code == code or not order.again) and record.most_rounds >= order.block.rounds
     }
     _tell(_greeting(order, done, code))
@@ -120,6 +123,22 @@ def run_block(order: Order) -> dict[str, Any] | None:
     document = figures(order, [done[number] for number in sorted(done)]) | {"failures": failures}
     write_text(order.folder / SCORE, json_text(document))
     return document
+
+
+def judgeable(order: Order) -> list[Record]:
+    """Records of an order's folder that can be judged; the other cases are made anew."""
+    found, damaged = list[Record](), list[str]()
+    for record in records.read(order.folder, order.count):
+        try:
+            if record.truth["seed"] != order.seed:
+                raise ValueError(f"it is of seed {record.truth['seed']!r}")
+            scoring.count([scoring.outcome_of(record)])
+            found.append(record)
+        except UNREADABLE as error:
+            name = records.path_of(order.folder, record.number).name
+            damaged.append(f"{name}: {reason(error)}")
+    records.say_lost(order.folder, damaged)
+    return found
 
 
 def figures(order: Order, kept: Sequence[Record]) -> dict[str, Any]:
@@ -220,14 +239,26 @@ def _claim(order: Order) -> None:
     if order.folder.exists() and not order.folder.is_dir():
         raise JobError(f"--out {order.folder} is a file; name a folder for the results")
     if path.is_file():
-        theirs = json.loads(path.read_text("utf-8"))
-        if theirs != mine:
+        theirs = _claimed(path)
+        if theirs is not None and theirs != mine:
             raise JobError(
                 f"--out {order.folder} holds block {theirs['block']} of seed {theirs['seed']}, "
                 f"not {order.block.name} of seed {order.seed}; name another folder"
             )
-        return
+        if theirs is not None:
+            return
     write_text(path, json.dumps(mine) + "\n")
+
+
+def _claimed(path: Path) -> dict[str, Any] | None:
+    """Whose set a folder holds; None where the file is damaged and no record is of another's."""
+    try:
+        theirs = read_json(path)
+        check_shape(theirs, {"block": str, "seed": Whole()})
+    except ValueError as error:
+        say_damaged(path, str(error), "it is written anew")
+        return None
+    return theirs
 
 
 def _greeting(order: Order, done: dict[int, Record], code: str) -> str:

@@ -1,13 +1,16 @@
 """What is kept of a case: the truth, the essentials of the answer, how long it took."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from benchmarks.damaged import say_damaged
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.files import case_name
+from pma_gym.document_shape import check_shape, shape_of
+from pma_gym.documents import read_json
 
 CANDIDATES = 6
 """How many of the likeliest candidates are kept."""
@@ -41,6 +44,9 @@ class Record:
     most_rounds: int = 0
 
 
+_SHAPE = shape_of(Record)
+
+
 def essentials(document: Mapping[str, Any]) -> dict[str, Any]:
     """What is kept of a `diagnosis.json`: parameters that moved, the likeliest candidates."""
     moved = {path: each for path, each in document["parameters"].items() if each["significant"]}
@@ -63,7 +69,29 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
         paths = sorted((folder / "cases").glob("case_*.json"))
     else:
         paths = [path_of(folder, number) for number in range(1, count + 1)]
-    return [Record(**json.loads(path.read_text("utf-8"))) for path in paths if path.is_file()]
+    found, damaged = list[Record](), list[str]()
+    for path in paths:
+        if not path.is_file():
+            continue
+        try:
+            entry = read_json(path, "journal_mib", own=True)
+            check_shape(entry, _SHAPE)
+            if path != path_of(folder, entry["number"]):
+                raise ValueError(f"it is of case {entry['number']}")
+            found.append(Record(**entry))
+        except (ValueError, TypeError) as error:
+            why = f"{error}".replace(f"{path} ", "").removesuffix("; write it anew")
+            damaged.append(f"{path.name}: {why}")
+    say_lost(folder, damaged)
+    return found
+
+
+def say_lost(folder: Path, damaged: Sequence[str]) -> None:
+    """Say once which records of a folder are damaged, if any are."""
+    if damaged:
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        then = "those cases are computed anew, the others stay"
+        say_damaged(folder / "cases", f"{damaged[0]}{more}", then)
 
 
 def path_of(folder: Path, number: int) -> Path:

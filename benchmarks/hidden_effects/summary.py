@@ -7,10 +7,16 @@ from typing import Any
 
 from benchmarks.hidden_effects.job import SCORE, JobError, merged
 from benchmarks.hidden_effects.tables import instead, listed, percent
+from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
+from pma_gym.documents import read_json
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
 
 MISSES = 40
 """How many misses of a block are listed; the rest are in its JSON."""
+
+
+_SCORE = {"seed": object, "code": {"*": Whole()}, "blocks": {"*": dict}, "failures": ListOf(str)}
+"""Shape of the figures that the job writes."""
 
 
 def read_scores(places: Sequence[Path]) -> dict[str, Any]:
@@ -28,13 +34,18 @@ def read_scores(places: Sequence[Path]) -> dict[str, Any]:
                 "hidden-effects` ended, or its --json file"
             )
         try:
-            document = json.loads(path.read_text("utf-8"))
+            document = read_json(path, "journal_mib", own=True)
         except ValueError as error:
             raise JobError(
                 f"{path} is no JSON file ({error}); name one that the job wrote"
             ) from None
-        if not isinstance(document, dict) or "blocks" not in document:
-            raise JobError(f"{path} holds no figures of `python -m benchmarks hidden-effects`")
+        try:
+            check_shape(document, _SCORE)
+        except ShapeError as error:
+            raise JobError(
+                f"{path} holds no figures of `python -m benchmarks hidden-effects` ({error}); run "
+                "it again, or name another"
+            ) from None
         documents.append(document)
     names = [name for document in documents for name in document["blocks"]]
     for name in names:

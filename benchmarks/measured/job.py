@@ -26,7 +26,9 @@ from benchmarks.measured.triangles import Held, held_against
 from pma_gym.data.dataset import Dataset
 from pma_gym.data.trial_files import encode_trial
 from pma_gym.discovery.journal import digest
+from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model
+from pma_gym.terminal import SafeConsole
 
 GIVEN = "serres2008"
 """The model to begin with."""
@@ -110,7 +112,7 @@ def run_measured(
         console: where to print.
         again: anew what other code made.
     """
-    console, begun = console or Console(), time.perf_counter()
+    console, begun = console or SafeConsole(), time.perf_counter()
     stages, given = Stages(out / "stages", again), load_model(GIVEN)
     if others := stages.others():
         console.print(others, highlight=False, markup=False, soft_wrap=True)
@@ -187,6 +189,7 @@ def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[
 
 
 def _explanations(found: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
+    check_shape(found, ListOf(ListOf(shape_of(Explanation, finite=False))), "found")
     return [[Explanation(**each) for each in every] for every in found]
 
 
@@ -257,7 +260,7 @@ def _prefixed(tell: Tell, prefix: str) -> Tell:
 @contextmanager
 def _bar(console: Console) -> Iterator[Tell]:
     """A line that says what is being done."""
-    columns = TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
+    columns = TextColumn("{task.description}", markup=False), BarColumn(), TimeElapsedColumn()
     with Bar(*columns, console=console) as bar:
         task = bar.add_task("begins", total=None)
 

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
+from benchmarks.damaged import reason, say_damaged
 from benchmarks.files import write_text
 from benchmarks.measured.stages import Stages
 from pma_gym.data.dataset import Dataset
@@ -47,7 +48,7 @@ class Round:
     rivals: Sequence[Sequence[Any]]
     blind: tuple[str, ...]
     next_experiment: Mapping[str, Any] | None
-    gap: Mapping[str, Mapping[str, float]]
+    gap: Mapping[str, Mapping[str, float | bool | None]]
     seconds: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -100,7 +101,10 @@ def _round(
     asked = digest([each.trial for each in data.trials], model, f"measured, seed {seed}")
     kept = stages.kept(name, asked, Round) if amended.is_file() else None
     if kept is not None:
-        return kept, load_model(amended)
+        try:
+            return kept, load_model(amended)
+        except ValueError as error:
+            say_damaged(amended, reason(error), "its round is computed anew")
     diagnosis = diagnose(
         data, model, seed=seed, jobs=jobs, journal=stages.journal, progress=progress
     )

@@ -9,7 +9,10 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from benchmarks.comparison.fingerprint import ROOT, code_digest_with
+from benchmarks.damaged import UNREADABLE, reason, say_damaged
 from benchmarks.files import write_text
+from pma_gym.document_shape import check_shape, shape_of
+from pma_gym.documents import read_json
 
 ELSEWHERE = ("contender", "execution", "replay", "results", "rollout", "score", "suite", "targets")
 """Modules of the benchmark, beside its own, that a stage depends on."""
@@ -57,13 +60,18 @@ class Stages:
             asked: digest of its question.
             made: makes it of what was kept, by keywords; None too where other code kept others.
         """
-        entry = self._entry(self._path(name))
+        path = self._path(name)
+        entry = self._entry(path)
         code = entry.pop("code", "")
         if entry.pop("asked", None) != asked or (code != self.code and self.again):
             return None
         try:
+            shape = shape_of(made, finite=False)
+            if shape is not object:
+                check_shape(entry, shape)
             found = made(**entry)
-        except TypeError:
+        except UNREADABLE as error:
+            say_damaged(path, reason(error))
             return None
         self.codes[code] += 1
         return found
@@ -91,4 +99,12 @@ class Stages:
 
     @staticmethod
     def _entry(path: Path) -> dict[str, Any]:
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+        if not path.is_file():
+            return {}
+        try:
+            entry = read_json(path, "journal_mib", own=True, finite=False)
+            check_shape(entry, {"code?": str, "asked?": str})
+        except ValueError as error:
+            say_damaged(path, str(error))
+            return {}
+        return entry

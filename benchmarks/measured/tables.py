@@ -9,6 +9,7 @@ from rich.table import Table
 from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
 from benchmarks.measured.rounds import Round
+from pma_gym.terminal import SafeConsole
 
 if TYPE_CHECKING:
     from benchmarks.measured.job import Measured
@@ -198,7 +199,7 @@ BLIND_HEADER = ("effect", "verdict", "shows from, times its usual size", "shown 
 
 def print_measured(result: "Measured", console: Console) -> None:
     """All of it as tables."""
-    console = console if console.is_terminal else Console(file=console.file, width=WIDTH)
+    console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
     header = ("round", "trials", "verdict", "added", "p", "explains as much")
     _print(console, "Diagnoses of I2 and I3", header, round_rows(result.rounds))
     names = tuple(label for _, label in COLUMNS)

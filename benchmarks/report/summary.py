@@ -34,7 +34,7 @@ def print_failures(results: Results, console: Console) -> None:
     if not results.failures:
         return
     console.print(
-        f"[red]{len(results.failures)} cases failed[/], all others are scored:",
+        f"{len(results.failures)} cases failed, all others are scored:",
         highlight=False,
     )
     for names, reason in results.failure_reasons():

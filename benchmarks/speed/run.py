@@ -26,6 +26,7 @@ from benchmarks.speed.ratios import (
 from benchmarks.speed.rows import RequestError, Row, all_rows, select
 from benchmarks.speed.views import View, rate, views
 from pma_gym.files import OutputError, check_output
+from pma_gym.terminal import SafeConsole
 
 DONE, FAILED, INTERRUPTED = 0, 1, 130
 """Exit codes."""
@@ -57,7 +58,7 @@ def run_speed(
     if json_file is not None:
         _check(json_file)
     # A file or a pipe has no width of its own.
-    console = console or (Console() if sys.stdout.isatty() else Console(width=WIDTH))
+    console = console or (SafeConsole() if sys.stdout.isatty() else SafeConsole(width=WIDTH))
     if quick:
         console.print("A smoke run: it shows that all works, its figures say little.")
     targets = CHECKS if check else TARGETS
@@ -68,7 +69,7 @@ def run_speed(
     try:
         _measure(measurement, console)
     except KeyboardInterrupt:
-        console.print("[yellow]Interrupted:[/] what follows is what was measured so far.")
+        console.print("Interrupted: what follows is what was measured so far.")
     verdicts = judge_all(targets, measurement.rows)
     found = document(measurement, verdicts, info, time.perf_counter() - begin)
     for view in views(found):
@@ -104,11 +105,11 @@ def _check(json_file: Path) -> None:
 
 def _measure(measurement: Measurement, console: Console) -> None:
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeRemainingColumn(),
-        TextColumn("{task.fields[last]}"),
+        TextColumn("{task.fields[last]}", markup=False),
     )
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task("measuring", total=measurement.work, last="")

@@ -17,7 +17,12 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from stable_baselines3.common.base_class import BaseAlgorithm
 
+from benchmarks.damaged import reason, say_damaged
 from benchmarks.training.averaging import WeightAverage
+from controllers.tensor_header import LARGEST_HEADER, check_header
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import read_json
+from pma_gym.limits import check_limit
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
 """What a model counts."""
@@ -83,6 +88,27 @@ def latest(folder: Path) -> tuple[int, Path] | None:
     return (int(found[-1].name), found[-1]) if found else None
 
 
+def usable(folder: Path, keys: Mapping[str, Any]) -> tuple[int, Path, dict[str, Any]] | None:
+    """The newest checkpoint that is not damaged, and what it says besides its tensors.
+
+    Args:
+        folder: of the checkpoints.
+        keys: shapes of what there must be, by key.
+    """
+    for path in reversed(_numbered(folder)):
+        if not (path / "state.json").is_file():
+            continue
+        try:
+            found = told(path, keys)
+            check_shape(found, keys)
+            _check_tensors(path / "state.safetensors")
+        except (CheckpointError, OSError, ValueError) as error:
+            say_damaged(path, reason(error.__cause__ or error), "the one before it serves, if any")
+            continue
+        return int(path.name), path, found
+    return None
+
+
 def _numbered(folder: Path) -> list[Path]:
     """Checkpoints by number; what somebody put beside them is none."""
     return sorted(path for path in folder.glob("*") if re.fullmatch("[0-9]{6}", path.name))
@@ -98,7 +124,7 @@ def told(path: Path, keys: Collection[str]) -> dict[str, Any]:
         CheckpointError: it is damaged.
     """
     try:
-        found = json.loads((path / "state.json").read_text(encoding="utf-8"))["told"]
+        found = _words(path)["told"]
         return {key: found[key] for key in keys}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise _damaged(path, error) from error
@@ -111,8 +137,10 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | N
         CheckpointError: it is damaged, or of another model.
     """
     try:
+        _check_tensors(path / "state.safetensors")
         tensors = load_file(path / "state.safetensors")
-        numbers = json.loads((path / "state.json").read_text(encoding="utf-8"))["numbers"]
+        numbers = _words(path)["numbers"]
+        _check_finite(tensors)
         _restore(model, tensors, numbers)
         means = [
             tensors[f"average.{i}"] for i in range(sum(k.startswith("average.") for k in tensors))
@@ -123,6 +151,25 @@ def load_checkpoint(path: Path, model: BaseAlgorithm, average: WeightAverage | N
             average.seen = int(numbers["averaged_at"])
     except Exception as error:
         raise _damaged(path, error) from error
+
+
+def _words(path: Path) -> dict[str, Any]:
+    """What a checkpoint says besides its tensors; a training that diverged may hold NaN."""
+    return read_json(path / "state.json", "journal_mib", own=True, finite=False)
+
+
+def _check_tensors(path: Path) -> None:
+    """Refuse a file of tensors that announces more than it holds, before memory is taken."""
+    size = path.stat().st_size
+    check_limit(str(path), "weights_mib", size / 2**20)
+    with path.open("rb") as file:
+        check_header(file.read(8 + LARGEST_HEADER), size)
+
+
+def _check_finite(tensors: Mapping[str, torch.Tensor]) -> None:
+    for name, tensor in tensors.items():
+        if not torch.isfinite(tensor).all():
+            raise ValueError(f"tensor {name} holds NaN or infinity: the training diverged")
 
 
 def _damaged(path: Path, error: Exception) -> CheckpointError:

@@ -100,7 +100,7 @@ def run_train(order: Order, out: Path, console: Console) -> Path:
     out.mkdir(parents=True, exist_ok=True)
     unit = unit_of(order.preset.task)
     columns = (
-        TextColumn("{task.description}"),
+        TextColumn("{task.description}", markup=False),
         BarColumn(),
         MofNCompleteColumn(),
         TimeElapsedColumn(),

@@ -5,6 +5,7 @@ its action does are the arguments of the wrapper `benchmarks.training.piloted_en
 that the zoo trains the same thing.
 """
 
+import reprlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from benchmarks.training.stations import training_recipe
 from controllers.form import Form
 from controllers.pilot import base_of
 from controllers.view import View
+from pma_gym.documents import is_file, read_yaml
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.envs.options import parse_options, parse_task
 
@@ -127,15 +129,13 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
     Raises:
         PresetError: there is none, or its file is not as it should be.
     """
-    import yaml
-
     if algorithm not in ALGORITHMS:
         raise PresetError(
             f"algo must be one of {', '.join(ALGORITHMS)}, got {algorithm!r}"
             f"{nearest(algorithm, ALGORITHMS)}"
         )
     path = Path(name) if name.endswith((".yml", ".yaml")) else PRESETS / name / f"{algorithm}.yml"
-    if not path.is_file():
+    if not is_file(path):
         names = preset_names()
         if name in names:
             has = ", ".join(sorted(p.stem for p in (PRESETS / name).glob("*.yml")))
@@ -145,9 +145,9 @@ def load_preset(name: str, algorithm: str, environment: str) -> Preset:
             f"{nearest(name, names)}"
         )
     try:
-        document = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise PresetError(f"{path} is no YAML: {error}") from error
+        document = read_yaml(path, finite=False)
+    except ValueError as error:
+        raise PresetError(str(error)) from error
     if not isinstance(document, Mapping) or environment not in document:
         known = ", ".join(map(str, document)) if isinstance(document, Mapping) else "nothing"
         raise PresetError(f"{path} has no entry for {environment}; it has {known}")
@@ -234,7 +234,7 @@ def _arguments(what: str, given: object, only: str, known: Mapping[str, bool]) -
         or not isinstance(given[0], Mapping)
         or list(given[0]) != [only]
     ):
-        raise ValueError(f"{what} must be a list of {only} alone, got {given!r}")
+        raise ValueError(f"{what} must be a list of {only} alone, got {reprlib.repr(given)}")
     found = mapping(only, given[0][only])
     needed = {key for key, must in known.items() if must}
     if not needed <= set(found) <= set(known):
@@ -248,7 +248,7 @@ def _arguments(what: str, given: object, only: str, known: Mapping[str, bool]) -
 def _scale(given: object) -> float:
     found = real(f"reward_scale of {WRAPPER}", given)
     if found <= 0.0:
-        raise ValueError(f"reward_scale of {WRAPPER} must be positive, got {given!r}")
+        raise ValueError(f"reward_scale of {WRAPPER} must be positive, got {reprlib.repr(given)}")
     return float(found)
 
 

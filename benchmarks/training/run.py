@@ -23,10 +23,9 @@ from stable_baselines3.common.utils import set_random_seed
 from benchmarks.training.averaging import WeightAverage, averaged, set_weights
 from benchmarks.training.checkpoint import (
     CheckpointError,
-    latest,
     load_checkpoint,
     save_checkpoint,
-    told,
+    usable,
 )
 from benchmarks.training.environments import (
     drawing_s,
@@ -36,6 +35,7 @@ from benchmarks.training.environments import (
 from benchmarks.training.learner import learner
 from benchmarks.training.preset import Preset
 from benchmarks.training.validation import Validation, validate
+from pma_gym.document_shape import ListOf, Real
 
 MOST_LEGS = 8
 """Most checkpoints of a training."""
@@ -197,15 +197,24 @@ def _formats() -> list[str]:
     return ["csv", "tensorboard"]
 
 
+_CONTENT = {
+    "order": dict,
+    "curve": ListOf(ListOf(Real(finite=False), 5)),
+    "wall_s": Real(),
+    "learning_s": Real(),
+    "stopped": bool,
+}
+"""Shape of what a checkpoint says of its training."""
+
+
 def _resumed(
     order: Order, out: Path, model: BaseAlgorithm, average: WeightAverage | None
 ) -> Course:
     """Where the training stands, with the model put there."""
-    found = latest(out / "checkpoints")
+    found = usable(out / "checkpoints", _CONTENT)
     if found is None:
         return Course()
-    number, path = found
-    content = told(path, ("order", "curve", "wall_s", "learning_s", "stopped"))
+    number, path, content = found
     here = json.loads(json.dumps(order.to_json()))
     if content["order"] != here:
         raise CheckpointError(
@@ -213,7 +222,7 @@ def _resumed(
             "--out, or delete that folder"
         )
     load_checkpoint(path, model, average)
-    curve = [Point(*point) for point in content["curve"]]
+    curve = [Point(*point[: len(Point._fields)]) for point in content["curve"]]
     times = content["wall_s"], content["learning_s"]
     return Course(curve, number, *times, content["stopped"])
 

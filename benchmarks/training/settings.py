@@ -1,11 +1,14 @@
 """Settings of the algorithms in a preset: which there are, and what values they may have."""
 
 import difflib
-import math
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from benchmarks.training.zoo_text import ACTIVATIONS, network_text
+from pma_gym.numerals import parse_number
+
+_shown = reprlib.repr
 
 _COMMON = {"batch_size", "gamma", "learning_rate"}
 _REPLAY = _COMMON | {"buffer_size", "gradient_steps", "learning_starts", "tau", "train_freq"}
@@ -71,7 +74,7 @@ def setting(algorithm: str, key: str, value: object) -> float | int | str:
     found = real(key, value)
     if found < 0.0 or key in SHARES and found > 1.0:
         rule = "lie in 0 to 1" if key in SHARES else "not be negative"
-        raise ValueError(f"{key} must {rule}, got {value!r}")
+        raise ValueError(f"{key} must {rule}, got {_shown(value)}")
     return found
 
 
@@ -86,7 +89,7 @@ def _worded(algorithm: str, key: str, value: str) -> str:
     forms = ["a number"]
     forms += ['"lin_" and a number'] * (key in FALLING) + ['"auto"', '"auto_0.1"'] * automatic
     hint = "; YAML takes it for text: write 0.001 or 1.0e-3" if _is_number(value) else ""
-    raise ValueError(f"{key} must be {' or '.join(forms)}, got {value!r}{hint}")
+    raise ValueError(f"{key} must be {' or '.join(forms)}, got {_shown(value)}{hint}")
 
 
 def network(given: object) -> dict[str, Any]:
@@ -103,19 +106,19 @@ def network(given: object) -> dict[str, Any]:
         given = network_text(given)
     if not isinstance(given, Mapping) or not set(given) <= NETWORK:
         raise ValueError(
-            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {given!r}"
+            f"policy_kwargs must be a mapping of {', '.join(sorted(NETWORK))}, got {_shown(given)}"
         )
     activation = given.get("activation_fn", ACTIVATIONS[0])
     if activation not in ACTIVATIONS:
         raise ValueError(
-            f"activation_fn must be one of {', '.join(ACTIVATIONS)}, got {activation!r}"
+            f"activation_fn must be one of {', '.join(ACTIVATIONS)}, got {_shown(activation)}"
         )
     arch = given.get("net_arch", [])
     if isinstance(arch, Mapping) and not set(arch) <= PARTS:
-        raise ValueError(f"net_arch must name {', '.join(sorted(PARTS))} alone, got {arch!r}")
+        raise ValueError(f"net_arch must name {', '.join(sorted(PARTS))} alone, got {_shown(arch)}")
     for layers in arch.values() if isinstance(arch, Mapping) else [arch]:
         if not isinstance(layers, list):
-            raise ValueError(f"net_arch must be a list such as [64, 64], got {arch!r}")
+            raise ValueError(f"net_arch must be a list such as [64, 64], got {_shown(arch)}")
         for size in layers:
             whole("a layer of net_arch", size)
     if "log_std_init" in given:
@@ -133,7 +136,7 @@ def whole(name: str, value: object, least: int = 1) -> int:
     """
     number = real(name, value)
     if number != int(number) or number < least:
-        raise ValueError(f"{name} must be a whole number from {least} up, got {value!r}")
+        raise ValueError(f"{name} must be a whole number from {least} up, got {_shown(value)}")
     return int(number)
 
 
@@ -143,11 +146,13 @@ def real(name: str, value: object) -> float:
     Raises:
         ValueError: none.
     """
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    # A whole number beyond the doubles fits in none.
+    if not number or not abs(value) < 1e308:  # type: ignore[arg-type]
         text = isinstance(value, str) and _is_number(value)
         hint = "; YAML takes it for text: write 0.001 or 1.0e-3" if text else ""
-        raise ValueError(f"{name} must be a finite number, got {value!r}{hint}")
-    return value
+        raise ValueError(f"{name} must be a finite number, got {_shown(value)}{hint}")
+    return value  # type: ignore[return-value]
 
 
 def mapping(name: str, value: object) -> dict[str, Any]:
@@ -157,7 +162,7 @@ def mapping(name: str, value: object) -> dict[str, Any]:
         ValueError: none.
     """
     if not isinstance(value, Mapping):
-        raise ValueError(f"{name} must be a mapping of names to values, got {value!r}")
+        raise ValueError(f"{name} must be a mapping of names to values, got {_shown(value)}")
     return dict(value)
 
 
@@ -168,7 +173,5 @@ def nearest(name: str, known: Iterable[str]) -> str:
 
 
 def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text)) and float(text) >= 0.0
-    except ValueError:
-        return False
+    number = parse_number(text)
+    return number is not None and number >= 0.0

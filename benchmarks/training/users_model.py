@@ -2,6 +2,7 @@
 
 import json
 import zipfile
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,8 +15,10 @@ from controllers.designs import task_kind
 from controllers.form import MIDDLE_V, Form
 from controllers.policy_file import PolicyFile, policy_pair, save_policy_file
 from controllers.view import View
+from pma_gym.documents import parse_json
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
 from pma_gym.files import check_output, replace_file
+from pma_gym.limits import check_limit, limit
 
 ALGORITHMS = {
     "ppo": ("stable_baselines3", "PPO"),
@@ -27,6 +30,18 @@ ALGORITHMS = {
 
 ACTOR_CRITIC = ("stable_baselines3.common.policies", "pma_gym.envs.sb3_policy")
 """Where policies are that PPO shares with A2C; only PPO has a `clip_range`."""
+
+UNREADABLE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    OSError,
+    EOFError,
+    RuntimeError,
+    KeyError,
+    TypeError,
+    ValueError,
+)
+"""What reading a zip raises that is damaged, encrypted, or packed in a way that Python lacks."""
 
 LOOP = ("control_rate_hz", "action_delay_s", "observation_delay_s")
 
@@ -94,12 +109,13 @@ def parsed_kwargs(text: str) -> dict[str, Any]:
         ExportError: no JSON object.
     """
     try:
-        found = json.loads(text)
+        found = parse_json(text.encode("utf-8", "surrogateescape"), "--env-kwargs")
     except ValueError as error:
         found = error
     if not isinstance(found, dict):
+        why = f" ({found})" if isinstance(found, ValueError) else ""
         raise ExportError(
-            f"--env-kwargs must be a JSON object such as '{{\"preview\": 4}}', got {text!r}"
+            f"--env-kwargs must be a JSON object such as '{{\"preview\": 4}}', got {text!r}{why}"
         )
     return found
 
@@ -153,9 +169,9 @@ def algorithm_of(path: Path) -> str:
     """
     try:
         with zipfile.ZipFile(path) as archive:
-            data = json.loads(archive.read("data"))
+            data = parse_json(_member(path, archive, "data"), f"{path}, data", finite=False)
         module = str(data["policy_class"]["__module__"])
-    except (zipfile.BadZipFile, KeyError, TypeError, ValueError) as error:
+    except UNREADABLE as error:
         raise ExportError(
             f"{path} must be a zip that Stable-Baselines3 saved (model.save), it cannot be read "
             f"as one ({error}); save the model anew"
@@ -168,6 +184,15 @@ def algorithm_of(path: Path) -> str:
             "is of one of these, say which: --algo"
         )
     return name
+
+
+def _member(path: Path, archive: zipfile.ZipFile, name: str) -> bytes:
+    """A file of a zip, no more of it than the limit on documents, whatever the zip announces."""
+    check_limit(f"{name} in {path}", "journal_mib", archive.getinfo(name).file_size / 2**20)
+    with archive.open(name) as file:
+        content = file.read((limit("journal_mib") << 20) + 1)
+    check_limit(f"{name} in {path}", "journal_mib", len(content) / 2**20)
+    return content
 
 
 def _loaded(path: Path, algorithm: str) -> Any:  # noqa: ANN401 - a model of any algorithm

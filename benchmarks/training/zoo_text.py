@@ -14,6 +14,10 @@ ACTIVATIONS = ("nn.ReLU", "nn.Tanh")
 """Activations that a policy file can hold, by the names that the zoo knows them by."""
 
 
+LONGEST = 1000
+"""Most characters of such a text."""
+
+
 def network_text(text: str) -> dict[str, object]:
     """What a text of `policy_kwargs` says.
 
@@ -23,11 +27,14 @@ def network_text(text: str) -> dict[str, object]:
     Raises:
         ValueError: what is no such text, or says more.
     """
+    if len(text) > LONGEST:
+        raise ValueError(f"policy_kwargs must have at most {LONGEST} characters, got {len(text)}")
     try:
         found = _value(ast.parse(text.strip(), mode="eval").body)
-    except SyntaxError as error:
-        raise ValueError(f"policy_kwargs is no Python text ({error.msg}), got {text!r}") from error
-    except RecursionError as error:
+    except (SyntaxError, ValueError) as error:
+        why = getattr(error, "msg", error)
+        raise ValueError(f"policy_kwargs is no Python text ({why}), got {text!r}") from error
+    except (RecursionError, MemoryError) as error:
         raise ValueError("policy_kwargs is nested too deeply to be read") from error
     if not isinstance(found, dict):
         raise ValueError(f"policy_kwargs must be a dict(...), got {text!r}")

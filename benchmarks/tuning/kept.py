@@ -4,10 +4,13 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.damaged import say_damaged
 from benchmarks.environment_info import ROOT, git_state
 from benchmarks.files import write_text
 from benchmarks.tuning.job import Job
 from controllers.gains import Gains
+from pma_gym.document_shape import ListOf, Real, check_shape
+from pma_gym.documents import read_json
 
 
 class KeptRows:
@@ -41,14 +44,28 @@ class KeptRows:
 
     def _read(self) -> dict[str, tuple[Gains, float]]:
         """The rows in the file; none if it is missing, broken or made with something else."""
-        try:
-            document = json.loads(self.path.read_text(encoding="utf-8"))
-            if document["made_with"] != self.made_with:
-                return {}
-            rows = document["rows"].items()
-            return {name: (Gains(*gains), float(cost)) for name, (gains, cost) in rows}
-        except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        if not self.path.exists():
             return {}
+        try:
+            document = read_json(self.path, "journal_mib", own=True)
+            check_shape(document, {"made_with": dict, "rows": dict})
+        except ValueError as error:
+            say_damaged(self.path, str(error))
+            return {}
+        if document["made_with"] != self.made_with:
+            return {}
+        found, damaged = dict[str, tuple[Gains, float]](), list[str]()
+        for name, row in document["rows"].items():
+            try:
+                check_shape(row, ListOf(object, 2), name)
+                gains, cost = row
+                check_shape([*gains, cost], ListOf(Real()), name)
+                found[name] = Gains._make(gains), float(cost)
+            except (ValueError, TypeError) as error:
+                damaged.append(str(error))
+        if damaged:
+            say_damaged(self.path, damaged[0], f"{len(damaged)} rows are computed anew")
+        return found
 
 
 def name_of(row: Job) -> str:

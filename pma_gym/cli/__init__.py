@@ -11,6 +11,7 @@ import typer
 
 from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.information import print_installation, print_model
+from pma_gym.cli.options import StrictTyper
 from pma_gym.cli.terminal import console, read, say
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.data.trial_columns import SampleError
@@ -18,8 +19,9 @@ from pma_gym.data.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import broken_limit
+from pma_gym.terminal import safe_streams
 
-app = typer.Typer(
+app = StrictTyper(
     add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -101,12 +103,13 @@ app.command()(fit)
 
 def main(arguments: Sequence[str] | None = None) -> None:
     """The console script: what cannot be used ends in one message and exit code 2."""
-    try:
-        app(args=None if arguments is None else list(arguments), prog_name="pma-gym")
-    # Errors of trials and models are ValueErrors; anything else is a fault of this package.
-    except (ValueError, OSError) as error:
-        say(f"error: {error}")
-        sys.exit(2)
+    with safe_streams():
+        try:
+            app(args=None if arguments is None else list(arguments), prog_name="pma-gym")
+        # Errors of trials and models are ValueErrors; anything else is a fault of this package.
+        except (ValueError, OSError) as error:
+            say(f"error: {error}")
+            sys.exit(2)
 
 
 def _doubts(model: Model, trial: Trial) -> list[str]:

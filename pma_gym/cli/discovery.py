@@ -12,7 +12,7 @@ import typer
 
 from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
-from pma_gym.cli.terminal import say, warnings_said
+from pma_gym.cli.terminal import say, warnings_said, warnings_said_at_once
 from pma_gym.data.dataset import Dataset, read_dataset
 from pma_gym.data.trial_files import encode_trial
 from pma_gym.files import OutputError
@@ -152,7 +152,9 @@ def _run(
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
-        with StepProgress() as progress:
+        from pma_gym.discovery.journal import JournalWarning
+
+        with StepProgress() as progress, warnings_said_at_once(JournalWarning):
             return function(trials, model, progress=progress, **arguments)
     except KeyboardInterrupt:
         kept = results.journal.is_dir()

@@ -4,7 +4,6 @@ import platform
 from importlib import metadata
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from pma_gym.effects import CATALOGUE
@@ -24,7 +23,7 @@ def print_installation(console: Console) -> None:
     models = Table("model", "plant", "what", title="Models", title_justify="left")
     for name in shipped_models():
         model = load_model(name)
-        models.add_row(name, model.plant, escape(model.title))
+        models.add_row(name, model.plant, model.title)
     environments = Table("environment", "task", title="Environments", title_justify="left")
     for name, task in ENVIRONMENTS.items():
         environments.add_row(name, task)
@@ -48,7 +47,7 @@ def print_model(model: Model, console: Console) -> None:
             note = model.notes.get(f"{effect}.{door}", Note())
             unit = CATALOGUE[effect].quantities[stems[door]].unit
             cells = (stems[door], _text(value), _interval(note), unit, note.source)
-            table.add_row(shown, *map(escape, cells))
+            table.add_row(shown, *cells)
             shown = ""
     console.print(table)
 

@@ -3,8 +3,9 @@
 import sys
 from types import TracebackType
 
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from pma_gym.terminal import SafeConsole
 
 
 class StepProgress:
@@ -12,10 +13,10 @@ class StepProgress:
 
     def __init__(self) -> None:
         """Find out whether somebody watches."""
-        console = Console(stderr=True)
+        console = SafeConsole(stderr=True)
         self._bars = (
             Progress(
-                TextColumn("{task.description}"),
+                TextColumn("{task.description}", markup=False),
                 BarColumn(),
                 MofNCompleteColumn(),
                 TimeElapsedColumn(),

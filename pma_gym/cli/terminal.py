@@ -5,17 +5,16 @@ import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-
-from rich.console import Console
+from typing import Any
 
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_files import TrialWarning, read_trial
+from pma_gym.terminal import SafeConsole, table_console
 
 
-def console() -> Console:
+def console() -> SafeConsole:
     """Where tables go; as wide as they need where nobody watches."""
-    found = Console()
-    return found if found.is_terminal else Console(width=160)
+    return table_console()
 
 
 def say(message: str) -> None:
@@ -31,6 +30,23 @@ def warnings_said() -> Iterator[None]:
         yield
     for warning in caught:
         say(f"warning: {warning.message}")
+
+
+@contextmanager
+def warnings_said_at_once(kind: type[Warning]) -> Iterator[None]:
+    """Says warnings of a kind as they come; others go where they went."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", kind)
+        show = warnings.showwarning
+
+        def shown(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, kind):
+                say(f"warning: {message}")
+            else:
+                show(message, category, *where)
+
+        warnings.showwarning = shown  # type: ignore[assignment]
+        yield
 
 
 def read(path: Path) -> Trial:

@@ -1,17 +1,22 @@
 """What `dataset.toml` says about a data set."""
 
 import math
-import tomllib
+import reprlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pma_gym.data.trial_columns import ColumnMap, TrialError, sources, suggestion
+from pma_gym.documents import is_file, read_toml
 
 DESCRIPTION = "dataset.toml"
 _KEYS = ("title", "model", "columns", "trials")
 _TRIAL_KEYS = ("order", "repeat_of", "note")
+_LINE_FORM = (
+    'a line is a table, [columns], or name = value, a text in quotes: "Weg" = "contraction_mm"'
+)
+_shown = reprlib.repr
 
 
 @dataclass(frozen=True)
@@ -65,16 +70,9 @@ def read_description(folder: Path, files: Sequence[str]) -> Description:
 
 def _parsed(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise TrialError(
-            f"{path} is not UTF-8 text (byte {error.start}); save it as UTF-8"
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise TrialError(
-            f"{path} is not valid TOML: {error}; a line is a table, [columns], or name = value, a "
-            'text in quotes: "Weg" = "contraction_mm"'
-        ) from None
+        return read_toml(path, _LINE_FORM)
+    except ValueError as error:
+        raise TrialError(str(error)) from None
 
 
 def _check_keys(place: str, found: Iterable[str], known: Sequence[str]) -> None:
@@ -89,14 +87,14 @@ def _check_keys(place: str, found: Iterable[str], known: Sequence[str]) -> None:
 def _table(document: Mapping[str, Any], key: str) -> dict[str, Any]:
     table = document.get(key, {})
     if not isinstance(table, dict):
-        raise TrialError(f"{key} in {DESCRIPTION} must be a table, [{key}], got {table!r}")
+        raise TrialError(f"{key} in {DESCRIPTION} must be a table, [{key}], got {_shown(table)}")
     return table
 
 
 def _text(table: Mapping[str, Any], key: str, place: str) -> str | None:
     value = table.get(key)
     if value is not None and (not isinstance(value, str) or not value.strip()):
-        raise TrialError(f'{key} in {place} must be a text, {key} = "...", got {value!r}')
+        raise TrialError(f'{key} in {place} must be a text, {key} = "...", got {_shown(value)}')
     return value
 
 
@@ -105,7 +103,7 @@ def _model(folder: Path, given: str | None) -> str | None:
     if given is None or not (given.endswith(".toml") or "/" in given or "\\" in given):
         return given
     path = folder / given
-    if not path.is_file():
+    if not is_file(path):
         raise TrialError(
             f"model in {DESCRIPTION} is {given!r}, but there is no file {path}; a path counts "
             "from the data set's folder"
@@ -123,7 +121,7 @@ def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[s
             )
         place = f'[trials."{name}"] in {DESCRIPTION}'
         if not isinstance(table, dict):
-            raise TrialError(f"{place} must be a table, got {table!r}")
+            raise TrialError(f"{place} must be a table, got {_shown(table)}")
         _check_keys(place, table, _TRIAL_KEYS)
         _text(table, "note", place)
         _check_order(place, table.get("order", 0.0))
@@ -136,7 +134,7 @@ def _check_order(place: str, order: object) -> None:
     if not math.isfinite(given):
         raise TrialError(
             f"order in {place} must be a number, the larger the later it was measured, got "
-            f"{order!r}; write order = 1 for the first"
+            f"{_shown(order)}; write order = 1 for the first"
         )
 
 

@@ -1,7 +1,7 @@
 """The columns of a trial's file: name and unit at the door, kind and name inside."""
 
 import difflib
-import math
+import reprlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -188,6 +188,11 @@ def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
         return None if column is None else Source(index, name, column, ends=_daq_ends(column))
     entry = mapping[name]
     entry = {"name": entry} if isinstance(entry, str) else entry
+    if not isinstance(entry, Mapping):
+        raise TrialError(
+            f"[columns] {name!r} must be the name of our column, or a table of name, factor, "
+            f'offset and range, got {reprlib.repr(entry)}; write {name!r} = "contraction_mm"'
+        )
     extra = set(entry) - {"name", "factor", "offset", "range"}
     if extra:
         raise TrialError(
@@ -197,7 +202,7 @@ def _source(index: int, name: str, mapping: ColumnMap) -> Source | None:
     if not isinstance(ours, str) or ours not in BY_NAME:
         raise TrialError(
             f"[columns] {name!r} must name one of {', '.join(BY_NAME)}, "
-            f"got {ours!r}{suggestion(str(ours))}"
+            f"got {reprlib.repr(ours)}{suggestion(ours) if isinstance(ours, str) else ''}"
         )
     factor, offset = (
         _number(f"[columns] {name!r} {key}", entry.get(key, usual))
@@ -221,7 +226,7 @@ def _ends(name: str, ours: str, given: object) -> tuple[float, float] | None:
     if not isinstance(given, list | tuple) or len(given) != 2:
         raise TrialError(
             f"[columns] {name!r} range must be two numbers in {column.unit}, the lowest and the "
-            f"highest that the sensor reads, got {given!r}; write range = [0, 50]"
+            f"highest that the sensor reads, got {reprlib.repr(given)}; write range = [0, 50]"
         )
     low, high = (_number(f"[columns] {name!r} range", value) for value in given)
     if low >= high:
@@ -241,8 +246,11 @@ def _daq_ends(column: Column) -> tuple[float, float] | None:
 
 def _number(name: str, value: object) -> float:
     """A finite number of a mapping."""
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise TrialError(f"{name} must be a finite number, got {value!r}")
+    # A whole number beyond the doubles fits in none.
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < 1e308:
+        raise TrialError(
+            f"{name} must be a finite number, got {reprlib.repr(value)}; write a number like 0.1"
+        )
     return float(value)
 
 

@@ -2,15 +2,24 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+import warnings
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from pma_gym.data.trial import Trial
+from pma_gym.document_shape import check_shape
+from pma_gym.documents import parse_json, read_content
 from pma_gym.files import replace_file
 from pma_gym.plant.model import Model, dump_model
+
+T = TypeVar("T")
+
+
+class JournalWarning(UserWarning):
+    """An entry of a journal that cannot be used; the message names its file."""
 
 
 class Journal:
@@ -27,18 +36,41 @@ class Journal:
         self, folder: Path | None, trials: Sequence[Trial], model: Model, question: str
     ) -> None:
         self._folder = folder
+        self._warned = False
         self._digest = "" if folder is None else digest(trials, model, question)
 
     def found(self, name: str) -> dict[str, Any] | None:
-        """What was kept by a name, or None."""
+        """What was kept by a name, or None; a damaged entry is none."""
+        return self.restored(name, dict)
+
+    def restored(self, name: str, made: Callable[[dict[str, Any]], T]) -> T | None:
+        """What is made of the entry that was kept by a name, or None.
+
+        Args:
+            name: of the entry.
+            made: makes something of it; an error says that the entry is damaged.
+        Warns:
+            JournalWarning: once, that an entry is damaged: its fit is made anew.
+        """
         path = self._path(name)
         if path is None or not path.is_file():
             return None
         try:
-            entry = json.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError):
+            content = read_content(path, "journal_mib")
+            entry = parse_json(content, path.name, own=True, finite=False)
+            check_shape(entry, dict)
+            return made(entry)
+        # Whatever an entry of another form leads to, its fit can be made again.
+        except Exception as error:
+            if not self._warned:
+                self._warned = True
+                warnings.warn(
+                    f"{self._folder} holds a damaged fit ({path.name}: {type(error).__name__}: "
+                    f"{error}); damaged fits are computed anew, the others stay",
+                    JournalWarning,
+                    stacklevel=3,
+                )
             return None
-        return entry if isinstance(entry, dict) else None
 
     def keep(self, name: str, entry: dict[str, Any]) -> None:
         """Keep an entry; its file is there whole or not at all."""

@@ -4,8 +4,6 @@ import itertools
 import re
 from collections.abc import Iterator
 
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from pma_gym.discovery.diagnosis import Diagnosis, Gap
@@ -26,6 +24,7 @@ from pma_gym.discovery.words import (
     unit_cell,
     what_to_do,
 )
+from pma_gym.terminal import table_console
 
 _MOST_PLACES, _MOST_PARAMETERS = 3, 5
 _LEFT_OVER = 1.5
@@ -93,8 +92,7 @@ def _gap(gap: Gap, unit: str) -> str:
 
 def print_fit(diagnosis: Diagnosis) -> None:
     """Parameters before and after with intervals, what is not determined, and the misfit."""
-    console = Console()
-    console = console if console.is_terminal else Console(width=160)
+    console = table_console()
     console.print(diagnosis.sentence, highlight=False, markup=False)
     for warning in diagnosis.warnings:
         console.print(f"Note: {warning}", highlight=False, markup=False)
@@ -109,9 +107,9 @@ def print_fit(diagnosis: Diagnosis) -> None:
         value = estimate(now.value, now.low, now.high)
         note = unknown.pop(path, "differs" if moved.significant else "")
         cells = (path, figure(moved.start, 4), value, interval(now), unit_cell(now.unit), note)
-        table.add_row(*map(escape, cells))
+        table.add_row(*cells)
     for path, note in unknown.items():
-        table.add_row(escape(path), "", "", "", "", escape(note))
+        table.add_row(path, "", "", "", "", note)
     console.print(table)
     gaps = Table("signal", title="Misfit (rms)", title_justify="left")
     for name in ("as given", "refitted", "noise"):

@@ -9,6 +9,7 @@ from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.parameters import values
 from pma_gym.discovery.screening import Baseline, Look, beginnings
 from pma_gym.discovery.suspects import Suspect
+from pma_gym.document_shape import ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
@@ -41,10 +42,10 @@ def fitted(
     """The best of fits from the probes that explain most; of more where others were caught."""
     begun_at = f"{before.names} {before.values.tolist()}"
     key = f"{bench.noise} {begun_at} {each.suspect.name} {each.starts}{' caught' * caught}"
-    kept = journal.found(key)
     extra = (*chosen, each.suspect)
+    kept = journal.restored(key, lambda entry: restored(entry, bench, before, extra))
     if kept is not None:
-        return restored(kept, bench, before, extra)
+        return kept
     best: Fitted | None = None
     evidence = bench.probed(stripped(bench, before), each.suspect)
     for begun in beginnings(baseline, evidence, each)[: ALL_BEGUN if caught else BEGUN]:
@@ -117,9 +118,9 @@ def _once(
 ) -> Fitted:
     """What a search from a fit found, from the journal where it was made before."""
     key = f"{what} {bench.noise} {fit.names} {fit.values.tolist()}"
-    kept = journal.found(key)
+    kept = journal.restored(key, lambda entry: restored(entry, bench, fit, chosen))
     if kept is not None:
-        return restored(kept, bench, fit, chosen)
+        return kept
     found = search()
     journal.keep(key, kept_form(found))
     return found
@@ -153,6 +154,17 @@ def without_idle(
     return chosen, best
 
 
+_KEPT = {
+    "paths": ListOf(str),
+    "values": ListOf(Real()),
+    "covariance": ListOf(ListOf(Real(finite=False))),
+    "chi_square": Real(),
+    "steps": ListOf(Real(finite=False)),
+    "converged": bool,
+}
+"""Shape of a fit in a journal."""
+
+
 def kept_form(fit: Fitted) -> dict:
     """A fit as a journal keeps it."""
     return {
@@ -166,7 +178,17 @@ def kept_form(fit: Fitted) -> dict:
 
 
 def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect]) -> Fitted:
-    """A fit from a journal."""
+    """A fit from a journal.
+
+    Raises:
+        ValueError: an entry of another form, or of other parameters.
+    """
+    check_shape(kept, _KEPT)
+    count = len(kept["paths"])
+    wanted = [*bench.own.free, *(path for each in extra for path in each.fitted_paths)]
+    shapes = (len(kept["values"]), len(kept["steps"]), np.shape(kept["covariance"]))
+    if shapes != (count, count, (count, count)) or kept["paths"] != wanted:
+        raise ValueError(f"it has {shapes} numbers of {count} parameters")
     model = before.model
     for suspect in extra:
         model = suspect.beside(model)

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from pma_gym.printable import printable
+
 
 @dataclass(frozen=True)
 class Heading:
@@ -101,22 +103,25 @@ def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: 
     for block in blocks:
         match block:
             case Heading(text, level):
-                parts.append(f"{'#' * level} {text}")
+                parts.append(f"{'#' * level} {_without_tags(text)}")
             case Paragraph(text):
-                parts.append(text)
+                parts.append(_without_tags(text))
             case Callout(text, note):
-                parts.append("\n>\n".join(f"> {each}" for each in (f"**{text}**", note) if each))
+                words = (f"**{_without_tags(text)}**", _without_tags(note))
+                parts.append("\n>\n".join(f"> {each}" for each in words if each))
             case Formula(text):
-                parts.append(f"```text\n{text}\n```")
+                fence = "`" * (1 + max((len(run) for run in re.findall("`{2,}", text)), default=2))
+                parts.append(f"{fence}text\n{text}\n{fence}")
             case Steps(items):
-                parts.append("\n".join(f"{i}. {item}" for i, item in enumerate(items, start=1)))
+                words = map(_without_tags, items)
+                parts.append("\n".join(f"{i}. {item}" for i, item in enumerate(words, start=1)))
             case TextTable():
                 parts.append(_markdown_table(block))
             case Picture(name, caption) if name in pictures:
                 parts.append(f"![{caption}]({folder}/{name}.png)\n\n*{caption}*")
             case Picture():
                 pass
-    return "\n\n".join(parts) + "\n"
+    return printable("\n\n".join(parts)) + "\n"
 
 
 def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
@@ -129,18 +134,30 @@ def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
     title = next(block.text for block in blocks if isinstance(block, Heading))
     body = "\n".join(_html_block(block, pictures) for block in blocks)
     page = _PAGE.read_text(encoding="utf-8")
-    return page.replace("{title}", html.escape(title)).replace("{body}", body)
+    # Once and together: a title may hold `{body}`.
+    parts = {"{title}": html.escape(printable(title)), "{body}": printable(body)}
+    return re.sub(r"\{(?:title|body)\}", lambda found: parts[found[0]], page)
 
 
 def _markdown_table(table: TextTable) -> str:
     """A table; groups of columns stay in front of their names, for Markdown cannot span."""
     columns = len(table.header)
-    names = [name.replace(_GROUP, "<br>") for name in table.header]
+    names = [_without_tags(name).replace(_GROUP, "<br>") for name in table.header]
     rules = [":--" if column < table.words else "--:" for column in range(columns)]
-    rows = [list(row) for row in table.rows if len(row) == columns]
+    rows = [[_without_tags(cell) for cell in row] for row in table.rows if len(row) == columns]
     cells = [names, rules, *rows]
-    lines = ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in cells]
-    return "\n".join([f"**{table.title}**", "", *lines])
+    lines = ["| " + " | ".join(map(_cell, row)) + " |" for row in cells]
+    return "\n".join([f"**{_without_tags(table.title)}**", "", *lines])
+
+
+def _cell(text: str) -> str:
+    """A cell of Markdown: on one line, and no end of it inside."""
+    return " ".join(text.split("\n")).replace("|", "\\|")
+
+
+def _without_tags(text: str) -> str:
+    """Text of Markdown that holds no HTML; `code` stays as it is."""
+    return re.sub(r"(`[^`\n]*`)|<(?=[A-Za-z/!?])", lambda found: found[1] or "&lt;", text)
 
 
 def _html_block(block: Block, pictures: Mapping[str, bytes]) -> str:

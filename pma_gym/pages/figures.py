@@ -26,6 +26,8 @@ _RULES: dict[Any, Any] = {
     "grid.linewidth": 0.7,
     "lines.linewidth": 1.3,
     "figure.facecolor": "white",
+    # Names and titles are data: a dollar sign in one is no formula.
+    "text.parse_math": False,
 }
 
 

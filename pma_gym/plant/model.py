@@ -1,6 +1,7 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
+import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
@@ -10,13 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
+from pma_gym.limits import LimitError
 from pma_gym.plant import cascade, slide, station
 from pma_gym.plant.compose import Port
-from pma_gym.plant.toml import TOMLError, read_toml, toml_text
+from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1
+_shown = reprlib.repr
 PLANTS = {"station": station, "cascade": cascade, "slide": slide}
 _HEAD = ("schema", "name", "title", "plant")
 
@@ -204,20 +208,20 @@ def load_model(source: "str | Path | Model") -> Model:
     if str(source) in shipped:
         return _read(shipped[str(source)])
     path = Path(source)
-    if path.suffix == ".toml" and path.is_file():
+    if path.suffix == ".toml" and is_file(path):
         return _read(path)
     near = difflib.get_close_matches(str(source), list(shipped), 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ModelError(
-        f"no model {str(source)!r}: give a shipped name ({', '.join(shipped)}) "
+        f"no model {str(source)[:200]!r}: give a shipped name ({', '.join(shipped)}) "
         f"or the path of a .toml file{hint}"
     )
 
 
 def _read(path: Path) -> Model:
     try:
-        return parse_model(read_toml(path))
-    except TOMLError as error:
+        return parse_model(read_toml(path, LINE_FORM, finite=False))
+    except (DocumentError, LimitError) as error:
         raise ModelError(str(error)) from error
     except ValueError as error:
         raise ModelError(f"{path}: {error}") from error
@@ -230,7 +234,7 @@ def parse_model(document: Mapping[str, Any]) -> Model:
         ModelError: as `load_model`.
     """
     if document.get("schema") != SCHEMA:
-        came = f"got {document['schema']!r}" if "schema" in document else "there is none"
+        came = f"got {_shown(document['schema'])}" if "schema" in document else "there is none"
         raise ModelError(
             f"schema must be {SCHEMA}, the only form of model files that this version reads, "
             f"{came}; write schema = {SCHEMA} as the first line"
@@ -238,35 +242,44 @@ def parse_model(document: Mapping[str, Any]) -> Model:
     missing = [key for key in _HEAD if key not in document]
     if missing:
         raise ModelError(f"a model needs {', '.join(_HEAD)}; missing: {', '.join(missing)}")
+    for key in _HEAD[1:]:
+        if not isinstance(document[key], str):
+            raise ModelError(f'{key} must be a text, {key} = "...", got {_shown(document[key])}')
     tables = {key: value for key, value in document.items() if key not in _HEAD}
     parameters, notes = {}, {}
     for effect, table in tables.items():
         values, found = _split(effect, table)
         parameters[effect] = _parse(effect, values)
         notes |= found
-    head = {key: str(document[key]) for key in ("name", "title", "plant")}
+    head = {key: document[key] for key in ("name", "title", "plant")}
     return Model(**head, parameters=parameters, notes=notes)
 
 
 def _split(effect: str, table: object) -> tuple[dict[str, Value], dict[str, Note]]:
     if not isinstance(table, dict):
-        raise ModelError(f"{effect} = {table!r} is no table; parameters stand under [effect]")
+        raise ModelError(f"{effect} = {_shown(table)} is no table; parameters stand under [effect]")
     values, notes = {}, {}
     for name, given in table.items():
         entry = given if isinstance(given, dict) else {"value": given}
         low, high = entry.get("low"), entry.get("high")
         if (
             not {"value"} <= set(entry) <= {"value", "low", "high", "source"}
-            or not isinstance(low, int | float | None)
-            or not isinstance(high, int | float | None)
+            or not all(end is None or _is_finite(end) for end in (low, high))
+            or not isinstance(entry.get("source", ""), str)
         ):
             raise ModelError(
                 f"{effect}.{name} must be a number, or a table of value, low and high (numbers) "
-                f"and source (text); got {given!r}"
+                f"and source (text); got {_shown(given)}"
             )
         values[name] = entry["value"]
-        notes[f"{effect}.{name}"] = Note(str(entry.get("source", "")), low, high)
+        notes[f"{effect}.{name}"] = Note(entry.get("source", ""), low, high)
     return values, notes
+
+
+def _is_finite(value: object) -> bool:
+    real = isinstance(value, int | float) and not isinstance(value, bool)
+    # A whole number beyond the doubles fits in none.
+    return real and abs(value) < 1e308  # type: ignore[arg-type]
 
 
 def _parse(effect: str, values: Mapping[str, Value]) -> Parameters:

@@ -198,7 +198,7 @@ def test_all_controllers_meet_the_same_noise():
     [
         ("robst", "no suite 'robst': there are .*did you mean robust"),
         ("reproduction", "schema must be 2, got 1"),
-        ("{0}/broken.toml", "broken.toml is no TOML"),
+        ("{0}/broken.toml", "broken.toml is not valid TOML: line 1"),
         ("{0}/unknown.toml", "unknown tasks: juggling; known: displacement"),
         ("{0}/effect.toml", "no effect 'sarosi' that a station may have or not"),
         ("{0}/range.toml", "creep needs a range or a tie for each of stiffness_n_per_mm, time"),

@@ -1,12 +1,13 @@
 """An interrupted diagnosis goes on, and ends as if nothing had happened."""
 
+import json
 import shutil
 
 import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.journal import Journal, digest
+from pma_gym.discovery.journal import Journal, JournalWarning, digest
 from pma_gym.discovery.workflow import diagnose
 from tests.discovery.laboratory import OFF, STATION, diagnosed, laboratory
 
@@ -64,7 +65,12 @@ def test_broken_files_are_passed_over(trials, tmp_path, broken):
     journal.keep("fit", {"chi_square": 1.0})
     for path in folder.iterdir():
         path.write_bytes(broken)
-    assert journal.found("fit") is None
+    journal.keep("other", {"chi_square": 2.0})
+    with pytest.warns(JournalWarning, match="broken holds a damaged fit .* computed anew") as said:
+        assert journal.found("fit") is None
+        assert journal.found("fit") is None
+    assert len(said) == 1
+    assert journal.found("other") == {"chi_square": 2.0}
 
 
 def test_a_diagnosis_passes_over_broken_files(trials, written, tmp_path):
@@ -72,7 +78,39 @@ def test_a_diagnosis_passes_over_broken_files(trials, written, tmp_path):
     shutil.copytree(written[0], folder)
     for path in sorted(folder.iterdir())[::2]:
         path.write_bytes(path.read_bytes()[:-5])
-    assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
+    with pytest.warns(JournalWarning) as said:
+        assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
+    assert len(said) == 1
+
+
+def _first(entry, key, value):
+    return json.dumps(entry | {key: [value, *entry[key][1:]]})
+
+
+OTHER_FORMS = {
+    "empty object": lambda entry: "{}",
+    "text for a number": lambda entry: _first(entry, "values", "1"),
+    "another parameter": lambda entry: _first(entry, "paths", "drive.no_such"),
+    "out of bounds": lambda entry: _first(entry, "values", -1e300),
+    "too few": lambda entry: json.dumps(entry | {"values": entry["values"][1:]}),
+    "flat covariance": lambda entry: json.dumps(entry | {"covariance": entry["values"]}),
+    "no number": lambda entry: json.dumps(entry | {"chi_square": float("nan")}),
+    "null": lambda entry: json.dumps(dict.fromkeys(entry)),
+    "deep": lambda entry: "[" * 100_000,
+}
+
+
+def test_entries_of_other_forms_are_computed_anew(trials, written, tmp_path):
+    folder = tmp_path / "other"
+    shutil.copytree(written[0], folder)
+    paths = sorted(folder.iterdir())
+    for number, path in enumerate(paths):
+        harm = list(OTHER_FORMS.values())[number % len(OTHER_FORMS)]
+        path.write_text(harm(json.loads(path.read_text())))
+    assert len(paths) >= len(OTHER_FORMS)
+    with pytest.warns(JournalWarning) as said:
+        assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
+    assert len(said) == 1
 
 
 def test_another_question_finds_nothing(trials, tmp_path):

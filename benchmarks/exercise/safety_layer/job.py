@@ -9,6 +9,8 @@ from rich.progress import Progress
 from benchmarks.exercise.safety_layer.episodes import Safety, Tally, measure
 from benchmarks.exercise.tables import NONE, terminal_table
 from benchmarks.files import write_text
+from pma_gym.document_shape import ListOf, Whole, check_shape, shape_of
+from pma_gym.documents import read_json
 from pma_gym.pages.document import TextTable, to_markdown
 from pma_gym.tasks.exercise import SAFE_MOMENT, SAFE_SPEED
 from pma_gym.units import SI_FACTORS
@@ -93,6 +95,14 @@ def safety_words(found: Safety) -> str:
 
 
 def read_safety(path: Path) -> Safety:
-    """Figures that `run_safety` kept."""
-    kept = json.loads(path.read_text(encoding="utf-8"))
+    """Figures that `run_safety` kept.
+
+    Raises:
+        SafetyError: a damaged file; says how it is written anew.
+    """
+    try:
+        kept = read_json(path, "journal_mib", own=True)
+        check_shape(kept, {"seed": Whole(), "tallies": ListOf(shape_of(Tally))})
+    except ValueError as error:
+        raise SafetyError(f"{error}; run `python -m benchmarks safety` again") from None
     return Safety(kept["seed"], tuple(Tally(**tally) for tally in kept["tallies"]))

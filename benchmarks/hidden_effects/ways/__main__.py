@@ -6,10 +6,13 @@ from typing import Annotated
 
 import typer
 
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
+
 # Each process computes on its own core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 TRAINING_SEED = 7001
@@ -66,4 +69,5 @@ def train(
 
 
 if __name__ == "__main__":
-    app()
+    with safe_streams():
+        app()

@@ -6,11 +6,14 @@ from typing import Annotated
 
 import typer
 
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
+
 OUT = Path("results/training/study")
 FIGURES = Path("docs/figures/policies.json")
 CONDITIONS = "conditions.json"
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
 Out = Annotated[Path, typer.Option(help="Folder of the study.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
@@ -45,11 +48,10 @@ def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
 @app.command()
 def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "") -> None:
     """Run every seed's policies through the suites; what ran before stays."""
-    from rich.console import Console
-
     from benchmarks.training.study.cells import cells
     from benchmarks.training.study.judged import SUITES, judge_pid, seed_folders
     from benchmarks.training.study.judged import judge as judge_group
+    from pma_gym.terminal import SafeConsole
 
     algorithms = {cell.group: cell.algorithm for cell in cells()}
     strange = [name for name in groups.split(",") if groups and name not in algorithms]
@@ -60,7 +62,7 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
         )
         raise typer.Exit(2)
     if not groups:
-        judge_pid(out, jobs, Console())
+        judge_pid(out, jobs, SafeConsole())
     for group, algorithm in algorithms.items():
         wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
         if not wanted:
@@ -69,7 +71,7 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
             print(f"{group}: no policy in {out / group}, train it first", file=sys.stderr)
             continue
         for suite in suites.split(",") if suites else SUITES:
-            judge_group(out / group, algorithm, suite, jobs, Console())
+            judge_group(out / group, algorithm, suite, jobs, SafeConsole())
 
 
 @app.command()
@@ -103,16 +105,17 @@ def report(
     from benchmarks.training.study.judged import PID_FOLDER, SHIPPED
     from benchmarks.training.study.pictures import write_curves
     from benchmarks.training.study.ship import ship as ship_policies
+    from pma_gym.documents import read_json
 
     found = study_figures(out)
     if figures.exists():
-        kept = json.loads(figures.read_text(encoding="utf-8"))["groups"]
+        kept = read_json(figures, "journal_mib", own=True, finite=False)["groups"]
         merged = kept | found["groups"]
         names = dict.fromkeys(cell.group for cell in cells())
         found["groups"] = {name: merged[name] for name in names if name in merged}
     found["pid"] = pid_errors(out)
     found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
-    found["robustness"] = json.loads((out / CONDITIONS).read_text(encoding="utf-8"))
+    found["robustness"] = read_json(out / CONDITIONS, own=True, finite=False)
     write_text(figures, json.dumps(found, indent=1) + "\n")
     write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
     for names in SHIPPED if ship else ():
@@ -121,4 +124,5 @@ def report(
 
 
 if __name__ == "__main__":
-    app()
+    with safe_streams():
+        app()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.comparison.journal import JOURNAL, read_rows
+from benchmarks.comparison.journal import JOURNAL, case_rows
 from benchmarks.comparison.statistics import interquartile_mean
 from benchmarks.training.study.cells import Cell, cells
 from benchmarks.training.study.judged import PID_FOLDER, SUITES, pools, seed_folders
@@ -75,7 +75,7 @@ def _group(folder: Path, members: list[Cell]) -> dict[str, Any]:
 def variation(results: Path) -> dict[str, float]:
     """Median total variation of the voltage a second (V/s) by task, in a run's cases."""
     by_task: dict[str, list[float]] = {}
-    for row in read_rows(results / JOURNAL):
+    for row in case_rows(results / JOURNAL):
         if not row["failure"]:
             by_task.setdefault(row["task"], []).append(row["variation_v_per_s"])
     return {task: float(np.median(values)) for task, values in by_task.items()}

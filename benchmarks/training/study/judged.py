@@ -7,7 +7,7 @@ from rich.console import Console
 
 from benchmarks.comparison.errors import Measure, Record, measures
 from benchmarks.comparison.job import run_comparison
-from benchmarks.comparison.journal import JOURNAL, read_rows
+from benchmarks.comparison.journal import JOURNAL, case_rows
 from benchmarks.comparison.suite import FrozenSuite, frozen_suite, kind_of
 from benchmarks.contender import parse_contenders
 from benchmarks.training.study.cells import OFF_POLICY, residual_group
@@ -104,7 +104,7 @@ def pools(results: Path, suite: str, seeds: Sequence[str]) -> dict[str, Pool]:
         seeds: names of the contenders.
     """
     frozen = frozen_suite(suite)
-    rows = read_rows(results / JOURNAL)
+    rows = case_rows(results / JOURNAL)
     record = Record.of(frozen, [row for row in rows if row["controller"] in seeds])
     found: dict[str, Pool] = {}
     for measure in measures(frozen.tasks):

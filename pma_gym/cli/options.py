@@ -1,0 +1,65 @@
+"""Numbers on command lines: the one strict grammar of `pma_gym.numerals`."""
+
+from collections.abc import Callable
+from typing import Any, get_args, get_type_hints
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from pma_gym.numerals import parse_number
+from pma_gym.printable import printable
+
+
+class StrictTyper(typer.Typer):
+    """An application whose options read numbers as files do: no `nan`, no `1_000`, no `٣`."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**{"cls": _StrictGroup, **options})
+
+    def command(self, *names: Any, **options: Any) -> Callable[..., Any]:
+        """As Typer's, with strict numbers."""
+        return super().command(*names, **{"cls": _StrictCommand, **options})
+
+
+class _StrictCommand(TyperCommand):
+    def __init__(self, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
+        _make_strict(self)
+
+
+class _StrictGroup(TyperGroup):
+    def __init__(self, *given: Any, **options: Any) -> None:
+        super().__init__(*given, **options)
+        _make_strict(self)
+
+
+def _make_strict(command: Any) -> None:  # noqa: ANN401 - Typer brings its own Click since 0.20
+    """Check the texts of a command's numbers before Python's `int` and `float` read them."""
+    callback = getattr(command.callback, "__wrapped__", command.callback)
+    hints = get_type_hints(callback) if callback else {}
+    for param in command.params:
+        kinds = {hints.get(param.name), *get_args(hints.get(param.name))}
+        if kinds & {int, float}:
+            param.process_value = _checked(param.process_value, param, whole=int in kinds)
+
+
+def _checked(process: Callable[..., Any], param: Any, whole: bool) -> Callable[..., Any]:  # noqa: ANN401
+    def process_value(ctx: Any, value: Any) -> Any:  # noqa: ANN401
+        for text in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(text, str) and not _is_number(text, whole):
+                kind, example = ("a whole number", "8") if whole else ("a number", "1.5 or 1e-3")
+                raise typer.BadParameter(
+                    f"'{printable(text[:60])}' is not {kind}; write ASCII digits, such as "
+                    f"{example}",
+                    ctx=ctx,
+                    param=param,
+                )
+        return process(ctx, value)
+
+    return process_value
+
+
+def _is_number(text: str, whole: bool) -> bool:
+    if parse_number(text) is None:
+        return False
+    return not whole or text.strip().removeprefix("-").removeprefix("+").isdigit()
