@@ -5,7 +5,10 @@ import gymnasium as gym
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.reward_function import RewardFunction
+from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.vector import PMAVectorEnv
+from pma_gym.tasks import named_task
 
 ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
@@ -18,6 +21,7 @@ ENVIRONMENTS = {
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.
     if _name not in gym.registry:
+        _steps = Options().horizon(named_task(_task))
         gym.register(
             _name,
             entry_point="pma_gym.envs.pma_env:PMAEnv",
@@ -27,6 +31,17 @@ for _name, _task in ENVIRONMENTS.items():
             order_enforce=False,
             disable_env_checker=True,
             kwargs={"task": _task},
+            # Of the default options. What `make` and `make_vec` make has its own number.
+            max_episode_steps=DefaultSteps(_steps),
+            additional_wrappers=single_wrappers(_steps),
         )
 
-__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "PMAVectorEnv", "Reading", "Station"]
+__all__ = [
+    "ENVIRONMENTS",
+    "Options",
+    "PMAEnv",
+    "PMAVectorEnv",
+    "Reading",
+    "RewardFunction",
+    "Station",
+]
