@@ -8,7 +8,7 @@ from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.reward_function import RewardFunction
 from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.vector import PMAVectorEnv
-from pma_gym.tasks import named_task
+from pma_gym.tasks import EVERY_TASK
 
 ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
@@ -21,7 +21,7 @@ ENVIRONMENTS = {
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.
     if _name not in gym.registry:
-        _steps = Options().horizon(named_task(_task))
+        _steps = Options().horizon(EVERY_TASK[_task])
         gym.register(
             _name,
             entry_point="pma_gym.envs.pma_env:PMAEnv",

@@ -1,7 +1,7 @@
 """Option values as plain Python: numbers of NumPy, arrays, ranges and paths survive JSON then."""
 
 import numbers
-from collections.abc import Iterable, Mapping, Set
+from collections.abc import Iterable, Iterator, Mapping, Set
 from enum import Enum
 from pathlib import PurePath
 from typing import Any
@@ -50,9 +50,12 @@ def plain_scalar(value: Any) -> Any:  # noqa: ANN401
 def plain_sequence(value: Any) -> Any:  # noqa: ANN401
     """An iterable as a list of plain values, rows of a table as lists in it; others as scalars.
 
-    A mapping and a set are no sequences: they have no order of numbers to draw from.
+    A mapping and a set are no sequences: they have no order of numbers to draw from. Nor is an
+    iterator, which is empty once it was read.
     """
     scalar = plain_scalar(value)
-    if not isinstance(scalar, Iterable) or isinstance(scalar, str | bytes | Mapping | Set):
+    if not isinstance(scalar, Iterable) or isinstance(
+        scalar, str | bytes | Iterator | Mapping | Set
+    ):
         return scalar
     return [plain_sequence(one) for one in scalar]

@@ -352,12 +352,12 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.options = self._engine.options
 
     @property
-    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+    def spec(self) -> EnvSpec | None:
         """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
         return self.__dict__.get("spec")
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
         self.__dict__["spec"] = completed_spec(spec, self.horizon)
 
     # -- what the agent, a controller and the reader see -------------------------------------------

@@ -210,12 +210,12 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         return ended
 
     @property
-    def spec(self) -> EnvSpec | None:  # type: ignore[override]
+    def spec(self) -> EnvSpec | None:
         """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
         return self.__dict__.get("spec")
 
     @spec.setter
-    def spec(self, spec: EnvSpec | None) -> None:
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
         if spec is not None:
             # Those are of single environments.
             spec = replace(spec, additional_wrappers=())
