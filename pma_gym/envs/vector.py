@@ -60,7 +60,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
         render_mode: None; a batch draws nothing.
-        options: as `PMAEnv`.
+        options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
         task: the Task.
