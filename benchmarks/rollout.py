@@ -38,7 +38,7 @@ class Rollout:
         truth: true contraction (m), load (N) and pressure (Pa) at the same instants.
         act_seconds: computing time of every `act` (s), shape (steps,).
         step_seconds: time spent inside the environment's steps (s).
-        ended_by: the physical limit that ended it early, or None.
+        ended_by: the physical limit that ended it early, in words, or "".
     """
 
     task: Task
@@ -50,7 +50,7 @@ class Rollout:
     truth: Mapping[str, NDArray[np.float64]]
     act_seconds: NDArray[np.float64]
     step_seconds: float
-    ended_by: str | None
+    ended_by: str
 
     @property
     def steps(self) -> int:

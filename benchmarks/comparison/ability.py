@@ -99,4 +99,4 @@ def _falls_short(
     if position[there] < task.protocol.span:
         return f"it only reaches {position.max() / SI_FACTORS[unit]:.3g} {unit}"
     codes = broken(model.parameters["limits"], {n: v[: there + 1] for n, v in truth.items()})
-    return limit_in_words(model, float(np.max(codes))) or ""
+    return limit_in_words(model, float(np.max(codes)))

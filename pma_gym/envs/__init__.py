@@ -5,9 +5,12 @@ import gymnasium as gym
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
+from pma_gym.envs.reward_function import RewardFunction
 from pma_gym.envs.snapshot import StateError
+from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.state import EnvState
 from pma_gym.envs.vector import PMAVectorEnv
+from pma_gym.tasks import EVERY_TASK
 
 ENVIRONMENTS = {
     "pma_gym/IsokineticDisplacement-v0": "displacement",
@@ -20,6 +23,7 @@ ENVIRONMENTS = {
 for _name, _task in ENVIRONMENTS.items():
     # An id stays as it was registered: a user's own entry under it, or a second import's.
     if _name not in gym.registry:
+        _steps = Options().horizon(EVERY_TASK[_task])
         gym.register(
             _name,
             entry_point="pma_gym.envs.pma_env:PMAEnv",
@@ -29,6 +33,9 @@ for _name, _task in ENVIRONMENTS.items():
             order_enforce=False,
             disable_env_checker=True,
             kwargs={"task": _task},
+            # Of the default options. What `make` and `make_vec` make has its own number.
+            max_episode_steps=DefaultSteps(_steps),
+            additional_wrappers=single_wrappers(_steps),
         )
 
 __all__ = [
@@ -39,5 +46,6 @@ __all__ = [
     "PMAVectorEnv",
     "Reading",
     "StateError",
+    "RewardFunction",
     "Station",
 ]

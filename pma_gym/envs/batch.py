@@ -7,7 +7,8 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.options import Pressure, check_pressure, check_pressures
+from pma_gym.envs.options import Pressure, parse_pressure, parse_pressures
+from pma_gym.envs.plain_values import plain_scalar
 
 
 def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:
@@ -22,16 +23,30 @@ def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int |
     if seed is None:
         return [None] * count
     rule = f"seed must be a whole number from 0 on, or one for each of the {count} environments"
-    if _is_seed(seed):
-        return [int(seed) + i for i in range(count)]
-    if not isinstance(seed, Sequence | np.ndarray) or isinstance(seed, str):
+    given: Any = plain_scalar(seed)
+    if _is_seed(given):
+        return [given + i for i in range(count)]
+    if not isinstance(given, Sequence | np.ndarray) or isinstance(given, str):
         raise ValueError(f"{rule}; got {seed!r}")
-    if len(seed) != count:
-        raise ValueError(f"{rule}; got {len(seed)}")
-    for one in seed:
+    if len(given) != count:
+        raise ValueError(f"{rule}; got {len(given)}")
+    seeds = [plain_scalar(one) for one in given]
+    for one in seeds:
         if one is not None and not _is_seed(one):
             raise ValueError(f"{rule}; got {one!r} among them")
-    return [None if one is None else int(one) for one in seed]
+    return seeds
+
+
+def parse_seed(seed: object) -> int | None:
+    """The seed of a single environment, as Python's own number.
+
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    given = plain_scalar(seed)
+    if given is not None and not _is_seed(given):
+        raise ValueError(f"seed must be a whole number from 0 on, or None, got {seed!r}")
+    return given
 
 
 def _is_seed(value: object) -> TypeGuard[int]:
@@ -68,11 +83,10 @@ def wanted_pressures(
     if "pressures_kpa" in options:
         if "pressure_kpa" in options:
             raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
-        check_pressures(options["pressures_kpa"], count)
-        return [options["pressures_kpa"][i] for i in indices.tolist()]
+        pressures = parse_pressures(options["pressures_kpa"], count)
+        return [pressures[i] for i in indices.tolist()]
     if "pressure_kpa" in options:
-        check_pressure(options["pressure_kpa"])
-        return [options["pressure_kpa"]] * len(indices)
+        return [parse_pressure(options["pressure_kpa"])] * len(indices)
     return None
 
 
@@ -97,7 +111,8 @@ def spread(
             own[indices[unknown]] = False
             places, values = indices[~unknown], values[~unknown]
         if len(values):
-            array = np.full(len(mask), None if values.dtype.kind == "O" else 0, values.dtype)
+            # Texts: no reader has to skip what is None.
+            array = np.full(len(mask), "" if values.dtype.kind == "O" else 0, values.dtype)
             array[places] = values
             info[name], info[f"_{name}"] = array, own
     return info

@@ -33,11 +33,12 @@ from pma_gym.plant.program import Program
 ARGUMENTS = (
     *("first", "last", "count", "records", "tables", "table_stride", "references"),
     *("actions", "observations", "rewards", "terminated", "truncated", "trace", "indices"),
-    *("attempts", "voltages", "ideals", "settles", "pressures"),
+    *("attempts", "voltages", "ideals", "settles", "pressures", "horizon"),
 )
 """Entries of a call's arguments: numbers of blocks and environments, then addresses.
 
-With settles other than 0 a beginning draws pressures, from two numbers each, and settles there."""
+With settles other than 0 a beginning draws pressures, from two numbers each, and settles there.
+The horizon is the number of control steps after which episodes are truncated."""
 
 BEFORE = len(ARGUMENTS)
 """Place, behind them, of the address of those of another part that the same thread took before."""
@@ -86,7 +87,7 @@ class BlockMemory:
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
         found = {}
-        numbers = ("first", "last", "count", "table_stride", "settles")
+        numbers = ("first", "last", "count", "table_stride", "settles", "horizon")
         for i, name in enumerate(ARGUMENTS):
             value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
             found[name] = value if name in numbers else b.inttoptr(value, POINTER)

@@ -75,6 +75,11 @@ class Circuit:
         """The reference so many steps after the one that begins (m or rad), as an input."""
         return self.graph.input(f"reference.{ahead}", CHANGING)
 
+    @property
+    def horizon(self) -> Value:
+        """Control steps after which an episode is truncated, as an input."""
+        return self.graph.input("horizon", CHANGING)
+
     def command(self) -> dict[str, Value]:
         """From an action to what the station hears: new numbers by name."""
         record, options = self.record, self.record.options
@@ -237,13 +242,20 @@ class Circuit:
         return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
 
     def reward(self, found: Mapping[str, Value]) -> Value:
-        """Reward of a step; the action's change stands where the reward will."""
+        """Reward of a step; the action's change stands where the reward will.
+
+        It stays there for a user's function, which Python calls (`FunctionRewards`).
+        """
         task, options = self.record.task, self.record.options
+        if callable(options.reward):
+            return self.slot("reward")
         rule = REWARDS[options.reward]
         error = self.position(found) - self.reference(0)
         value = self.graph.value(rule(task.error_percent(error), self.slot("reward")))
-        missed = float(task.steps(options.control_rate_hz)) - to_real(found["count"])
-        return where(found["ended"] > 0.0, value + missed * missed_reward(rule), value)
+        missed = self.horizon - to_real(found["count"])
+        whole = where(found["ended"] > 0.0, value + missed * missed_reward(rule), value)
+        # By 1 it is the same, and takes its time.
+        return whole if options.reward_scale == 1.0 else options.reward_scale * whole
 
     def observation(self, table: ObservationTable, found: Mapping[str, Value]) -> list[Value]:
         """The observation's entries."""

@@ -46,12 +46,13 @@ Name = Literal["step", "begin"]
 ARGUMENTS = (
     *("count", "choices", "records", "tables", "references", "actions", "observations"),
     *("rewards", "terminated", "truncated", "faults", "attempts", "finals", "scores", "pressures"),
-    "ideals",
+    *("ideals", "horizon"),
 )
 """Arguments of `step` and `begin`: numbers of environments and of pressures to draw from, then
-addresses; behind them the table's numbers, where all environments share one."""
+addresses, and the control steps of an episode; behind them the table's numbers, where all
+environments share one."""
 
-NUMBERS = ("count", "choices")
+NUMBERS = ("count", "choices", "horizon")
 
 THREADS = 128
 """Threads of a block."""
@@ -114,7 +115,8 @@ class CudaKernel:
         options, record = self.record.options, self.record
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
-            *(options.observation_delay, options.history, options.reward),
+            *(options.observation_delay, options.history, options.reward_name),
+            options.reward_scale,
             *(options.regulator_action, options.safety, self.single),
             *(record.task.structure, record.events),
             *(self.own_tables, self.draws, self.ranged),

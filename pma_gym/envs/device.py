@@ -93,6 +93,11 @@ class DeviceEngine:
         """Compile, and make room."""
         if precision not in ("double", "single"):
             raise ValueError(f"precision must be double or single, got {precision!r}")
+        if callable(options.reward):
+            raise ValueError(
+                "reward must be a name where a device computes it, got a function, which Python "
+                "calls; take PMAVectorEnv, or compute rewards from the observations"
+            )
         self.task, self.options, self.count, self._device = task, options, count, device
         self.nominal = Plant(rig_model(task, options), options.tolerance)
         self.record = Record(tuple(self.nominal.states), task, options)
@@ -183,7 +188,11 @@ class DeviceEngine:
             "pressures": self._pressure,
         }
         self._given = {name: made.address(array) for name, array in given.items()}
-        self._given |= {"count": n, "choices": len(pressures)}
+        self._given |= {
+            "count": n,
+            "choices": len(pressures),
+            "horizon": self.options.horizon(self.task),
+        }
 
     # -- episodes ----------------------------------------------------------------------------------
 

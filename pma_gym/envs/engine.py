@@ -1,6 +1,7 @@
 """Environments as arrays: one, or many that step together."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -59,6 +60,7 @@ class Engine(Episodes):
         nominal: the Plant of the nominal model, with what `disturbances` need.
         models: the Model of every environment's episode.
         pressures: gauge pressure that every episode began at (Pa), shape (n,).
+        horizon: control steps after which an episode is truncated.
         observations: of the last step or reset, float32, shape (n, entries).
         rewards: of the last step, shape (n,).
         terminated: of the last step, bool, shape (n,).
@@ -85,7 +87,8 @@ class Engine(Episodes):
         self._beginnings = np.tile(self._beginning, (threads * BEGUN_PARTS, 1))
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
-        self._crew = Crew((address("step"), self._parts(threads)), (address("begin"), shares))
+        self._steps = self._parts(threads)
+        self._crew = Crew((address("step"), self._steps), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -111,6 +114,13 @@ class Engine(Episodes):
         for name, number in given.items():
             part[ARGUMENTS.index(name)] = number
         return part
+
+    def limit_steps(self, steps: int) -> None:
+        """Truncate episodes after so many control steps, or at the task's end if it comes first."""
+        self.options = replace(self.options, max_episode_steps=steps)
+        self.horizon = self.options.horizon(self.task)
+        for part in (self._arguments, *(part for share in self._steps for part in share)):
+            part[ARGUMENTS.index("horizon")] = self.horizon
 
     def step(self) -> int:
         """Step all environments by `actions`; their results stand in the attributes.

@@ -41,6 +41,7 @@ class EngineMemory:
         self.kernel = Kernel(program, self.record, self.table, self.width, single)
         self.models = [self.nominal.model] * count
         self.pressures = np.zeros(count)
+        self.horizon = options.horizon(task)
         self._allocate()
         self._address = self._arguments.ctypes.data
 
@@ -97,6 +98,7 @@ class EngineMemory:
             "ideals": self._ideals.ctypes.data,
             "settles": 0,
             "pressures": self._ranges.ctypes.data,
+            "horizon": self.horizon,
         }
         self._arguments[:BEFORE] = [given[name] for name in ARGUMENTS]
         self._count_attempts(1)

@@ -49,7 +49,8 @@ class Kernel:
         options, record = self.record.options, self.record
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
-            *(options.observation_delay, options.history, options.reward),
+            *(options.observation_delay, options.history, options.reward_name),
+            options.reward_scale,
             *(options.regulator_action, options.safety, self.draws),
             *(self.width, self.abreast, self.single, pairs(self.width)),
             *(record.task.structure, record.events),

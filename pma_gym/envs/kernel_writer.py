@@ -312,12 +312,13 @@ class Writer(BeginningWriter):
         records, tables = self._block(b, given, block)
         entries = self.circuit.observation(self.kernel.observed, self.sensed)
         options = self.record.options
-        steps = float(self.record.task.steps(options.control_rate_hz))
         is_over = self.sensed["ended"] > 0.0
-        at_end = to_real(self.sensed["count"]) >= steps
+        at_end = to_real(self.sensed["count"]) >= self.circuit.horizon
         truncated = at_end & ~is_over
         values = [*self.sensed.values(), *entries, is_over, truncated]
         known = self._known(b, lanes, values, records, tables, 0)
+        horizon = lanes.spread(b, b.uitofp(given["horizon"], lanes.element))
+        known[self.circuit.horizon.id] = horizon
         for ahead in range(options.preview + 1):
             known[self.circuit.reference(ahead).id] = self._references(
                 b, lanes, given, records, 0, ahead, 1

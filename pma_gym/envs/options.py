@@ -8,9 +8,10 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, TypeGuard
 
-import numpy as np
-
 from pma_gym.effects import CATALOGUE
+from pma_gym.envs.plain_values import plain_options, plain_sequence
+from pma_gym.envs.reward_function import RewardFunction, check_reward_function
+from pma_gym.envs.specs import DefaultSteps
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import DEFAULT_TOLERANCE, check_tolerance
@@ -44,9 +45,11 @@ Pressure = float | Sequence[float] | str
 class Options:
     """Keyword arguments of the environments; each survives JSON (a model as a name or path).
 
+    Numbers of NumPy, arrays, ranges and paths are kept as plain Python values.
+
     Attributes:
-        pressure_kpa: gauge pressure of the episodes (kPa): a number, a list to draw from, or
-            "random" for any that the task's trials begin at.
+        pressure_kpa: gauge pressure of the episodes (kPa): a number, several to draw from (a list,
+            a range, an array), or "random" for any that the task's trials begin at.
         model: name of a shipped model, path of a TOML file, or a Model.
         control_rate_hz: control steps a second (Hz).
         preview: how many future references the observation holds, one a control step.
@@ -54,7 +57,11 @@ class Options:
         action_delay_s: how late an action reaches the drive (s), whole control steps.
         observation_delay_s: how late the sensors are heard (s), whole control steps.
         history: how many earlier readings of the position the observation holds.
-        reward: name of a reward in `pma_gym.tasks.REWARDS`.
+        reward: name of a reward in `pma_gym.tasks.REWARDS`; or a function of four numbers, which
+            is called after every step: the true error in percent of the range, the largest change
+            of an action, the true position and its reference in the units of the info (mm, deg
+            or N m). It does not survive JSON.
+        reward_scale: positive number that every reward is multiplied by.
         randomisation: name of a randomisation in `pma_gym.tasks.RANDOMISATIONS`; or, for stations
             of one's own, a function of the nominal model and a generator that gives a model with
             the same effects (it does not survive JSON).
@@ -66,6 +73,8 @@ class Options:
         tolerance: largest error of an internal step of the integrator, as a share of what the
             plant's states are counted against (`Plant`); a larger one is faster, a smaller one
             more exact.
+        max_episode_steps: control steps after which an episode is truncated, if its task lasts
+            longer; None: as long as the task.
     """
 
     pressure_kpa: Pressure = "random"
@@ -76,13 +85,15 @@ class Options:
     action_delay_s: float = 0.0
     observation_delay_s: float = 0.0
     history: int = 0
-    reward: str = "absolute"
+    reward: str | RewardFunction = "absolute"
+    reward_scale: float = 1.0
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
     human: str | Human = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
+    max_episode_steps: int | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """Its fields for pickle; functions among them need no module."""
@@ -123,16 +134,36 @@ class Options:
         """How late the sensors are heard, in control steps."""
         return round(self.observation_delay_s * self.control_rate_hz)
 
+    @property
+    def reward_name(self) -> str:
+        """Name of the reward; "function" for a user's, whatever it is."""
+        return self.reward if isinstance(self.reward, str) else "function"
 
-def parse_options(given: Mapping[str, Any]) -> Options:
+    def horizon(self, task: Task) -> int:
+        """Control steps after which an episode of a task is truncated."""
+        whole = task.steps(self.control_rate_hz)
+        return whole if self.max_episode_steps is None else min(whole, self.max_episode_steps)
+
+
+def parse_options(
+    given: Mapping[str, Any], caller: str = "the environment", others: Sequence[str] = ()
+) -> Options:
     """Checked options from keyword arguments.
+
+    Args:
+        given: the keyword arguments.
+        caller: who takes them, for the message.
+        others: names of further keyword arguments that the caller takes, for the message.
 
     Raises:
         TypeError: an unknown keyword, with the nearest known one.
         ValueError: a value that is out of range or of the wrong kind.
     """
-    check_known("option", given, [field.name for field in fields(Options)])
-    options = Options(**given)
+    check_keywords(caller, given, [field.name for field in fields(Options)], others)
+    if isinstance(given.get("max_episode_steps"), DefaultSteps):
+        # Of the registered options, not of these: nobody asked for it.
+        given = {**given, "max_episode_steps": None}
+    options = Options(**plain_options(given))
     _check_model(options.model)
     _check_rate_and_delays(options)
     for name in ("preview", "history"):
@@ -140,7 +171,16 @@ def parse_options(given: Mapping[str, Any]) -> Options:
     for name in ("noise", "regulator_action", "safety"):
         if not isinstance(getattr(options, name), bool):
             raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
-    check_named("reward", options.reward, REWARDS)
+    if callable(options.reward):
+        check_reward_function(options.reward)
+    else:
+        check_named("reward", options.reward, REWARDS)
+    if not _is_real(options.reward_scale) or not 0.0 < options.reward_scale <= 1e9:
+        raise ValueError(
+            f"reward_scale must be a number above 0 and up to 1e9, got {options.reward_scale!r}"
+        )
+    if options.max_episode_steps is not None:
+        _check_max_episode_steps(options.max_episode_steps)
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
@@ -276,6 +316,29 @@ def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
             )
 
 
+def check_keywords(
+    caller: str, given: Iterable[str], known: Sequence[str], others: Sequence[str] = ()
+) -> None:
+    """Refuse keyword arguments that do not exist, in Python's own words.
+
+    Libraries look for these words to see whether an environment takes an argument.
+
+    Args:
+        caller: who takes them.
+        given: names that came.
+        known: names of the options.
+        others: names of further keyword arguments of the caller.
+    Raises:
+        TypeError: the first unknown name, the nearest known one, and all known.
+    """
+    for name in given:
+        if name not in known:
+            raise TypeError(
+                f"{caller} got an unexpected keyword argument {name!r}"
+                f"{_nearest(name, [*known, *others])}; known: {', '.join([*known, *others])}"
+            )
+
+
 def check_named(what: str, value: object, known: Iterable[str]) -> None:
     """Refuse a value that is none of the known names.
 
@@ -315,23 +378,33 @@ def check_pressure(pressure: object) -> None:
         _check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
 
 
-def check_pressures(pressures: object, count: int) -> None:
-    """Refuse pressures that are not one for each of so many environments.
+def parse_pressure(given: object) -> Pressure:
+    """The checked pressure of episodes, as plain Python values.
+
+    Raises:
+        ValueError: names the range, the unit and what came.
+    """
+    pressure = plain_sequence(given)
+    check_pressure(pressure)
+    return pressure
+
+
+def parse_pressures(given: object, count: int) -> list[Pressure]:
+    """The checked pressures of so many environments, one each, as plain Python values.
 
     Raises:
         ValueError: names the rule and what came.
     """
-    if isinstance(pressures, str) or not isinstance(pressures, Sequence | np.ndarray):
-        length = "no sequence"
-    else:
-        length = "" if len(pressures) == count else f"{len(pressures)}"
-    if length:
+    pressures = plain_sequence(given)
+    length = f"{len(pressures)}" if isinstance(pressures, list) else "no sequence"
+    if length != f"{count}":
         raise ValueError(
             f"pressures_kpa must hold one pressure for each of the {count} environments, got "
-            f"{length}: {pressures!r}; pressure_kpa is one for all"
+            f"{length}: {given!r}; pressure_kpa is one for all"
         )
-    for pressure in pressures:  # type: ignore[attr-defined]
+    for pressure in pressures:
         check_pressure(pressure)
+    return pressures
 
 
 def check_count(name: str, count: object, most: int) -> None:
@@ -363,6 +436,14 @@ def _check_rate_and_delays(options: Options) -> None:
                 f"{name} must be a whole number of control steps of {options.period:g} s, "
                 f"got {delay:g} s = {steps:g} steps; change it or control_rate_hz"
             )
+
+
+def _check_max_episode_steps(steps: object) -> None:
+    if not _is_whole(steps) or steps < 1:
+        raise ValueError(
+            f"max_episode_steps must be a whole number of control steps from 1 on, got {steps!r}; "
+            "leave it out for the whole task"
+        )
 
 
 def _check_whole(name: str, value: object) -> None:

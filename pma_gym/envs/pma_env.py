@@ -1,15 +1,17 @@
 """The environment: a task on a plant, seen through the plant's sensors."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from pma_gym.envs.advance import NOT_READ
+from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import Engine
@@ -19,14 +21,16 @@ from pma_gym.envs.options import (
     Pressure,
     check_known,
     check_named,
-    check_pressure,
     parse_options,
+    parse_pressure,
     parse_task,
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
+from pma_gym.envs.reward_function import FunctionRewards
 from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.snapshot import put, take
+from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.plant.plant import Condition, Plant
@@ -112,7 +116,13 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | `gaussian` | exp(-e^2), 0 where e^2 is 12 or more |
     | `smooth` | -abs(e) - 0.1 abs(da) |
 
-    A terminated episode also gets, for every step that it did not reach, the reward of e = 100.
+    A terminated episode also gets, for every step until truncation that it did not reach, the
+    reward of e = 100.
+    `reward_scale` multiplies all of it.
+
+    `reward` may also be a function, which Python calls after every step with four floats: e, da,
+    the true position and its reference, in the unit of the info (mm, deg or N m). It returns a
+    finite number: `def reward(error_percent, action_change, position, reference): ...`
 
     ## Termination and truncation
     `terminated` only at a physical limit of the rig (the model's `[limits]`):
@@ -130,7 +140,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
     is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
-    references), 751 (isotonic), 1201 or 3001 (triangles), 1501 (exercises).
+    references), 751 (isotonic), 1201 or 3001 (triangles), 1501 (exercises). `max_episode_steps`
+    truncates earlier, with the same last info.
 
     ## Disturbances
     By name, `disturbances`; drawn at every reset, at random times, by the environment's seed:
@@ -162,6 +173,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | if it prescribes a moment: `rotation_deg`, `prescribed_nm` | angle, moment | deg, N m |
     | and `excess_nm` for the position, `_nm` for `_mm` | moment less prescribed | N m |
     | at the end: `rmse_mm`, `rmse_deg` or `rmse_nm`, ... | see `episode_summary` | |
+    | at the end: `ended_by` | the limit that terminated the episode, in words, else "" | |
 
     ## Reset options
     `reset(options={"pressure_kpa": 300})` sets the pressure of one episode, as the keyword does.
@@ -184,7 +196,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         plant: the Plant of this episode; differs from the nominal one with `randomisation`.
         condition: where the plant stands.
         pressure: gauge pressure that this episode began at (Pa).
-        ended_by: the limit that ended the episode, in words, or None.
+        ended_by: the limit that terminated the episode, in words; "" while none has.
+        horizon: control steps after which an episode is truncated.
 
     Example:
         >>> env = PMAEnv("displacement", model="serres2008", pressure_kpa=300, noise=False)
@@ -203,7 +216,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.options = parse_options(options)
+        self.options = parse_options(options, "PMAEnv.__init__()", ("task", "render_mode"))
         self.task = parse_task(task, self.options)
         self._engine = Engine(self.task, self.options)
         self.observation_space = self._engine.table.space
@@ -211,7 +224,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
-        self.ended_by: str | None = None
+        self.ended_by = ""
         self._idle: str | None = NOT_BEGUN
         self._attach()
 
@@ -233,6 +246,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         self._made = self._engine.advance(self._observed.copy, self._given)
+        if callable(self.options.reward):
+            self._made = self._rewarded(self._made)
         self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
         self._wait(self._idle)
@@ -251,14 +266,14 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
             TypeError: an unknown option.
             ValueError: a pressure out of range.
         """
-        wanted = self._wanted_pressure(options or {})
+        wanted, seed = self._wanted_pressure(options or {}), parse_seed(seed)
         super().reset(seed=seed)
         self._wait(NOT_BEGUN)
         # Unseeded, it begins with the seed that `np_random_seed` says.
         begins = seed is None and not self._engine.is_seeded(0)
         self._engine.seed(_FIRST, [self.np_random_seed if begins else seed])
         self._engine.reset(_FIRST, [wanted])
-        self.ended_by = None
+        self.ended_by = ""
         self._wait(None)
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
@@ -275,6 +290,22 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         """
         made = self._advance(action)
         return made if type(made) is tuple else self._otherwise(action, made)
+
+    def _rewarded(self, made: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """A compiled step, and the reward of a user's function."""
+        rewards, engine = FunctionRewards(self._engine), self._engine
+
+        def advance(action: object) -> Any:  # noqa: ANN401 - as `Engine.advance` has it
+            result = made(action)
+            if type(result) is not tuple:
+                if result in (1, 2):
+                    rewards.write()
+                return result
+            rewards.write()
+            observation, _, *rest = result
+            return (observation, float(engine.rewards[0]), *rest)
+
+        return advance
 
     def _otherwise(
         self, action: NDArray[np.floating], code: int
@@ -315,9 +346,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     def _wanted_pressure(self, options: Mapping[str, Any]) -> Pressure:
         check_known("reset option", options, RESET_OPTIONS)
-        wanted = options.get("pressure_kpa", self.options.pressure_kpa)
-        check_pressure(wanted)
-        return wanted
+        if "pressure_kpa" in options:
+            return parse_pressure(options["pressure_kpa"])
+        return self.options.pressure_kpa
 
     def _number(self, name: str) -> float:
         return float(self._row[self._places[name]])
@@ -353,7 +384,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         state = check_state(state, self._setup, 1)
         put(self._engine, state.simulation)
         self.__dict__.pop("plant", None)
-        self.ended_by = state.ended_by
+        self.ended_by = state.ended_by or ""
         self._np_random_seed = state.seeds[0]
         self._np_random = generator_at(state.generator, self._np_random)
         self._commands.begin(self._number("rest_regulator"))
@@ -362,6 +393,31 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     def _made_as(self) -> Setup:
         return setup(self._engine, num_envs=SINGLE, precision="double")
+
+    # -- length of an episode ----------------------------------------------------------------------
+
+    @property
+    def horizon(self) -> int:
+        """Control steps after which an episode is truncated."""
+        return self._engine.horizon
+
+    def limit_steps(self, steps: int) -> None:
+        """Truncate after so many control steps, or at the task's end if that comes first.
+
+        `gym.make(id, max_episode_steps=steps)` calls it, so that the last info of an episode has
+        the episode's summary.
+        """
+        self._engine.limit_steps(steps)
+        self.options = self._engine.options
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
+        return self.__dict__.get("spec")
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
+        self.__dict__["spec"] = completed_spec(spec, self.horizon)
 
     # -- what the agent, a controller and the reader see -------------------------------------------
 
@@ -524,9 +580,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         Returns:
             `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
             each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
-            or the contraction's stroke; `ended_by`: the limit that ended the episode, in words, or
-            None. An exercise has `exercise_summaries` too, and its RMSE in N m where it prescribes
-            a moment.
+            or the contraction's stroke; `ended_by`: the limit that terminated the episode, in
+            words, or "". An exercise has `exercise_summaries` too, and its RMSE in N m where it
+            prescribes a moment.
         """
         return episode_summary(self._engine, 0)
 

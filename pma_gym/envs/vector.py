@@ -1,10 +1,13 @@
 """Many environments that step together, in SIMD lanes and threads."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
@@ -20,17 +23,23 @@ from pma_gym.envs.options import (
     check_count,
     check_known,
     check_named,
-    check_pressures,
     parse_options,
+    parse_pressures,
     parse_task,
 )
+from pma_gym.envs.plain_values import plain_scalar
 from pma_gym.envs.record import PARTS
+from pma_gym.envs.reward_function import FunctionRewards
 from pma_gym.envs.seeding import SeededByReset, own_seeds
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.snapshot import put, take
+from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
+
+OWN = ("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa", "render_mode")
+"""Keyword arguments of a batch beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
@@ -58,7 +67,7 @@ class PMAVectorEnv(
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
         render_mode: None; a batch draws nothing.
-        options: as `PMAEnv`.
+        options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
         task: the Task.
@@ -91,6 +100,7 @@ class PMAVectorEnv(
         **options: Any,
     ) -> None:
         """Check the options and compile."""
+        num_envs, threads = plain_scalar(num_envs), plain_scalar(threads)
         check_count("num_envs", num_envs, 1 << 24)
         check_count("threads", threads, 256)
         check_named("precision", precision, ("double", "single"))
@@ -103,7 +113,7 @@ class PMAVectorEnv(
             )
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.options = parse_options(options)
+        self.options = parse_options(options, "PMAVectorEnv.__init__()", OWN)
         self.task = parse_task(task, self.options)
         self.metadata = self.metadata | {
             "render_fps": round(self.options.control_rate_hz),
@@ -112,7 +122,7 @@ class PMAVectorEnv(
         if pressures_kpa is not None:
             if "pressure_kpa" in options:
                 raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
-            check_pressures(pressures_kpa, num_envs)
+            pressures_kpa = parse_pressures(pressures_kpa, num_envs)
         single = precision == "single"
         self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
         self.single_observation_space = self.engine.table.space
@@ -135,6 +145,7 @@ class PMAVectorEnv(
         """Point into the engine."""
         self.table: ObservationTable = self.engine.table
         self._given = self.engine.actions[: self.num_envs]
+        self._advance = self._rewarded if callable(self.options.reward) else self.engine.step
         if self.closed:
             self.engine.close()
 
@@ -274,7 +285,7 @@ class PMAVectorEnv(
         self._take(actions, waiting)
         engine = self.engine
         try:
-            ended = engine.step()
+            ended = self._advance()
         except ActionError:
             raise self._not_finite() from None
         if waiting is not None:
@@ -283,6 +294,28 @@ class PMAVectorEnv(
             return self._last()
         flags = engine.terminated.copy(), engine.truncated.copy()
         return engine.observations.copy(), engine.rewards.copy(), *flags, {}
+
+    @cached_property
+    def _rewards(self) -> FunctionRewards:
+        return FunctionRewards(self.engine)
+
+    def _rewarded(self) -> int:
+        """A step, and the rewards of a user's function."""
+        ended = self.engine.step()
+        self._rewards.write(() if self._waiting is None else self._waiting)
+        return ended
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made it: with plain arguments and the true number of steps, for JSON."""
+        return self.__dict__.get("spec")
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
+        if spec is not None:
+            # Those are of single environments.
+            spec = replace(spec, additional_wrappers=())
+        self.__dict__["spec"] = completed_spec(spec, self.engine.horizon)
 
     def _require_episodes(self) -> None:
         if self._idle:

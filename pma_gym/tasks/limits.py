@@ -45,8 +45,8 @@ def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
     return where(moment <= exercise.safe_moment, found, code + 1.0)
 
 
-def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
-    """Which physical limit of the rig a state breaks, in words; None if none.
+def broken_limit(model: Model, truth: Mapping[str, float]) -> str:
+    """Which physical limit of the rig a state breaks, in words; "" if none.
 
     Args:
         model: the rig's model, with its limits.
@@ -55,10 +55,10 @@ def broken_limit(model: Model, truth: Mapping[str, float]) -> str | None:
     return limit_in_words(model, broken(model.parameters["limits"], truth))
 
 
-def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str | None:
-    """The limit that `broken` or `unsafe` found, in words; None for 0."""
+def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str:
+    """The limit that `broken` or `unsafe` found, in words; "" for 0."""
     if not code:
-        return None
+        return ""
     limits = model.parameters["limits"]
     words = (
         f"contraction above {limits.contraction * 1e3:g} mm",

@@ -45,7 +45,7 @@ def drive() -> Callable[..., tuple[dict[str, float], np.ndarray]]:
             assert 0.0 <= voltage <= 10.0
             *_, terminated, truncated, info = env.step(env.action(voltage))
             ended = terminated or truncated
-        assert info["ended_by"] is None
+        assert info["ended_by"] == ""
         by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
         return by_phase, env.voltages
 

@@ -21,7 +21,7 @@ def rmse(name, task, seed, **options):
         assert 0.0 <= voltage <= 10.0
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
-    assert info["ended_by"] is None
+    assert info["ended_by"] == ""
     return np.array(list(info[f"rmse_by_phase_{env.task.protocol.suffix}"].values()))
 
 

@@ -155,8 +155,15 @@ def fragile() -> Model:
     return load_model("serres2008").replace({"limits.tension_n": 450.0})
 
 
+def _squared(error, change, position, reference):
+    """A reward of a user's own."""
+    return -(error**2) - change
+
+
 SINGLES = [
     {},
+    {"reward": _squared},
+    {"max_episode_steps": 30},
     {"task": "rotation", "randomisation": "varied", "pressure_kpa": "random"},
     {"disturbances": "regulator_and_operator", "model": "station"},
     {"action_delay_s": 0.1, "observation_delay_s": 0.2, "history": 2, "preview": 3},

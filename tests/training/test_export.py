@@ -271,7 +271,10 @@ def test_nothing_is_loaded_without_trust(saved, tmp_path, monkeypatch):
         (("--env", "CartPole-v1"), "--env must be one of pma_gym/Isokinetic"),
         (("--env-kwargs", "{preview: 2}"), "--env-kwargs must be a JSON object such as"),
         (("--env-kwargs", "[2]"), r"--env-kwargs must be a JSON object .* got '\[2\]'"),
-        (("--env-kwargs", '{"previw": 2}'), "unknown option 'previw' .did you mean 'preview'"),
+        (
+            ("--env-kwargs", '{"previw": 2}'),
+            "unexpected keyword argument 'previw' .did you mean 'preview'",
+        ),
         (
             ("--env-kwargs", '{"preview": 3}'),
             r"was trained with observations Box\(-5.0, 5.0, \(9,\), float32\), .* has "

@@ -130,7 +130,7 @@ def _error(
     environment = PMAEnv(task, model=model, pressure_kpa=pressure_kpa, **options)
     done = rollout(environment, controller, seed, nominal)
     phases: Sequence[Any] = environment.task.protocol.phases
-    row: dict[str, Any] = {"task": task, "failure": done.ended_by or "", "phases": {}}
+    row: dict[str, Any] = {"task": task, "failure": done.ended_by, "phases": {}}
     if not done.ended_by:
         unit = SI_FACTORS[environment.task.protocol.unit]
         by_phase = phase_rmse(environment.task.protocol, done.position)

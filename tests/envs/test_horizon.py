@@ -1,0 +1,256 @@
+"""How long episodes are: `max_episode_steps`, specs, Gymnasium's TimeLimit, and the last info."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import RecordEpisodeStatistics, TimeAwareObservation, TimeLimit
+
+from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
+from pma_gym.tasks import EVERY_TASK, named_task
+
+DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
+MADE = {"model": "serres2008", "pressure_kpa": 300.0}
+HORIZONS = {"displacement": 501, "rotation": 1501, "isotonic": 751, "isokinetic_exercise": 1501}
+
+
+def run(env) -> tuple[int, bool, bool, dict]:
+    """Steps of an episode without a command, how it ended, and its last info."""
+    env.reset(seed=1)
+    action = np.full(env.action_space.shape, -1.0, np.float32)
+    for steps in range(1, 100_000):
+        *_, terminated, truncated, info = env.step(action)
+        if terminated or truncated:
+            return steps, terminated, truncated, info
+    raise AssertionError("the episode never ended")
+
+
+# -- specs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_registered_specs_have_the_steps_of_the_default_options(name):
+    assert gym.spec(name).max_episode_steps == HORIZONS[ENVIRONMENTS[name]]
+    env = gym.make(name)
+    assert env.spec.max_episode_steps == env.unwrapped.horizon == HORIZONS[ENVIRONMENTS[name]]
+
+
+@pytest.mark.parametrize("options", [
+    {"control_rate_hz": 20.0}, {"control_rate_hz": 300.0}, {"task": "rotation"},
+    {"task": "triangle_high", "control_rate_hz": 10}, {"task": "displacement_steps_3"},
+])  # fmt: skip
+def test_the_spec_has_the_true_steps_and_no_episode_is_cut(options):
+    env = gym.make(DISPLACEMENT, **options)
+    true = named_task(options.get("task", "displacement")).steps(
+        float(options.get("control_rate_hz", 100.0))
+    )
+    assert type(env) is PMAEnv and env.spec.max_episode_steps == true
+    steps, terminated, truncated, info = run(env)
+    assert (steps, terminated, truncated) == (true, False, True)
+    assert info["ended_by"] == "" and info["time_s"] >= env.unwrapped.task.duration - 1e-9
+
+
+@pytest.mark.parametrize("task", EVERY_TASK)
+def test_every_task_has_its_steps_in_the_spec(task):
+    env = gym.make(DISPLACEMENT, task=task, control_rate_hz=50.0)
+    assert env.spec.max_episode_steps == named_task(task).steps(50.0)
+
+
+def remade(spec: EnvSpec, how: str) -> EnvSpec:
+    return EnvSpec.from_json(spec.to_json()) if how == "json" else spec
+
+
+@pytest.mark.parametrize("how", ["memory", "json"])
+@pytest.mark.parametrize("first", [{}, {"max_episode_steps": 7}, {"control_rate_hz": 40.0}])
+@pytest.mark.parametrize(
+    ("then", "wanted"), [({}, None), ({"max_episode_steps": 9}, 9), ({"max_episode_steps": -1}, 0)]
+)
+def test_environments_are_made_anew_from_their_specs(how, first, then, wanted):
+    env = gym.make(DISPLACEMENT, **({"control_rate_hz": 20.0} | MADE | first))
+    whole = named_task("displacement").steps(env.unwrapped.options.control_rate_hz)
+    if wanted is None:
+        wanted = first.get("max_episode_steps", whole)
+    for spec in (env.spec, RecordEpisodeStatistics(env).spec):
+        again = gym.make(remade(spec, how), **then)
+        steps, _, truncated, info = run(again)
+        assert truncated and steps == (wanted or whole) == again.spec.max_episode_steps
+        assert info["rmse_mm"] > 0.0 and info["ended_by"] == ""
+
+
+@pytest.mark.parametrize("how", ["memory", "json"])
+def test_other_options_of_a_remade_spec_have_their_own_steps(how):
+    for spec in (gym.spec(DISPLACEMENT), gym.make(DISPLACEMENT, control_rate_hz=20).spec):
+        env = gym.make(remade(spec, how), control_rate_hz=200.0)
+        assert run(env)[0] == 1002 == env.spec.max_episode_steps
+    limited = gym.make(DISPLACEMENT, max_episode_steps=7).spec
+    assert run(gym.make(remade(limited, how), control_rate_hz=200.0))[0] == 7
+
+
+def test_a_number_that_is_asked_for_counts_though_it_is_the_registered_one():
+    env = gym.make(DISPLACEMENT, control_rate_hz=200.0, max_episode_steps=501)
+    assert run(env)[0] == 501 == env.spec.max_episode_steps
+
+
+def test_wrappers_and_checkers_find_what_they_look_for():
+    assert TimeAwareObservation(gym.make(DISPLACEMENT)).max_timesteps == 501
+    assert TimeAwareObservation(gym.make(DISPLACEMENT, control_rate_hz=20)).max_timesteps == 101
+    for options in ({}, {"max_episode_steps": 5}, {"disable_env_checker": False}):
+        env = gym.make(DISPLACEMENT, **(MADE | options))
+        check_env(env.unwrapped)
+        assert env.spec.max_episode_steps == options.get("max_episode_steps", 501)
+        env.spec.make(render_mode="rgb_array").reset(seed=1)
+
+
+# -- the last info ---------------------------------------------------------------------------------
+
+
+def keys_at_the_end() -> set[str]:
+    return set(run(PMAEnv("displacement", control_rate_hz=20.0, **MADE))[3])
+
+
+@pytest.mark.parametrize("make", [
+    lambda: gym.make(DISPLACEMENT, max_episode_steps=6, **MADE),
+    lambda: gym.make(DISPLACEMENT, max_episode_steps=6, disable_env_checker=False, **MADE),
+    lambda: PMAEnv("displacement", max_episode_steps=6, **MADE),
+    lambda: TimeLimit(PMAEnv("displacement", max_episode_steps=6, **MADE), 6),
+])  # fmt: skip
+def test_a_shortened_episode_has_its_summary_in_the_last_info(make):
+    env = make()
+    steps, terminated, truncated, info = run(env)
+    assert (steps, terminated, truncated) == (6, False, True)
+    assert set(info) == keys_at_the_end()
+    for name in ("rmse_mm", "rmse_by_phase_mm", "percent_of_range", "ended_by"):
+        assert info[name] == env.unwrapped.episode_summary()[name]
+    # The whole episode's first steps are these.
+    whole = PMAEnv("displacement", **MADE)
+    whole.reset(seed=1)
+    for _ in range(6):
+        whole.step(np.full(1, -1.0))
+    assert whole.episode_summary() == env.unwrapped.episode_summary()
+    # It begins anew, and ends there again.
+    assert run(env)[0] == 6
+
+
+def test_monitor_finds_its_keys_when_a_time_limit_ends_the_episode():
+    monitor = pytest.importorskip("stable_baselines3.common.monitor")
+    env = gym.make(DISPLACEMENT, max_episode_steps=50, **MADE)
+    assert run(monitor.Monitor(env, info_keywords=("rmse_mm",)))[3]["episode"]["rmse_mm"] > 0.0
+
+
+def test_after_a_shortened_episode_a_reset_is_needed():
+    env = gym.make(DISPLACEMENT, max_episode_steps=3, **MADE)
+    run(env)
+    with pytest.raises(gym.error.ResetNeeded, match=r"ended at 0.03 s: call reset\(\)"):
+        env.step(env.action_space.sample())
+
+
+def test_a_number_beyond_the_task_changes_nothing():
+    assert run(PMAEnv("displacement", control_rate_hz=20.0, max_episode_steps=10**9))[0] == 101
+    env = gym.make(DISPLACEMENT, control_rate_hz=20.0, max_episode_steps=10**9)
+    assert run(env)[0] == 101 == env.spec.max_episode_steps
+
+
+@pytest.mark.parametrize("steps", [0, -1, -7, 2.5, True, "10", np.float64(3.0)])
+def test_bad_numbers_of_steps_are_refused(steps):
+    for make in (lambda: PMAEnv(max_episode_steps=steps), lambda: PMAVectorEnv(
+        2, max_episode_steps=steps
+    )):  # fmt: skip
+        with pytest.raises(ValueError, match="max_episode_steps must be a whole number of con"):
+            make()
+
+
+def test_what_an_episode_did_not_reach_counts_until_its_truncation(fragile, follow):
+    made = {"model": fragile, "pressure_kpa": 300, "control_rate_hz": 10.0}
+    rewards = []
+    for steps in (None, 40):
+        env = PMAEnv("displacement", max_episode_steps=steps, **made)
+        env.reset(seed=0)
+        terminated = truncated = False
+        while not (terminated or truncated):
+            _, reward, terminated, truncated, info = env.step(env.action(env.time * 2.0))
+        assert terminated and info["ended_by"] == "cable tension above 450 N"
+        assert env.horizon == (steps or 51)
+        rewards.append(reward)
+    assert rewards[1] - rewards[0] == pytest.approx(100.0 * (51 - 40))
+
+
+# -- batches ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_batches_truncate_after_their_number_of_steps(mode):
+    envs = gym.make_vec(DISPLACEMENT, 3, max_episode_steps=np.int64(4), autoreset_mode=mode, **MADE)
+    assert isinstance(envs, PMAVectorEnv) and envs.spec.max_episode_steps == 4
+    single = PMAEnv("displacement", max_episode_steps=4, **MADE)
+    assert run(single)[0] == 4
+    expected = single.episode_summary()
+    envs.reset(seed=1)
+    actions = np.full((3, 1), -1.0)
+    ends = []
+    for step in range(1, 13):
+        *_, terminated, truncated, info = envs.step(actions)
+        assert not terminated.any() and truncated.all() == truncated.any()
+        if truncated.any():
+            ends.append(step)
+            told = info["final_info"] if mode == "SameStep" else info
+            if len(ends) == 1:
+                assert told["rmse_mm"][0] == expected["rmse_mm"]
+            assert told["_rmse_mm"].all() and told["ended_by"].tolist() == [""] * 3
+        if truncated.any() and mode == "Disabled":
+            envs.reset(options={"reset_mask": truncated})
+    assert ends == ([4, 9] if mode == "NextStep" else [4, 8, 12])
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+def test_shortened_batches_are_as_single_environments(twins, mode):
+    pair = twins(3, autoreset_mode=mode, max_episode_steps=5)
+    pair.reset(seed=7)
+    for _ in range(18):
+        pair.step()
+    assert pair.ends[1].sum() == 3 * (18 // (6 if mode == "NextStep" else 5))
+
+
+@pytest.mark.parametrize("mode", ["vector_entry_point", "sync", "async"])
+@pytest.mark.parametrize(
+    ("options", "steps"),
+    [({}, 501), ({"max_episode_steps": 6}, 6), ({"control_rate_hz": 200.0}, 1002)],
+)
+def test_every_kind_of_vector_has_the_true_steps_and_the_summary(mode, options, steps):
+    envs = gym.make_vec(DISPLACEMENT, 2, vectorization_mode=mode, **MADE, **options)
+    envs.reset(seed=1)
+    actions, count, truncated = np.full((2, 1), -1.0, np.float32), 0, np.zeros(2, bool)
+    while not truncated.any():
+        *_, truncated, info = envs.step(actions)
+        count += 1
+    assert count == steps and (info["rmse_mm"] > 0.0).all()
+    envs.close()
+
+
+@pytest.mark.parametrize("how", ["memory", "json"])
+def test_batches_are_made_anew_from_their_specs(how):
+    for options, steps in (
+        ({}, 501),
+        ({"max_episode_steps": 6}, 6),
+        ({"control_rate_hz": 20}, 101),
+    ):
+        envs = gym.make_vec(DISPLACEMENT, 2, **options)
+        again = gym.make_vec(remade(envs.spec, how))
+        assert again.spec.max_episode_steps == again.engine.horizon == steps
+    assert gym.make_vec(gym.make(DISPLACEMENT).spec, 2).spec.max_episode_steps == 501
+
+
+def test_an_own_id_cuts_single_environments_and_batches_alike():
+    name = "Short-v0"
+    gym.register(
+        name, entry_point="pma_gym:PMAEnv", vector_entry_point="pma_gym.envs:PMAVectorEnv",
+        max_episode_steps=5,
+    )  # fmt: skip
+    try:
+        single, envs = gym.make(name), gym.make_vec(name, 2)
+        assert run(single)[0] == 5 == single.spec.max_episode_steps == envs.spec.max_episode_steps
+        envs.reset(seed=1)
+        ends = [envs.step(np.zeros((2, 1)))[3].all() for _ in range(5)]
+        assert ends == [False] * 4 + [True]
+    finally:
+        del gym.registry[name]

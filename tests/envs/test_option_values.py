@@ -1,0 +1,157 @@
+"""Values of options: NumPy's numbers, arrays, ranges and paths, as plain Python values in specs."""
+
+import json
+import shutil
+from fractions import Fraction
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from gymnasium.vector import AutoresetMode
+
+from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.plant.model import shipped_models
+
+DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
+
+SAME = [
+    ("pressure_kpa", np.linspace(200, 400, 5), [200.0, 250.0, 300.0, 350.0, 400.0]),
+    ("pressure_kpa", range(200, 401, 50), [200, 250, 300, 350, 400]),
+    ("pressure_kpa", (200, np.float32(300.5)), [200, 300.5]),
+    ("pressure_kpa", np.array([200, 300], np.int16), [200, 300]),
+    ("pressure_kpa", np.array(300.0), 300.0),
+    ("pressure_kpa", np.float32(300), 300.0),
+    ("pressure_kpa", np.str_("random"), "random"),
+    ("pressure_kpa", Fraction(601, 2), 300.5),
+    ("noise", np.True_, True),
+    ("noise", np.array(False), False),
+    ("regulator_action", np.False_, False),
+    ("preview", np.int64(2), 2),
+    ("preview", np.array(3, np.uint8), 3),
+    ("history", np.int32(1), 1),
+    ("control_rate_hz", np.float32(50), 50.0),
+    ("control_rate_hz", np.int64(50), 50),
+    ("action_delay_s", np.float64(0.02), 0.02),
+    ("observation_delay_s", np.array(0.03), 0.03),
+    ("tolerance", np.float64(1e-3), 1e-3),
+    ("tolerance", np.array(1e-3), 1e-3),
+    ("reward_scale", np.float32(0.5), 0.5),
+    ("reward", np.str_("smooth"), "smooth"),
+]
+
+
+@pytest.mark.parametrize(("name", "value", "plain"), SAME)
+def test_values_are_kept_plain_and_survive_json(name, value, plain):
+    env = gym.make(DISPLACEMENT, **{"model": "serres2008", name: value})
+    kept = getattr(env.unwrapped.options, name)
+    assert kept == plain and type(kept) is type(plain)
+    if isinstance(plain, list):
+        assert [type(one) for one in kept] == [type(one) for one in plain]
+    assert env.spec is not None
+    text = env.spec.to_json()
+    assert json.loads(text)["kwargs"][name] == plain
+    again = gym.make(EnvSpec.from_json(text))
+    assert again.unwrapped.options == env.unwrapped.options
+    direct = PMAEnv("displacement", **{"model": "serres2008", name: plain})
+    for other in (again, direct):
+        np.testing.assert_array_equal(other.reset(seed=4)[0], env.reset(seed=4)[0])
+
+
+@pytest.mark.parametrize(("name", "value", "plain"), SAME)
+def test_batches_take_the_same_values(name, value, plain):
+    envs = gym.make_vec(DISPLACEMENT, 2, **{"model": "serres2008", name: value})
+    assert envs.unwrapped.options == PMAEnv(**{"model": "serres2008", name: plain}).options
+    assert json.loads(envs.spec.to_json())["kwargs"][name] == plain
+    gym.make_vec(EnvSpec.from_json(envs.spec.to_json())).reset(seed=1)
+
+
+@pytest.mark.parametrize("kind", [np.array, tuple, list])
+@pytest.mark.parametrize("rows", [[200.0, 300.0], [[200.0, 300.0], [250.0, 350.0]]])
+def test_pressures_of_each_come_in_any_sequence(kind, rows):
+    made = {"model": "serres2008", "num_envs": 2}
+    expected, _ = PMAVectorEnv(pressures_kpa=rows, **made).reset(seed=3)
+    envs = gym.make_vec(DISPLACEMENT, pressures_kpa=kind(rows), **made)
+    np.testing.assert_array_equal(envs.reset(seed=3)[0], expected)
+    assert json.loads(envs.spec.to_json())["kwargs"]["pressures_kpa"] == rows
+    envs = PMAVectorEnv(**made)
+    np.testing.assert_array_equal(
+        envs.reset(seed=3, options={"pressures_kpa": kind(rows)})[0], expected
+    )
+
+
+def test_numbers_of_steps_may_be_of_numpy():
+    assert PMAEnv(max_episode_steps=np.int64(50)).options.max_episode_steps == 50
+    envs = gym.make_vec(DISPLACEMENT, 2, max_episode_steps=np.array(50))
+    assert json.loads(envs.spec.to_json())["kwargs"]["max_episode_steps"] == 50
+
+
+def test_a_range_of_pressures_is_one_for_each():
+    envs = PMAVectorEnv(3, pressures_kpa=range(200, 401, 100))
+    envs.reset(seed=1)
+    np.testing.assert_allclose(envs.pressures, [200e3, 300e3, 400e3], rtol=1e-6)
+
+
+def test_arguments_of_a_batch_survive_json_too():
+    envs = gym.make_vec(
+        DISPLACEMENT, np.int64(3), threads=np.int32(1), autoreset_mode=AutoresetMode.SAME_STEP
+    )
+    again = gym.make_vec(EnvSpec.from_json(envs.spec.to_json()))
+    assert again.num_envs == 3 and again.metadata["autoreset_mode"] == AutoresetMode.SAME_STEP
+
+
+def test_paths_of_models_are_kept_as_text(tmp_path):
+    path = tmp_path / "rig of my own.toml"
+    shutil.copy(shipped_models()["serres2008"], path)
+    for given in (path, str(path), np.str_(path)):
+        env = gym.make(DISPLACEMENT, model=given)
+        assert env.spec is not None and type(env.unwrapped.options.model) is str
+        again = gym.make(EnvSpec.from_json(env.spec.to_json()))
+        np.testing.assert_array_equal(again.reset(seed=1)[0], env.reset(seed=1)[0])
+    assert PMAEnv(model=Path("serres2008")).station.model.name == "serres2008"
+
+
+@pytest.mark.parametrize("seed", [np.int64(5), np.array(5), np.uint8(5)])
+def test_seeds_may_be_numbers_of_numpy(seed):
+    expected, _ = PMAEnv().reset(seed=5)
+    np.testing.assert_array_equal(PMAEnv().reset(seed=seed)[0], expected)
+    envs = PMAVectorEnv(2)
+    np.testing.assert_array_equal(envs.reset(seed=seed)[0][0], expected)
+    for several in (np.array([5, 9]), [np.int64(5), 9], range(5, 7), (np.array(5), None)):
+        np.testing.assert_array_equal(envs.reset(seed=several)[0][0], expected)
+
+
+@pytest.mark.parametrize("seed", [True, np.True_, -1, 2.5, "5", np.array([1, 2])])
+def test_bad_seeds_are_refused(seed):
+    with pytest.raises(ValueError, match=r"seed must be a whole number from 0 on"):
+        PMAEnv().reset(seed=seed)
+    with pytest.raises(ValueError, match=r"seed must be a whole number from 0 on"):
+        PMAVectorEnv(3).reset(seed=seed)
+
+
+@pytest.mark.parametrize("value", [np.True_, True, np.array(True)])
+@pytest.mark.parametrize("name", [
+    "pressure_kpa", "control_rate_hz", "preview", "history", "action_delay_s", "tolerance",
+    "reward_scale", "max_episode_steps",
+])  # fmt: skip
+def test_a_truth_is_no_number(name, value):
+    with pytest.raises(ValueError, match=f"{name} must be .*True"):
+        PMAEnv(**{name: value})
+
+
+@pytest.mark.parametrize("value", [{300.0, 200.0}, {"kpa": 300}, np.zeros((2, 2)), [[200], [300]],
+    np.array([]), b"300", np.array([True, False]), [300, None], np.array(["300"]),
+    iter([200, 300])])  # fmt: skip
+def test_what_is_no_list_of_pressures_is_refused(value):
+    with pytest.raises(ValueError, match="pressure_kpa must be a number in kPa, a list of number"):
+        PMAEnv(pressure_kpa=value)
+
+
+def test_pressures_of_a_reset_may_be_of_numpy():
+    env, other = PMAEnv(), PMAEnv()
+    for given, plain in ((np.array([200.0, 300.0]), [200.0, 300.0]), (np.float32(250), 250.0)):
+        first, _ = env.reset(seed=2, options={"pressure_kpa": given})
+        np.testing.assert_array_equal(
+            other.reset(seed=2, options={"pressure_kpa": plain})[0], first
+        )

@@ -1,0 +1,192 @@
+"""`reward_scale`, and rewards by a user's function: the same alone and in a batch."""
+
+import math
+import pickle
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.tasks import REWARDS
+
+MADE = {"model": "serres2008", "pressure_kpa": 300.0, "control_rate_hz": 10.0}
+STEPS = 60
+
+
+def absolute(error_percent, action_change, position, reference):
+    """The reward `absolute`, as a user would write it."""
+    return -abs(error_percent)
+
+
+def smooth(error_percent, action_change, position, reference):
+    """The reward `smooth`."""
+    return -abs(error_percent) - 0.1 * action_change
+
+
+def rewards_of(env, seed=3, high=1.0) -> list[float]:
+    """Rewards of an episode under random actions."""
+    generator = np.random.default_rng(seed)
+    env.reset(seed=seed)
+    found = []
+    for _ in range(STEPS):
+        action = generator.uniform(-1.0, high, env.action_space.shape).astype(np.float32)
+        _, reward, terminated, truncated, _ = env.step(action)
+        assert type(reward) is float
+        found.append(reward)
+        if terminated or truncated:
+            break
+    return found
+
+
+@pytest.mark.parametrize("task", ["displacement", "rotation", "isotonic", "isotonic_exercise"])
+@pytest.mark.parametrize(("function", "name"), [(absolute, "absolute"), (smooth, "smooth")])
+def test_a_function_gives_what_the_reward_of_that_name_gives(task, function, name):
+    options = {"control_rate_hz": 50.0} if "exercise" in task else {"control_rate_hz": 10.0}
+    named = rewards_of(PMAEnv(task, reward=name, **options))
+    own = rewards_of(PMAEnv(task, reward=function, **options))
+    # The error goes through the info's unit, which rounds once more.
+    np.testing.assert_allclose(own, named, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("function", "name"), [(absolute, "absolute"), (smooth, "smooth")])
+def test_a_broken_limit_costs_what_it_costs_by_name(fragile, function, name):
+    made = {**MADE, "model": fragile}
+    named, own = (rewards_of(PMAEnv(reward=r, **made), high=1.0) for r in (name, function))
+    assert len(own) < 51 and own[-1] < -100.0
+    np.testing.assert_allclose(own, named, rtol=1e-12)
+
+
+def test_a_function_gets_floats_and_what_the_info_says():
+    seen = []
+
+    def reward(error_percent, action_change, position, reference):
+        seen.append((error_percent, action_change, position, reference))
+        return 1.5
+
+    env = PMAEnv(reward=reward, **MADE)
+    env.reset(seed=1)
+    assert not seen
+    _, value, *_, info = env.step(np.array([0.25]))
+    assert value == 1.5 and len(seen) == 1 and all(type(one) is float for one in seen[0])
+    error, change, position, reference = seen[0]
+    assert (position, reference) == (info["extension_mm"], info["reference_mm"])
+    assert error == pytest.approx(100.0 * info["error_mm"] / 25.0) and change == 1.25
+    env.step(np.array([0.0]))
+    assert seen[1][1] == 0.25
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
+@pytest.mark.parametrize("function", [absolute, smooth])
+@pytest.mark.parametrize("scale", [1.0, 0.25])
+def test_batches_give_the_bits_of_single_environments(twins, fragile, mode, function, scale):
+    pair = twins(3, autoreset_mode=mode, model=fragile, reward=function, reward_scale=scale)
+    pair.reset(seed=5)
+    for _ in range(70):
+        pair.step()
+    assert pair.ends[0].any()
+
+
+def test_threads_and_sb3_have_the_same_rewards():
+    sb3 = pytest.importorskip("pma_gym.envs.sb3")
+    made = {**MADE, "reward": smooth, "reward_scale": 0.1}
+    first, other = PMAVectorEnv(20, threads=2, **made), sb3.SB3VecEnv(20, **made)
+    first.reset(seed=1)
+    other.seed(1)
+    other.reset()
+    generator = np.random.default_rng(0)
+    for _ in range(20):
+        actions = generator.uniform(-1, 1, (20, 1)).astype(np.float32)
+        rewards = first.step(actions)[1]
+        np.testing.assert_array_equal(other.step(actions)[1], rewards.astype(np.float32))
+    assert rewards.min() < 0.0
+
+
+@pytest.mark.parametrize("name", sorted(REWARDS))
+@pytest.mark.parametrize("scale", [1e-3, 0.5, 7, np.float64(2.0)])
+def test_a_scale_multiplies_every_reward(fragile, name, scale):
+    made = {**MADE, "model": fragile, "reward": name}
+    plain = rewards_of(PMAEnv(**made))
+    scaled = rewards_of(PMAEnv(reward_scale=scale, **made))
+    assert scaled == [scale * reward for reward in plain]
+    envs = PMAVectorEnv(9, reward_scale=scale, **made)
+    envs.reset(seed=3)
+    generator = np.random.default_rng(3)
+    for reward in scaled:
+        actions = np.tile(generator.uniform(-1.0, 1.0, (1, 1)), (9, 1)).astype(np.float32)
+        assert envs.step(actions)[1][0] == reward
+
+
+def test_a_scale_of_one_leaves_the_bits():
+    assert rewards_of(PMAEnv(reward_scale=1.0, **MADE)) == rewards_of(PMAEnv(**MADE))
+    assert rewards_of(PMAEnv(reward_scale=1, reward=smooth, **MADE)) == rewards_of(
+        PMAEnv(reward=smooth, **MADE)
+    )
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, math.nan, math.inf, "2", None, True, 1e10])
+def test_bad_scales_are_refused(scale):
+    with pytest.raises(ValueError, match="reward_scale must be a number above 0 and up to 1e9"):
+        PMAEnv(reward_scale=scale)
+
+
+@pytest.mark.parametrize("value", [None, "0.5", math.nan, -math.inf, True, 1j, np.zeros(2)])
+def test_a_function_that_returns_no_number_is_named(value):
+    env = PMAEnv(reward=lambda *given: value, **MADE)
+    env.reset(seed=1)
+    with pytest.raises(ValueError, match="reward must be a function of four numbers .*it returned"):
+        env.step(np.zeros(1))
+    envs = PMAVectorEnv(2, reward=lambda *given: value, **MADE)
+    envs.reset(seed=1)
+    with pytest.raises(ValueError, match="reward must be a function of four numbers .*it returned"):
+        envs.step(np.zeros((2, 1)))
+
+
+def test_a_function_of_other_arguments_is_refused_when_the_environment_is_made():
+    for function in (lambda error: 0.0, lambda: 0.0, lambda a, b, c, d, e: 0.0):
+        with pytest.raises(ValueError, match="reward must be a name or a function of four numbers"):
+            PMAEnv(reward=function)
+    for fine in (lambda *given: 0.0, lambda a, b, c, d, e=1: 0.0):
+        PMAEnv(reward=fine)
+
+
+def test_actions_are_still_refused_before_the_function_is_called():
+    calls = []
+    env = PMAEnv(reward=lambda *given: calls.append(1) or 0.0, **MADE)
+    env.reset(seed=1)
+    for bad in ([math.nan], [0.1, 0.2], "fast"):
+        with pytest.raises(ValueError, match="action"):
+            env.step(bad)
+    assert not calls
+    assert env.step([0.5])[1] == 0.0 and len(calls) == 1
+    fresh = PMAEnv(reward=absolute, **MADE)
+    with pytest.raises(gym.error.ResetNeeded):
+        fresh.step(np.zeros(1))
+
+
+def test_numpy_numbers_are_numbers_and_options_pickle_with_their_function():
+    env = PMAEnv(reward=lambda error, *rest: np.float32(error), **MADE)
+    assert all(type(reward) is float for reward in rewards_of(env))
+    assert pickle.loads(pickle.dumps(PMAEnv(reward=absolute).options)).reward is absolute
+
+
+def test_a_device_says_that_it_calls_no_function():
+    from pma_gym.envs.device import DeviceEngine
+    from pma_gym.envs.options import Options
+    from pma_gym.envs.stand_in import StandIn
+    from pma_gym.tasks import TASKS
+
+    with pytest.raises(ValueError, match="reward must be a name where a device computes it"):
+        DeviceEngine(TASKS["displacement"], Options(reward=absolute), 2, "double", StandIn())
+    # A scale and a number of steps it has as the processor has them.
+    options = Options(reward_scale=0.5, max_episode_steps=7, control_rate_hz=10.0, pressure_kpa=300)
+    device = DeviceEngine(TASKS["displacement"], options, 2, "double", StandIn())
+    envs = PMAVectorEnv(2, reward_scale=0.5, max_episode_steps=7, control_rate_hz=10.0,
+        pressure_kpa=300)  # fmt: skip
+    device.reset(seed=1)
+    envs.reset(seed=1)
+    for step in range(1, 8):
+        _, rewards, terminated, truncated = device.step(np.zeros((2, 1)))
+        _, expected, *_ = envs.step(np.zeros((2, 1)))
+        np.testing.assert_allclose(rewards, expected, rtol=1e-6)
+        assert not terminated.any() and truncated.all() == (step == 7)
