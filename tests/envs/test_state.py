@@ -64,7 +64,7 @@ def test_states_before_and_after_episodes(single, same):
     assert same(other.reset(), env.reset())
     # Back from an end to the beginning.
     env.set_state(begun)
-    assert env.time == 0.0 and env.ended_by is None
+    assert env.time == 0.0 and env.ended_by == ""
     env.step([0.0])
 
 
