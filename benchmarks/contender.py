@@ -52,6 +52,11 @@ class Contender:
         return bool(self.algorithm) or self.path.endswith(POLICY_FILES)
 
     @property
+    def is_bound(self) -> bool:
+        """Whether it is the project's own bound, which alone is shown the environment."""
+        return not self.path and hasattr(CONTROLLERS.get(self.name), "see")
+
+    @property
     def kinds(self) -> frozenset[str]:
         """Kinds of task that it can do; all if empty."""
         if self.algorithm:

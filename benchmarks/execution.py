@@ -108,7 +108,8 @@ def run_case(case: Case, suite: Suite) -> Outcome:
     environment = make_environment(
         case.task, case.model, case.pressure_kpa, suite.control_rate_hz, suite.noise
     )
-    done = rollout(environment, case.controller.make(), score.seed)
+    controller = case.controller.make()
+    done = rollout(environment, controller, score.seed, reveal=case.controller.is_bound)
     score = replace(score, steps=done.steps, step_seconds=done.step_seconds)
     if done.ended_by:
         end = f"ended after {done.steps / suite.control_rate_hz:.4g} s by a physical limit"

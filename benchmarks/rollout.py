@@ -1,5 +1,6 @@
 """One case, run: a controller drives an environment, and what happened comes back."""
 
+import copy
 import math
 import numbers
 import time
@@ -100,19 +101,25 @@ def make_environment(
 
 
 def rollout(
-    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None = None
+    environment: PMAEnv,
+    controller: Controller,
+    seed: int,
+    nominal: Model | None = None,
+    reveal: bool = False,
 ) -> Rollout:
     """Let a controller drive one episode, or the last of its repetitions.
 
     A controller with `repetitions` has driven so many episodes when this ends, all but the last to
-    practise: on the same station and reference, each with a noise of its own. One with a method
-    `see` is shown the environment before each.
+    practise: on the same station and reference, each with a noise of its own. It receives copies
+    of the reference, the station and the readings, and no environment.
 
     Args:
         environment: of one pressure.
         controller: who drives; reset first.
         seed: seed of the episode.
-        nominal: model that the controller is told, if the environment has another.
+        nominal: model that the controller receives, if the environment has another.
+        reveal: hand the environment to the controller's method `see` before each reset; only for
+            the oracle, which is no rival but the bound that rivals are measured by.
     Returns:
         What happened, to the last scored sample or to where a physical limit ended it.
     Raises:
@@ -120,9 +127,11 @@ def rollout(
         Exception: whatever the controller or the environment raised.
     """
     for practice in range(1, getattr(controller, "repetitions", 1)):
-        _drive(environment, controller, practice_seed(seed, practice), nominal, _Log())
+        _begin(environment, controller, practice_seed(seed, practice), nominal, reveal)
+        _drive(environment, controller, _Log())
     log = _Log()
-    _drive(environment, controller, seed, nominal, log)
+    _begin(environment, controller, seed, nominal, reveal)
+    _drive(environment, controller, log)
     return log.rollout(environment)
 
 
@@ -168,18 +177,22 @@ class _Log:
         )
 
 
-def _drive(
-    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, log: _Log
+def _begin(
+    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, reveal: bool
 ) -> None:
-    """Run an episode to its end."""
+    """Reset the environment and the controller."""
     environment.reset(seed=seed)
-    see = getattr(controller, "see", None)
-    if see is not None:
-        see(environment)
+    if reveal:
+        controller.see(environment)  # type: ignore[attr-defined]
     station = environment.station
-    controller.reset(
-        environment.reference, station if nominal is None else replace(station, model=nominal)
-    )
+    if nominal is not None:
+        # A copy: whatever the controller does to it, the next case receives the same model.
+        station = replace(station, model=copy.copy(nominal))
+    controller.reset(environment.reference, station)
+
+
+def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
+    """Run an episode to its end."""
     log.see(environment)
     clock, ended = time.perf_counter, False
     while not ended:

@@ -87,7 +87,8 @@ def run_case(case: Case, model: Model | None = None) -> Row:
     period = environment.options.period
     controller = Guarded(contender, period) if contender.path else contender.make()
     told = told_model(environment.task, suite.nominal)
-    done = rollout(environment, controller, suite.seed_of(case.episode), told)
+    seed = suite.seed_of(case.episode)
+    done = rollout(environment, controller, seed, told, reveal=contender.is_bound)
     if done.ended_by:
         end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
         return blank_row(case) | {"failure": end}

@@ -2,7 +2,7 @@
 
 import gymnasium as gym
 
-from pma_gym.envs.knowledge import Reading, Station
+from pma_gym.envs.knowledge import Reading, Reference, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.vector import PMAVectorEnv
@@ -29,4 +29,4 @@ for _name, _task in ENVIRONMENTS.items():
             kwargs={"task": _task},
         )
 
-__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "PMAVectorEnv", "Reading", "Station"]
+__all__ = ["ENVIRONMENTS", "Options", "PMAEnv", "PMAVectorEnv", "Reading", "Reference", "Station"]

@@ -215,7 +215,7 @@ class Learns(Returns):
 def test_a_controller_that_learns_practises_and_its_last_episode_counts():
     environment, learns = make_environment("displacement", MODEL, 300), Learns()
     nominal = load_model("station")
-    done = rollout(environment, learns, seed=5, nominal=nominal)
+    done = rollout(environment, learns, seed=5, nominal=nominal, reveal=True)
     shown, models = learns.told[::2], learns.told[1::2]
     assert len(set(shown)) == 1 and shown[0][0] == 0.0
     assert models == ["station"] * 3
