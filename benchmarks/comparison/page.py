@@ -52,8 +52,8 @@ def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     return blocks + _origin_blocks(leaderboard)
 
 
-def page_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
-    """Every plot that there are figures for, as PNG by name."""
+def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Every plot of the scores that there are figures for, as PNG by name."""
     styles = styles_of(leaderboard.labels)
     pictures: dict[str, bytes] = {}
     single = _shown(leaderboard, pooled=False)
@@ -64,9 +64,13 @@ def page_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     headline = _headline(leaderboard)
     if headline is not None and len(headline.errors.names) > 1:
         pictures["improvement"] = improvement_plot(headline, styles)
-    for task, found in leaderboard.loops.items():
-        pictures[f"loops_{task}"] = loop_plot(found, styles)
     return pictures
+
+
+def loop_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Plots of the linear controllers' loops, as PNG by name."""
+    styles = styles_of(leaderboard.labels)
+    return {f"loops_{task}": loop_plot(found, styles) for task, found in leaderboard.loops.items()}
 
 
 def _opening(leaderboard: Leaderboard) -> list[Block]:
