@@ -5,8 +5,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Generic, TypeVar, cast
 
-from benchmarks.processes import LOOK_S
-from benchmarks.worker import ProcessDied, Worker, deaf_to_interrupt
+from benchmarks.worker import LOOK_S, ProcessDied, Worker, deaf_to_interrupt
 
 Result = TypeVar("Result")
 

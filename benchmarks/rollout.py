@@ -16,6 +16,7 @@ from benchmarks.contender import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
+from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
@@ -33,6 +34,7 @@ class Rollout:
         period: of the control steps (s).
         start: contraction that extension is counted from (m).
         position: true position (m or rad) at k / 384 s.
+        asked: volts that the controller returned, before they are held to 0-10 V, shape (steps,).
         commands: motor and regulator voltage (V) in force in every control step, shape (steps, 2).
         readings: at the steps' beginnings and the end: extension, rotation, load, pressure (SI),
             shape (steps + 1, 4).
@@ -46,6 +48,7 @@ class Rollout:
     period: float
     start: float
     position: NDArray[np.float64]
+    asked: NDArray[np.float64]
     commands: NDArray[np.float64]
     readings: NDArray[np.float64]
     truth: Mapping[str, NDArray[np.float64]]
@@ -77,6 +80,12 @@ class Rollout:
             },
             truth={self.task.protocol.quantity: self.position + self._zero},
         )
+
+    @property
+    def clipped(self) -> tuple[float, float]:
+        """Share of the steps that asked for volts outside 0-10 V, and the farthest beyond (V)."""
+        beyond = np.maximum(self.asked - HIGHEST_VOLTAGE, -self.asked)
+        return float(np.mean(beyond > 0.0)), float(np.max(beyond, initial=0.0))
 
     @property
     def _zero(self) -> float:
@@ -144,6 +153,7 @@ class _Log:
     """What is written down while an episode runs."""
 
     def __init__(self) -> None:
+        self.asked: list[float] = []
         self.commands: list[tuple[float, float]] = []
         self.readings: list[Reading] = []
         self.truths: list[tuple[float, float, float]] = []
@@ -168,6 +178,7 @@ class _Log:
             period=environment.options.period,
             start=self.start,
             position=environment.trajectory()[: last.first + last.samples],
+            asked=np.array(self.asked),
             commands=np.array(self.commands),
             readings=np.array([reading[1:] for reading in self.readings]),
             truth=dict(zip(("contraction", "load", "pressure"), truths, strict=True)),
@@ -200,17 +211,19 @@ def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
         asked = clock()
         answer = controller.act(reading, now)
         answered = clock()
-        action = environment.action(_checked(answer, now))
+        volts = checked_volts(answer, now)
+        action = environment.action(volts)
         given = clock()
         _, _, terminated, truncated, _ = environment.step(action)
         log.step_seconds += clock() - given
+        log.asked.append(volts)
         log.act_seconds.append(answered - asked)
         log.commands.append((environment.motor_voltage, environment.regulator_voltage))
         log.see(environment)
         ended = terminated or truncated
 
 
-def _checked(volts: object, now: float) -> float:
+def checked_volts(volts: object, now: float) -> float:
     """A controller's answer as volts.
 
     Raises:

@@ -17,7 +17,7 @@ from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
 from controllers import designs
 from pma_gym.envs.options import parse_options
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import Model, is_path, load_model, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
 
 SCHEMA = 2
@@ -216,7 +216,9 @@ def frozen_suite(source: str) -> FrozenSuite:
     Raises:
         SuiteError: there is none, or its file is not as it should be; names the file and the mend.
     """
-    path = Path(source) if source.endswith(".toml") else SUITES / f"{source}.toml"
+    path = Path(source) if is_path(source) else SUITES / f"{source}.toml"
+    if is_path(source) and missing_file(path):
+        raise SuiteError(missing_file(path))
     if not path.is_file():
         near = difflib.get_close_matches(source, suite_names(), 1)
         hint = f"; did you mean {near[0]}?" if near else ""

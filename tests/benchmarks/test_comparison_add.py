@@ -1,6 +1,5 @@
 """Somebody's own controller: scored beside the others, or told in plain words what to mend."""
 
-import time
 from functools import partial
 
 import numpy as np
@@ -121,7 +120,6 @@ def dies():
 
 def test_what_takes_too_long_is_ended_and_the_others_are_not():
     results = {}
-    began = time.monotonic()
     works = [partial(loops, 0.3), is_quick, dies, is_quick]
     assert run_all(works, 2, results.__setitem__, wary=True)
     assert results[1] == results[3] == "quick"
@@ -129,7 +127,6 @@ def test_what_takes_too_long_is_ended_and_the_others_are_not():
     assert str(results[0]).startswith("thinking took over 0.3 s and was ended; look for an endless")
     # Of works that are not trusted none is run twice.
     assert isinstance(results[2], ProcessDied) and "again" not in str(results[2])
-    assert time.monotonic() - began < 30.0
 
 
 def invoke(folder, *arguments):
