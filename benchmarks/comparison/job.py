@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from benchmarks.comparison.case import Row
+from benchmarks.comparison.command_lines import report_command
 from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
 from benchmarks.comparison.journal import JOURNAL
 from benchmarks.comparison.leaderboard import keep_bounds
@@ -81,7 +82,7 @@ def run_comparison(
             keep_bounds(suite, out)
     except KeyboardInterrupt:
         console.print("[yellow]Interrupted:[/] all cases are done; the report computes the bounds.")
-    console.print(f"Leaderboard: python -m benchmarks report {suite.source}", highlight=False)
+    console.print(f"Leaderboard: {report_command(suite, out)}", highlight=False)
     return FAILED if any(row["failure"] for row in rows) else 0
 
 

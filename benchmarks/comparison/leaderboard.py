@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.comparison.bounds import Bounds
+from benchmarks.comparison.command_lines import run_command
 from benchmarks.comparison.errors import (
     Errors,
     Measure,
@@ -166,15 +167,15 @@ def read_leaderboard(suite: FrozenSuite, folder: Path, bounds: Bounds | None = N
     info, rows = read_run(folder), finished_rows(folder)
     if not rows:
         raise SuiteError(
-            f"{folder} has no results of suite {suite.name}; make some: python -m benchmarks run "
-            f"--suite {suite.source}"
+            f"{folder} has no results of suite {suite.name}; make some: "
+            f"{run_command(suite, folder)}"
         )
     ran = info.get("suite", {})
     if (ran.get("name"), ran.get("digest")) != (suite.name, suite.digest):
         raise SuiteError(
             f"{folder} has results of suite {ran.get('name')} version {ran.get('version')} with "
             f"other numbers than {suite.source} version {suite.version} has now; run it again: "
-            f"python -m benchmarks run --suite {suite.source}"
+            f"{run_command(suite, folder)}"
         )
     return Leaderboard(Record.of(suite, rows), info, bounds)
 

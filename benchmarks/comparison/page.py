@@ -181,7 +181,8 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
 
 def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
     text = (
-        "Medians over the cases that did not fail; “saturated” is a mean. Effort is the standard "
+        "Medians over the cases that did not fail; “saturated” and “clipped” are means. A command "
+        "below 0 V or above 10 V is clipped to there. Effort is the standard "
         "deviation of the voltage, variation its total variation a second. Soft limits are the "
         "reach of table I3; 100 % of the way beyond them the episode ends. Real-time factor: how "
         "often the 99th percentile of the computing time fits into a control period."

@@ -241,9 +241,13 @@ def missing_file(path: Path, ending: str = ".toml") -> str:
     where = "" if path.is_absolute() else f" in {Path.cwd()}"
     if not path.parent.is_dir():
         return f"no such file {path}{where}: there is no folder {path.parent}; check the path"
-    names = [each.name for each in path.parent.glob(f"*{ending}")]
-    near = difflib.get_close_matches(path.name, names, 1)
-    hint = f"did you mean {path.parent / near[0]}?" if near else "check the name and the folder"
+    stems = [each.stem for each in path.parent.glob(f"*{ending}")]
+    near = difflib.get_close_matches(path.stem, stems, 1)
+    hint = (
+        f"did you mean {path.parent / near[0]}{ending}?"
+        if near
+        else "check the name and the folder"
+    )
     return f"no such file {path}{where}; {hint}"
 
 
