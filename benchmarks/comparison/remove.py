@@ -57,7 +57,8 @@ def _controller(line: bytes) -> str | None:
 
 
 def _names(path: Path) -> set[str]:
-    return {name for line in path.open("rb") if (name := _controller(line)) is not None}
+    with path.open("rb") as lines:
+        return {name for line in lines if (name := _controller(line)) is not None}
 
 
 def _unknown(name: str, known: dict[Path, set[str]], results: Path) -> str:
