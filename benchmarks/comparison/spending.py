@@ -66,7 +66,7 @@ def _of_one(record: Record, measure: Measure, name: str) -> Spending:
     done = [row for row in rows if not row["failure"]]
 
     def column(field: str) -> np.ndarray:
-        return np.array([row[field] for row in done] or [np.nan], dtype=np.float64)
+        return np.array([row.get(field, np.nan) for row in done] or [np.nan], dtype=np.float64)
 
     largest = [max(phase["largest_error"] for phase in row["phases"].values()) for row in done]
     worst_us = float(np.median(column("act_us_worst")))
