@@ -4,15 +4,20 @@ import difflib
 import importlib.util
 import inspect
 import sys
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import ModuleType
 
+import controllers.controller
 from controllers import CONTROLLERS
 from controllers.controller import Controller
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
 from controllers.policy_file import PolicyError, policy_pair
+
+PROTOCOL = Path(controllers.controller.__file__)
+"""File that says what a controller is."""
 
 POLICY_FILES = (".json", ".safetensors")
 """Endings of a policy's two files."""
@@ -50,6 +55,11 @@ class Contender:
     def is_policy(self) -> bool:
         """Whether it is a policy from a file, or from a folder of them."""
         return bool(self.algorithm) or self.path.endswith(POLICY_FILES)
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether it is the project's own bound, which alone is shown the environment."""
+        return not self.path and hasattr(CONTROLLERS.get(self.name), "see")
 
     @property
     def kinds(self) -> frozenset[str]:
@@ -103,9 +113,10 @@ class Contender:
         try:
             controller = factory()
         except Exception as error:
+            where = raised_at(error, Path(self.path)) or "a controller must need no arguments"
             raise ControllerError(
                 f"cannot make {self.source}: {factory.__name__}() raised "
-                f"{type(error).__name__}: {error}; a controller must need no arguments"
+                f"{type(error).__name__}: {error}; {where}"
             ) from error
         _check_protocol(self, controller)
         return controller
@@ -212,8 +223,40 @@ def _module(path: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except Exception as error:
         del sys.modules[name]
-        raise ControllerError(f"cannot import {path}: {type(error).__name__}: {error}") from error
+        where = raised_at(error, path)
+        at = f" ({where})" if where else ""
+        raise ControllerError(
+            f"cannot import {path}: {type(error).__name__}: {error}{at}"
+        ) from error
     return module
+
+
+def raised_at(error: BaseException, path: Path) -> str:
+    """Where in somebody's file an exception came from: the last frame of that file, in words.
+
+    Args:
+        error: as it was caught.
+        path: the file.
+    Returns:
+        `line 9 of mine.py`, and where that line's own calls raised it; empty if no frame is of it.
+    """
+    if not path.name:
+        return ""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [at for at, frame in enumerate(frames) if _same_file(frame.filename, path)]
+    if not own:
+        return ""
+    where, last = f"line {frames[own[-1]].lineno} of {path.name}", frames[-1]
+    # A helper beside the file is the author's too; a library's inside is not.
+    beside = Path(last.filename).resolve().parent == path.resolve().parent
+    if own[-1] < len(frames) - 1 and beside:
+        where += f", which calls line {last.lineno} of {Path(last.filename).name}"
+    return where
+
+
+def _same_file(name: str, path: Path) -> bool:
+    """Whether a frame's file is a path's, whatever links lead there."""
+    return Path(name).resolve() == path.resolve()
 
 
 def _check_protocol(contender: Contender, controller: object) -> None:
@@ -223,11 +266,11 @@ def _check_protocol(contender: Contender, controller: object) -> None:
         if not callable(found):
             raise ControllerError(
                 f"{contender.source} has no method {method}{arguments}; a controller needs reset "
-                "and act, see controllers/controller.py"
+                f"and act, see {PROTOCOL}"
             )
         try:
             inspect.signature(found).bind(None, None)
         except (TypeError, ValueError):
             raise ControllerError(
-                f"{contender.source}: {method} must take {arguments}, see controllers/controller.py"
+                f"{contender.source}: {method} must take {arguments}, see {PROTOCOL}"
             ) from None

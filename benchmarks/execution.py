@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from benchmarks.bound import achievable_bound
+from benchmarks.comparison.isolated import driver
 from benchmarks.processes import run_all
 from benchmarks.rollout import make_environment, rollout
 from benchmarks.score import Score, score_trial
@@ -108,7 +109,8 @@ def run_case(case: Case, suite: Suite) -> Outcome:
     environment = make_environment(
         case.task, case.model, case.pressure_kpa, suite.control_rate_hz, suite.noise
     )
-    done = rollout(environment, case.controller.make(), score.seed)
+    controller = driver(case.controller, environment.options.period, keep_pace=False)
+    done = rollout(environment, controller, score.seed, reveal=case.controller.is_bound)
     score = replace(score, steps=done.steps, step_seconds=done.step_seconds)
     if done.ended_by:
         end = f"ended after {done.steps / suite.control_rate_hz:.4g} s by a physical limit"

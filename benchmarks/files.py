@@ -4,6 +4,9 @@ from pathlib import Path
 
 from pma_gym.files import replace_file
 
+RESULTS = Path("results")
+"""Folder of a folder of results for each suite, where none is given."""
+
 
 def write_bytes(path: Path, content: bytes) -> None:
     """Write a file; an older one stays until the new one is complete.

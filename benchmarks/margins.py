@@ -192,8 +192,12 @@ def response_of(
     system: control.StateSpace, frequencies: NDArray[np.float64]
 ) -> NDArray[np.complex128]:
     """Frequency response of a system of one input and one output, shape (frequencies,)."""
-    at_z: Any = np.exp(1j * frequencies * float(system.dt))  # type: ignore[arg-type]
-    return np.asarray(system(at_z))
+    at_z = np.exp(1j * frequencies * float(system.dt))  # type: ignore[arg-type]
+    a, b, c, d = (np.asarray(each) for each in (system.A, system.B, system.C, system.D))
+    # All frequencies at once: python-control solves for one after the other.
+    states = np.linalg.solve(at_z[:, None, None] * np.eye(len(a)) - a, b[None].astype(complex))
+    response: Any = c @ states + d
+    return response[:, 0, 0]
 
 
 def closed_poles(loop: control.StateSpace) -> NDArray[np.complex128]:

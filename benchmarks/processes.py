@@ -4,10 +4,7 @@ import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from benchmarks.worker import ProcessDied, Worker, deaf_to_interrupt
-
-LOOK_S = 0.1
-"""How often to look whether a piece of work passed its limit (s)."""
+from benchmarks.worker import LOOK_S, ProcessDied, Worker, deaf_to_interrupt
 
 Work = Callable[[], object]
 """A piece of work; pickled to be run in another process."""

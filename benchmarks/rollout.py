@@ -1,5 +1,6 @@
 """One case, run: a controller drives an environment, and what happened comes back."""
 
+import copy
 import math
 import numbers
 import time
@@ -15,6 +16,7 @@ from benchmarks.contender import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
+from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
@@ -32,6 +34,7 @@ class Rollout:
         period: of the control steps (s).
         start: contraction that extension is counted from (m).
         position: true position (m or rad) at k / 384 s.
+        asked: volts that the controller returned, before they are held to 0-10 V, shape (steps,).
         commands: motor and regulator voltage (V) in force in every control step, shape (steps, 2).
         readings: at the steps' beginnings and the end: extension, rotation, load, pressure (SI),
             shape (steps + 1, 4).
@@ -45,6 +48,7 @@ class Rollout:
     period: float
     start: float
     position: NDArray[np.float64]
+    asked: NDArray[np.float64]
     commands: NDArray[np.float64]
     readings: NDArray[np.float64]
     truth: Mapping[str, NDArray[np.float64]]
@@ -78,6 +82,12 @@ class Rollout:
         )
 
     @property
+    def clipped(self) -> tuple[float, float]:
+        """Share of the steps that asked for volts outside 0-10 V, and the farthest beyond (V)."""
+        beyond = np.maximum(self.asked - HIGHEST_VOLTAGE, -self.asked)
+        return float(np.mean(beyond > 0.0)), float(np.max(beyond, initial=0.0))
+
+    @property
     def _zero(self) -> float:
         """What the position is counted from, as trials count it (m or rad)."""
         return self.start if self.task.protocol.quantity == "contraction" else 0.0
@@ -100,19 +110,25 @@ def make_environment(
 
 
 def rollout(
-    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None = None
+    environment: PMAEnv,
+    controller: Controller,
+    seed: int,
+    nominal: Model | None = None,
+    reveal: bool = False,
 ) -> Rollout:
     """Let a controller drive one episode, or the last of its repetitions.
 
     A controller with `repetitions` has driven so many episodes when this ends, all but the last to
-    practise: on the same station and reference, each with a noise of its own. One with a method
-    `see` is shown the environment before each.
+    practise: on the same station and reference, each with a noise of its own. It receives copies
+    of the reference, the station and the readings, and no environment.
 
     Args:
         environment: of one pressure.
         controller: who drives; reset first.
         seed: seed of the episode.
-        nominal: model that the controller is told, if the environment has another.
+        nominal: model that the controller receives, if the environment has another.
+        reveal: hand the environment to the controller's method `see` before each reset; only for
+            the oracle, which is no rival but the bound that rivals are measured by.
     Returns:
         What happened, to the last scored sample or to where a physical limit ended it.
     Raises:
@@ -120,9 +136,11 @@ def rollout(
         Exception: whatever the controller or the environment raised.
     """
     for practice in range(1, getattr(controller, "repetitions", 1)):
-        _drive(environment, controller, practice_seed(seed, practice), nominal, _Log())
+        _begin(environment, controller, practice_seed(seed, practice), nominal, reveal)
+        _drive(environment, controller, _Log())
     log = _Log()
-    _drive(environment, controller, seed, nominal, log)
+    _begin(environment, controller, seed, nominal, reveal)
+    _drive(environment, controller, log)
     return log.rollout(environment)
 
 
@@ -135,6 +153,7 @@ class _Log:
     """What is written down while an episode runs."""
 
     def __init__(self) -> None:
+        self.asked: list[float] = []
         self.commands: list[tuple[float, float]] = []
         self.readings: list[Reading] = []
         self.truths: list[tuple[float, float, float]] = []
@@ -159,6 +178,7 @@ class _Log:
             period=environment.options.period,
             start=self.start,
             position=environment.trajectory()[: last.first + last.samples],
+            asked=np.array(self.asked),
             commands=np.array(self.commands),
             readings=np.array([reading[1:] for reading in self.readings]),
             truth=dict(zip(("contraction", "load", "pressure"), truths, strict=True)),
@@ -168,18 +188,22 @@ class _Log:
         )
 
 
-def _drive(
-    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, log: _Log
+def _begin(
+    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, reveal: bool
 ) -> None:
-    """Run an episode to its end."""
+    """Reset the environment and the controller."""
     environment.reset(seed=seed)
-    see = getattr(controller, "see", None)
-    if see is not None:
-        see(environment)
+    if reveal:
+        controller.see(environment)  # type: ignore[attr-defined]
     station = environment.station
-    controller.reset(
-        environment.reference, station if nominal is None else replace(station, model=nominal)
-    )
+    if nominal is not None:
+        # A copy: whatever the controller does to it, the next case receives the same model.
+        station = replace(station, model=copy.copy(nominal))
+    controller.reset(environment.reference, station)
+
+
+def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
+    """Run an episode to its end."""
     log.see(environment)
     clock, ended = time.perf_counter, False
     while not ended:
@@ -187,17 +211,19 @@ def _drive(
         asked = clock()
         answer = controller.act(reading, now)
         answered = clock()
-        action = environment.action(_checked(answer, now))
+        volts = checked_volts(answer, now)
+        action = environment.action(volts)
         given = clock()
         _, _, terminated, truncated, _ = environment.step(action)
         log.step_seconds += clock() - given
+        log.asked.append(volts)
         log.act_seconds.append(answered - asked)
         log.commands.append((environment.motor_voltage, environment.regulator_voltage))
         log.see(environment)
         ended = terminated or truncated
 
 
-def _checked(volts: object, now: float) -> float:
+def checked_volts(volts: object, now: float) -> float:
     """A controller's answer as volts.
 
     Raises:

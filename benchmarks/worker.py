@@ -12,6 +12,9 @@ from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection, wait
 from multiprocessing.sharedctypes import RawValue
 
+LOOK_S = 0.1
+"""How often to look whether a piece of work passed its limit (s)."""
+
 LAST_WORDS_S = 5.0
 """How long a process may take to end when it is told to (s)."""
 
@@ -121,6 +124,21 @@ class Worker:
             return pickle.loads(content)
         except Exception as error:
             return RuntimeError(f"its result cannot be read back: {type(error).__name__}: {error}")
+
+    def ask(self, work: bytes) -> object:
+        """Hand over a pickled piece of work and wait for its result.
+
+        Raises:
+            TookTooLong: it passed a limit of its own.
+            ProcessDied: the process ended before.
+        """
+        self.give(work)
+        # A process that the dead one left behind may still hold the connection.
+        while not self._connection.poll(LOOK_S) and self._process.is_alive():
+            late = self.overdue()
+            if late is not None:
+                raise late
+        return self.result()
 
     def overdue(self) -> TookTooLong | None:
         """What it is at too long, or None."""

@@ -10,6 +10,9 @@ ACCURACY = 1e-5
 
 MOST_ITERATIONS = 2000
 
+Problem = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+"""Entries of H's upper triangle, q, low and high."""
+
 
 class BoundedProgram:
     """Least v' H v / 2 + q' v with low <= v <= high, again and again with other numbers.
@@ -17,7 +20,9 @@ class BoundedProgram:
     If what minimises without limits keeps them, it is the answer, and found as the solution of
     H v = -q. Else OSQP searches, from the last answer on. It is set up when it is first needed and
     counts iterations, never time, so that the same problems in the same order have the same
-    answers to the last bit, on a busy machine too.
+    answers to the last bit, on a busy machine too. A copy, or one from a pickle, has no solver of
+    its own until it needs one: then it solves the problems of the original again, in their order,
+    and so goes on with the same bits.
 
     Args:
         count: how many variables.
@@ -31,12 +36,27 @@ class BoundedProgram:
     """
 
     def __init__(self, count: int) -> None:
-        self.osqp = imported_osqp()
+        self._count = count
         self.limited = self.failures = 0
+        self._problems: list[Problem] = []
+        self._prepare()
+
+    def _prepare(self) -> None:
+        """Make what no copy can hold."""
+        self.osqp = imported_osqp()
         self._solver: Any = None
         (self._positive_solve,) = get_lapack_funcs(("posv",))
         # OSQP wants the upper triangle, column by column.
-        self._columns, self._rows = np.tril_indices(count)
+        self._columns, self._rows = np.tril_indices(self._count)
+
+    def __getstate__(self) -> tuple[int, int, int, list[Problem]]:
+        """What a copy is made from: the counts, and the problems that OSQP was given."""
+        return self._count, self.limited, self.failures, list(self._problems)
+
+    def __setstate__(self, state: tuple[int, int, int, list[Problem]]) -> None:
+        """Go on where the original stood."""
+        self._count, self.limited, self.failures, self._problems = state
+        self._prepare()
 
     def solve(
         self, square: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
@@ -62,15 +82,22 @@ class BoundedProgram:
         self, square: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
     ) -> np.ndarray | None:
         entries = square[self._rows, self._columns]
-        if self._solver is None:
-            self._solver = self._set_up(entries, linear, low, high)
-        else:
-            self._solver.update(Px=entries, q=linear, l=low, u=high)
-        result = self._solver.solve(raise_error=False)
+        self._problems.append((entries, linear.copy(), low.copy(), high.copy()))
+        unsolved = self._problems if self._solver is None else self._problems[-1:]
+        result = [self._solved(*problem) for problem in unsolved][-1]
         if result.info.status_val != self.osqp.SolverStatus.OSQP_SOLVED:
             return None
         # OSQP keeps limits to its accuracy only.
         return np.clip(result.x, low, high)
+
+    def _solved(
+        self, entries: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray
+    ) -> Any:  # noqa: ANN401
+        if self._solver is None:
+            self._solver = self._set_up(entries, linear, low, high)
+        else:
+            self._solver.update(Px=entries, q=linear, l=low, u=high)
+        return self._solver.solve(raise_error=False)
 
     def _set_up(
         self, entries: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray

@@ -50,6 +50,10 @@ class Foresight:
         shared = self._jobs, self._taken, self._attempts
         self._addresses = [array.ctypes.data for array in shared]
 
+    def __deepcopy__(self, memo: dict[int, object]) -> "Foresight":
+        """One with arrays of its own; the compiled plant never changes and is shared."""
+        return Foresight(self.plant, self._time)
+
     def __call__(
         self, condition: Condition, commands: Commands, plans: int
     ) -> dict[str, NDArray[np.float64]]:

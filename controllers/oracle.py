@@ -20,6 +20,7 @@ cable hangs loose: it gives no slope to follow.
 It is close to the optimum, not proven to be it.
 """
 
+import copy
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -71,6 +72,13 @@ class Oracle:
     def see(self, environment: "PMAEnv") -> None:
         """Be shown the environment that it drives; after the environment's own reset."""
         self._environment = environment
+
+    def __deepcopy__(self, memo: dict[int, object]) -> "Oracle":
+        """A copy with a plan of its own that is shown the same environment."""
+        memo[id(self._environment)] = self._environment
+        copied = Oracle()
+        copied.__dict__ |= copy.deepcopy(self.__dict__, memo)
+        return copied
 
     def reset(self, reference: Reference, station: Station) -> None:
         """Look at the true station, and compute what its inverse needs.

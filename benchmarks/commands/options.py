@@ -6,7 +6,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
-RESULTS = Path("results")
+from benchmarks.files import RESULTS  # noqa: F401 (the commands take it from here)
+
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells have it."""
 

@@ -1,4 +1,4 @@
-"""The commands about frozen suites: `run`, `report`, `add` and `suites`."""
+"""The commands about frozen suites: `run`, `report`, `add`, `remove` and `suites`."""
 
 import sys
 from pathlib import Path
@@ -15,6 +15,7 @@ def register(app: typer.Typer) -> None:
     app.command()(run)
     app.command()(report)
     app.command()(add)
+    app.command()(remove)
     app.command()(suites)
 
 
@@ -97,6 +98,26 @@ def add(
         print("Interrupted before the first case; run it again", file=sys.stderr)
         code = INTERRUPTED
     raise typer.Exit(code)
+
+
+def remove(
+    controller: Annotated[str, typer.Argument(help="Name as the journal has it: the class.")],
+    suite: Annotated[str, typer.Option(help="Suites by commas; all if empty.")] = "",
+    results: Annotated[
+        Path, typer.Option(help="Folder with a folder of results for each suite.")
+    ] = RESULTS,
+) -> None:
+    """Take a controller's rows out of the journals; the rows of all others stay as they are."""
+    from benchmarks.comparison.remove import remove_controller
+    from benchmarks.comparison.suite import frozen_suite, suite_names
+    from benchmarks.suite import SuiteError
+
+    try:
+        frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
+        for path, count in remove_controller(controller, frozen, results).items():
+            print(f"{path}: {count} rows of {controller} removed; write its page anew by `report`")
+    except SuiteError as error:
+        refuse(error)
 
 
 def suites() -> None:

@@ -9,11 +9,12 @@ from rich.markup import escape
 from rich.progress import Progress
 
 from benchmarks.comparison.case import BY_LIMIT, Row
+from benchmarks.comparison.command_lines import remove_command, run_command
 from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
 from benchmarks.comparison.guard import probe
 from benchmarks.comparison.leaderboard import read_leaderboard
 from benchmarks.comparison.provenance import check_folder, run_info, write_run
-from benchmarks.comparison.scores import print_failures
+from benchmarks.comparison.scores import print_clipping, print_failures
 from benchmarks.comparison.standings import Standings
 from benchmarks.comparison.suite import FrozenSuite
 from benchmarks.contender import Contender, ControllerError
@@ -36,7 +37,7 @@ def own_contender(text: str) -> Contender:
     """The controller of `path/to/file.py:ClassName`, tried in a process of its own.
 
     Raises:
-        ControllerError: it cannot be made, or takes too long to; says why and the mend.
+        ControllerError: it cannot be made, or takes too long to; says why and what to do.
     """
     path, colon, name = text.rpartition(":")
     if not colon or not path or not name:
@@ -90,6 +91,7 @@ def run_add(
         complete = _run(todo, out, jobs, rows, console)
         write_run(out, info, complete=bool(complete))
         failed |= any(row["failure"] for row in rows)
+        print_clipping(rows, console)
         print_failures(rows, console)
         if complete is None:
             console.print(
@@ -128,9 +130,12 @@ def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) ->
         try:
             done = execute(todo, jobs, out, on_done, wary=True)
         except _EnoughError:
+            (contender,) = {case.contender for case in todo.cases}
+            suite = todo.suite
             console.print(
                 f"  {ENOUGH} cases failed: the other {len(todo.cases) - len(rows)} are "
-                "not run; mend it and run the same command again",
+                "not run; correct it and run the same command again, or take its rows out: "
+                f"{remove_command(contender.name, suite, out)}",
                 highlight=False,
             )
             return False
@@ -147,7 +152,7 @@ def _say_ranks(contender: Contender, suite: FrozenSuite, out: Path, console: Con
     if not others:
         console.print(
             f"  no other controller has results in {out} made with this code; for a rank: "
-            f"python -m benchmarks run --suite {suite.source}",
+            f"{run_command(suite, out)}",
             highlight=False,
         )
 

@@ -1,11 +1,13 @@
 """One case: a controller drives one episode of a suite, and a row says what came of it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
+
+import numpy as np
 
 from benchmarks.comparison.figures import Episode as Measured
 from benchmarks.comparison.figures import figures
-from benchmarks.comparison.guard import Guarded
+from benchmarks.comparison.isolated import Isolated, driver
 from benchmarks.comparison.suite import Entry, Episode, FrozenSuite, frozen_suite
 from benchmarks.contender import Contender
 from benchmarks.rollout import Rollout, rollout
@@ -67,7 +69,7 @@ def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
 
 
 def run_case(case: Case, model: Model | None = None) -> Row:
-    """Run a case; somebody's own controller under guard.
+    """Run a case; somebody's own controller in a process of its own.
 
     Args:
         case: the case.
@@ -84,14 +86,18 @@ def run_case(case: Case, model: Model | None = None) -> Row:
         pressure_kpa=case.episode.pressure_kpa,
         **suite.environment,
     )
-    period = environment.options.period
-    controller = Guarded(contender, period) if contender.path else contender.make()
+    controller = driver(contender, environment.options.period)
     told = told_model(environment.task, suite.nominal)
-    done = rollout(environment, controller, suite.seed_of(case.episode), told)
+    seed = suite.seed_of(case.episode)
+    done = rollout(environment, controller, seed, told, reveal=contender.is_bound)
+    if isinstance(controller, Isolated):
+        done = replace(done, act_seconds=np.array(controller.act_seconds))
+    share, farthest = done.clipped
+    clipped = {"clipped_share": share, "clipped_v": farthest}
     if done.ended_by:
         end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
-        return blank_row(case) | {"failure": end}
-    return blank_row(case) | _figures(done, environment)
+        return blank_row(case) | {"failure": end} | clipped
+    return blank_row(case) | _figures(done, environment) | clipped
 
 
 def _figures(done: Rollout, environment: PMAEnv) -> Row:

@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from benchmarks.comparison.statistics import Draws, resample
 from benchmarks.comparison.suite import NOMINAL, Entry, Episode, FrozenSuite
 from benchmarks.contender import Contender
-from controllers import CONTROLLERS
 from controllers.designs import kind_of
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.tasks import EVERY_TASK, Task, named_task
@@ -237,4 +236,4 @@ class Record:
 
 def is_bound(name: str) -> bool:
     """Whether a controller may see the true plant: no rival, but what rivals are measured by."""
-    return hasattr(CONTROLLERS.get(name), "see")
+    return Contender(name).is_bound

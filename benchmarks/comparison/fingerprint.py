@@ -25,6 +25,7 @@ SOURCES = (
     "benchmarks/comparison/case.py",
     "benchmarks/comparison/figures.py",
     "benchmarks/comparison/guard.py",
+    "benchmarks/comparison/isolated.py",
     "benchmarks/comparison/recipe.py",
     "benchmarks/comparison/stations.py",
     "benchmarks/comparison/suite.py",

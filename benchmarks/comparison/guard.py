@@ -1,11 +1,10 @@
 """What stands between somebody's own controller and a run: time limits, errors in plain words."""
 
 import time
-import traceback
 from collections import deque
 from pathlib import Path
 
-from benchmarks.contender import Contender, ControllerError
+from benchmarks.contender import Contender, ControllerError, raised_at
 from benchmarks.worker import begin_limited, end_limited
 from controllers.controller import Controller, Reference
 from pma_gym.envs import Reading, Station
@@ -28,19 +27,20 @@ _clock = time.perf_counter
 class Guarded:
     """A controller that is watched.
 
-    Everything else that it has (`repetitions`, `see`...) shows through.
+    Everything else that it has (`repetitions`...) shows through.
 
     Args:
         contender: whose controller is made and watched.
         period: of the control steps (s).
+        keep_pace: whether `act` must keep up with the clock.
     Raises:
         ControllerError: the controller cannot be made.
     """
 
-    def __init__(self, contender: Contender, period: float) -> None:
+    def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
         self._controller = _made(contender)
         self.name = str(getattr(self._controller, "name", contender.name))
-        self._file, self._period = contender.path, period
+        self._file, self._period, self._keep_pace = contender.path, period, keep_pace
         self._latest: deque[float] = deque(maxlen=max(1, round(LATE_S / period)))
 
     def __getattr__(self, name: str) -> object:
@@ -78,7 +78,7 @@ class Guarded:
         finally:
             end_limited()
         self._latest.append(_clock() - began)
-        if len(self._latest) == self._latest.maxlen:
+        if self._keep_pace and len(self._latest) == self._latest.maxlen:
             self._check_pace(sum(self._latest) / len(self._latest))
         return answer
 
@@ -92,9 +92,7 @@ class Guarded:
 
     def _told(self, method: str, error: BaseException, when: str) -> ControllerError:
         """What it raised, in words that say where to mend it."""
-        frames = traceback.extract_tb(error.__traceback__)
-        own = [frame for frame in frames if Path(frame.filename) == Path(self._file).resolve()]
-        where = f"line {own[-1].lineno} of {Path(self._file).name}" if own else "outside its file"
+        where = raised_at(error, Path(self._file)) or "outside its file"
         return ControllerError(f"{method} raised {type(error).__name__}: {error} ({where}, {when})")
 
 

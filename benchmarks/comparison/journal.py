@@ -4,13 +4,17 @@ import json
 import os
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 from benchmarks.comparison.case import Row
 from benchmarks.damaged import say_damaged
+from benchmarks.suite import SuiteError
 from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape
 from pma_gym.documents import parse_json
+from pma_gym.files import replace_file
 from pma_gym.limits import limit
 
 JOURNAL = "journal.jsonl"
@@ -66,7 +70,7 @@ class Journal:
 
     def __init__(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        self._file = _opened(path)
         size = os.fstat(self._file).st_size
         if size and os.pread(self._file, 1, size - 1) != b"\n":
             os.write(self._file, b"\n")
@@ -101,6 +105,69 @@ class Journal:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _opened(path: Path) -> int:
+    """The file, locked against being rewritten while it is appended to."""
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        _lock(file, exclusive=False)
+        # Another process may have put a rewritten journal in its place meanwhile.
+        if path.exists() and os.path.samestat(os.fstat(file), path.stat()):
+            return file
+        os.close(file)
+
+
+def _lock(file: int, exclusive: bool) -> None:
+    """Lock a file until it is closed: appending processes share it, a rewriting one has it alone.
+
+    Raises:
+        BlockingIOError: wanted alone, and others append.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows refuses to replace an open file.
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB if exclusive else fcntl.LOCK_SH)
+    except BlockingIOError:
+        raise
+    except OSError:
+        # Some network file systems have no locks.
+        return
+
+
+@dataclass
+class Lines:
+    """Lines of a journal that is rewritten, each with its end.
+
+    Attributes:
+        lines: as they were read; whoever rewrites puts others in their place.
+    """
+
+    lines: list[bytes]
+
+
+@contextmanager
+def rewriting(path: Path) -> Iterator[Lines]:
+    """The lines of a journal, to be changed inside; the file is then replaced as a whole.
+
+    Raises:
+        SuiteError: a run is appending to it.
+    """
+    file = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            _lock(file, exclusive=True)
+        except BlockingIOError:
+            raise SuiteError(
+                f"a run is writing to {path}; wait until it is done, or end it, and try again"
+            ) from None
+        lines = Lines(path.read_bytes().splitlines(keepends=True))
+        yield lines
+        replace_file(path, b"".join(lines.lines))
+    finally:
+        os.close(file)
 
 
 def read_rows(path: Path) -> Iterator[Row]:

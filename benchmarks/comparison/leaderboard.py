@@ -2,11 +2,12 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bound import achievable_bound
+from benchmarks.comparison.bounds import Bounds
+from benchmarks.comparison.command_lines import run_command
 from benchmarks.comparison.errors import (
     Errors,
     Measure,
@@ -18,7 +19,7 @@ from benchmarks.comparison.errors import (
 from benchmarks.comparison.provenance import check_run, finished_rows, read_run
 from benchmarks.comparison.standings import Standings
 from benchmarks.comparison.suite import Entry, FrozenSuite
-from benchmarks.comparison.verdicts import Verdict, verdicts
+from benchmarks.comparison.verdicts import Verdict, bounds_needed, verdicts
 from benchmarks.margins import Condition, conditions, is_linear
 from benchmarks.suite import SuiteError
 from controllers import CONTROLLERS
@@ -37,10 +38,12 @@ class Leaderboard:
     Attributes:
         record: the suite and its rows.
         info: what the run was made with; empty if that is not known.
+        bounds: achievable bounds on the suite's model; computed here, and not kept, if None.
     """
 
     record: Record
     info: Mapping[str, Any]
+    bounds: Bounds | None = None
 
     @property
     def suite(self) -> FrozenSuite:
@@ -93,12 +96,22 @@ class Leaderboard:
     @cached_property
     def verdicts(self) -> list[Verdict]:
         """The suite's targets; only what all cases have been run for has a figure."""
-        known = {name: each for name, each in self.standings.items() if self.whole(each)}
+        known = self._whole_standings
         units = {name: each.errors.measure.unit for name, each in self.standings.items()}
         return verdicts(self.suite.targets, known, self.labels, units, self._bound)
 
-    def _bound(self, task: str, pressure_kpa: float) -> float:
-        return least_return_error(self.suite.model, task, pressure_kpa)
+    def start_bounds(self) -> None:
+        """Let other processes compute the bounds that the targets need."""
+        if self.bounds is not None:
+            self.bounds.start(bounds_needed(self.suite.targets, self._whole_standings))
+
+    @cached_property
+    def _whole_standings(self) -> dict[str, Standings]:
+        return {name: each for name, each in self.standings.items() if self.whole(each)}
+
+    @cached_property
+    def _bound(self) -> Bounds:
+        return self.bounds or Bounds(self.suite.model)
 
     @property
     def missing(self) -> list[Entry]:
@@ -141,30 +154,36 @@ class Leaderboard:
         ]
 
 
-@cache
-def least_return_error(model: str, task: str, pressure_kpa: float) -> float:
-    """The achievable bound of phase III (mm or deg), computed once."""
-    return achievable_bound(model, task, pressure_kpa)["III"]
-
-
-def read_leaderboard(suite: FrozenSuite, folder: Path) -> Leaderboard:
+def read_leaderboard(suite: FrozenSuite, folder: Path, bounds: Bounds | None = None) -> Leaderboard:
     """The leaderboard of the results in a folder.
 
+    Args:
+        suite: the suite.
+        folder: of the results.
+        bounds: achievable bounds on the suite's model.
     Raises:
         SuiteError: there are none, or they are of another suite or version.
     """
     info, rows = read_run(folder), finished_rows(folder)
     if not rows:
         raise SuiteError(
-            f"{folder} has no results of suite {suite.name}; make some: python -m benchmarks run "
-            f"--suite {suite.source}"
+            f"{folder} has no results of suite {suite.name}; make some: "
+            f"{run_command(suite, folder)}"
         )
     ran = info.get("suite", {})
     if (ran.get("name"), ran.get("digest")) != (suite.name, suite.digest):
         raise SuiteError(
             f"{folder} has results of suite {ran.get('name')} version {ran.get('version')} with "
             f"other numbers than {suite.source} version {suite.version} has now; run it again: "
-            f"python -m benchmarks run --suite {suite.source}"
+            f"{run_command(suite, folder)}"
         )
     check_run(folder, info, suite.source)
-    return Leaderboard(Record.of(suite, rows), info)
+    return Leaderboard(Record.of(suite, rows), info, bounds)
+
+
+def keep_bounds(suite: FrozenSuite, folder: Path) -> None:
+    """Compute the achievable bounds that the targets need, and keep them for the page."""
+    with Bounds(suite.model, folder) as bounds:
+        leaderboard = read_leaderboard(suite, folder, bounds)
+        leaderboard.start_bounds()
+        _ = leaderboard.verdicts

@@ -52,8 +52,8 @@ def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     return blocks + _origin_blocks(leaderboard)
 
 
-def page_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
-    """Every plot that there are figures for, as PNG by name."""
+def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Every plot of the scores that there are figures for, as PNG by name."""
     styles = styles_of(leaderboard.labels)
     pictures: dict[str, bytes] = {}
     single = _shown(leaderboard, pooled=False)
@@ -64,9 +64,13 @@ def page_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     headline = _headline(leaderboard)
     if headline is not None and len(headline.errors.names) > 1:
         pictures["improvement"] = improvement_plot(headline, styles)
-    for task, found in leaderboard.loops.items():
-        pictures[f"loops_{task}"] = loop_plot(found, styles)
     return pictures
+
+
+def loop_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Plots of the linear controllers' loops, as PNG by name."""
+    styles = styles_of(leaderboard.labels)
+    return {f"loops_{task}": loop_plot(found, styles) for task, found in leaderboard.loops.items()}
 
 
 def _opening(leaderboard: Leaderboard) -> list[Block]:
@@ -177,7 +181,8 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
 
 def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
     text = (
-        "Medians over the cases that did not fail; “saturated” is a mean. Effort is the standard "
+        "Medians over the cases that did not fail; “saturated” and “clipped” are means. A command "
+        "below 0 V or above 10 V is clipped to there. Effort is the standard "
         "deviation of the voltage, variation its total variation a second. Soft limits are the "
         "reach of table I3; 100 % of the way beyond them the episode ends. Real-time factor: how "
         "often the 99th percentile of the computing time fits into a control period."

@@ -3,16 +3,24 @@
 import csv
 import io
 import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.background import Background
+from benchmarks.comparison.bounds import Bounds
 from benchmarks.comparison.leaderboard import Leaderboard, read_leaderboard
-from benchmarks.comparison.page import page_blocks, page_pictures
+from benchmarks.comparison.page import loop_pictures, page_blocks, score_pictures
 from benchmarks.comparison.standings import Pair
 from benchmarks.comparison.statistics import Interval
 from benchmarks.comparison.suite import FrozenSuite
 from benchmarks.files import write_bytes, write_text
+from pma_gym.cli.progress import StepProgress
 from pma_gym.pages.document import to_html, to_markdown
+
+OnStep = Callable[[str, int, int], None]
 
 PLOTS = "plots"
 NUMBERS, PAIRS = "leaderboard.csv", "pairs.csv"
@@ -20,7 +28,7 @@ PAGE, TEXT = "report.html", "report.md"
 
 
 def run_report(suite: FrozenSuite, results: Path, out: Path) -> Path:
-    """Read a run's results and write the page.
+    """Read a run's results and write the page; says on stderr what it is at.
 
     Args:
         suite: the suite that was run.
@@ -31,20 +39,34 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> Path:
     Raises:
         SuiteError: there are no results of this suite and version.
     """
-    return write_leaderboard(read_leaderboard(suite, results), out)
+    with Bounds(suite.model, out) as bounds, StepProgress() as progress:
+        return write_leaderboard(read_leaderboard(suite, results, bounds), out, progress)
 
 
-def write_leaderboard(leaderboard: Leaderboard, out: Path) -> Path:
+def write_leaderboard(
+    leaderboard: Leaderboard, out: Path, progress: OnStep = lambda *step: None
+) -> Path:
     """Write the page, as HTML, Markdown and pictures, and the numbers behind it.
 
     Args:
         leaderboard: what is to be shown.
         out: folder; made if need be.
+        progress: called with a step's name, how much of it is done, and of how much.
     Returns:
         The page.
     """
-    pictures = page_pictures(leaderboard)
+    leaderboard.start_bounds()
+    # Without the bounds, which are computed in processes of their own.
+    with Background(partial(score_pictures, replace(leaderboard, bounds=None))) as plots:
+        _compute(leaderboard, progress)
+        progress("plots", 0, 2)
+        of_loops = loop_pictures(leaderboard)
+        progress("plots", 1, 2)
+        pictures = plots.result() | of_loops
+        progress("plots", 2, 2)
+    progress("achievable bounds", 0, 1)
     blocks = page_blocks(leaderboard)
+    progress("achievable bounds", 1, 1)
     texts = {
         TEXT: to_markdown(blocks, pictures, PLOTS),
         PAGE: to_html(blocks, pictures),
@@ -59,6 +81,18 @@ def write_leaderboard(leaderboard: Leaderboard, out: Path) -> Path:
     for name, text in texts.items():
         write_text(out / name, text)
     return out / PAGE
+
+
+def _compute(leaderboard: Leaderboard, progress: OnStep) -> None:
+    """Compute what takes its time, a step after the other; the leaderboard keeps it."""
+    every = [*leaderboard.standings.values(), *leaderboard.by_task.values()]
+    for done, each in enumerate(every):
+        progress("standings and their intervals", done, len(every))
+        _ = each.rows, each.pairs
+    progress("standings and their intervals", len(every), len(every))
+    progress("loops and margins", 0, 1)
+    _ = leaderboard.loops
+    progress("loops and margins", 1, 1)
 
 
 def numbers_csv(leaderboard: Leaderboard) -> str:

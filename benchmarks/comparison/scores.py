@@ -28,7 +28,7 @@ WHO = (
 )
 FIGURES = (
     *("rmse", "start_rmse", "steady_rmse", "effort_v", "variation_v_per_s"),
-    *("saturation_share", "violation"),
+    *("saturation_share", "violation", "clipped_share", "clipped_v"),
 )
 TIMES = ("act_us", "act_us_worst")
 """Columns of scores.csv: a row a case, errors in its unit; the RMSE of every phase stands between
@@ -76,7 +76,24 @@ def print_scores(
             _figure([row["act_us"] for row in done]),
         )
     console.print(table)
+    print_clipping(rows, console)
     print_failures(rows, console)
+
+
+def print_clipping(rows: Sequence[Row], console: Console) -> None:
+    """Whose commands were clipped to 0-10 V: how often, in how many cases, by how much."""
+    for name in dict.fromkeys(row["controller"] for row in rows):
+        mine = [row for row in rows if row["controller"] == name and "clipped_share" in row]
+        clipped = [row for row in mine if row["clipped_share"] > 0.0]
+        if clipped:
+            share = 100.0 * sum(row["clipped_share"] for row in mine) / len(mine)
+            most = max(row["clipped_v"] for row in clipped)
+            console.print(
+                f"  {name}: {share:.2g} % of its commands were below 0 V or above 10 V, by up to "
+                f"{most:.3g} V, in {len(clipped)} of {len(mine)} cases; clipped to 0-10 V",
+                markup=False,
+                highlight=False,
+            )
 
 
 def print_failures(rows: Sequence[Row], console: Console) -> None:

@@ -24,6 +24,9 @@ class Spending(NamedTuple):
         effort_v: standard deviation of the voltage (V).
         variation_v_per_s: total variation of the voltage (V/s).
         saturated_percent: mean share of the control steps at 0 or 10 V (%).
+        clipped_percent: mean share of the control steps whose command, below 0 V or above 10 V,
+            was clipped (%).
+        clipped_v: how far beyond 0-10 V a command of any case was (V).
         violating_percent: share of the cases that passed a soft limit (%).
         violation_percent: the largest violation of any case (% of the way to the hard limit).
         act_us: computing time of `act` (us).
@@ -40,6 +43,8 @@ class Spending(NamedTuple):
     effort_v: float
     variation_v_per_s: float
     saturated_percent: float
+    clipped_percent: float
+    clipped_v: float
     violating_percent: float
     violation_percent: float
     act_us: float
@@ -61,7 +66,7 @@ def _of_one(record: Record, measure: Measure, name: str) -> Spending:
     done = [row for row in rows if not row["failure"]]
 
     def column(field: str) -> np.ndarray:
-        return np.array([row[field] for row in done] or [np.nan], dtype=np.float64)
+        return np.array([row.get(field, np.nan) for row in done] or [np.nan], dtype=np.float64)
 
     largest = [max(phase["largest_error"] for phase in row["phases"].values()) for row in done]
     worst_us = float(np.median(column("act_us_worst")))
@@ -76,6 +81,8 @@ def _of_one(record: Record, measure: Measure, name: str) -> Spending:
         effort_v=float(np.median(column("effort_v"))),
         variation_v_per_s=float(np.median(column("variation_v_per_s"))),
         saturated_percent=100.0 * float(np.mean(column("saturation_share"))),
+        clipped_percent=100.0 * float(np.mean(column("clipped_share"))),
+        clipped_v=float(np.max(column("clipped_v"))),
         violating_percent=100.0 * float(np.mean(column("violation") > 0.0)) if done else np.nan,
         violation_percent=100.0 * float(np.max(column("violation"))),
         act_us=float(np.median(column("act_us"))),

@@ -19,7 +19,7 @@ from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.envs.options import parse_options
 from pma_gym.limits import LimitError
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import Model, is_path, load_model, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
 
 SCHEMA = 2
@@ -267,7 +267,9 @@ def frozen_suite(source: str) -> FrozenSuite:
     Raises:
         SuiteError: there is none, or its file is not as it should be; names the file and the mend.
     """
-    path = Path(source) if source.endswith(".toml") else SUITES / f"{source}.toml"
+    path = Path(source) if is_path(source) else SUITES / f"{source}.toml"
+    if is_path(source) and missing_file(path):
+        raise SuiteError(missing_file(path))
     if not is_file(path):
         near = difflib.get_close_matches(source, suite_names(), 1)
         hint = f"; did you mean {near[0]}?" if near else ""

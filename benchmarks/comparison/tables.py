@@ -61,6 +61,7 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
     """Start and steady errors, effort, limits, computing time."""
     header = ["Controller", f"RMSE ({unit}) | first 0.5 s", f"RMSE ({unit}) | the rest"]
     header += [f"Largest error ({unit})", "Effort (V)", "Variation (V/s)", "Saturated (%)"]
+    header += ["Clipped | % of steps", "Clipped | at most by (V)"]
     header += ["Beyond a soft limit | % of cases", "Beyond a soft limit | at most (%)"]
     header += ["act (us) | median", "act (us) | 99 %", "Real-time factor", "Failed"]
     cells = [
@@ -69,6 +70,8 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
             *map(figure, (row.start, row.steady, row.largest)),
             *map(figure, (row.effort_v, row.variation_v_per_s)),
             _short(row.saturated_percent),
+            _short(row.clipped_percent),
+            figure(row.clipped_v),
             _short(row.violating_percent),
             _short(row.violation_percent),
             *map(figure, (row.act_us, row.act_us_worst, row.real_time_factor)),

@@ -2,7 +2,7 @@
 
 import gymnasium as gym
 
-from pma_gym.envs.knowledge import Reading, Station
+from pma_gym.envs.knowledge import Reading, Reference, Station
 from pma_gym.envs.options import Options
 from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.reward_function import RewardFunction
@@ -45,7 +45,8 @@ __all__ = [
     "PMAEnv",
     "PMAVectorEnv",
     "Reading",
-    "StateError",
+    "Reference",
     "RewardFunction",
+    "StateError",
     "Station",
 ]

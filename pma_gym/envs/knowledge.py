@@ -1,11 +1,47 @@
-"""What a controller may know: the station before a trial, the sensors' readings during it."""
+"""What a controller may know: the station before a trial, the sensors' readings during it.
 
+All of it is detached: copies that hold no environment, so that neither the true state nor anything
+that the simulation reads can be reached or changed through them.
+"""
+
+import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from pma_gym.data.protocol import Protocol
 from pma_gym.envs.options import rest_load
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The reference of a trial, to be called with a time (s) since the trial began.
+
+    It returns extension or contraction (m) or rotation (rad), past and future; where an exercise
+    prescribes a moment, the moment's excess (N m), which is to be 0.
+
+    Attributes:
+        protocol: a copy of the task's protocol.
+    """
+
+    protocol: Protocol
+
+    def __call__(self, time: float) -> float:
+        """The reference at a time (s)."""
+        return self.protocol.at(time)
+
+
+def detached_task(task: Task) -> Task:
+    """A copy of a task that shares nothing mutable with it.
+
+    A motion of the user's own that cannot be copied is shared: it is the user's, not the plant's.
+    """
+    try:
+        return copy.deepcopy(task)
+    except Exception:
+        motion = task.protocol.motion
+        return copy.deepcopy(task, {id(motion): motion})
 
 
 @dataclass(frozen=True)
@@ -13,8 +49,8 @@ class Station:
     """What a controller may know of the station before a trial.
 
     Attributes:
-        model: the nominal model, also where the plant's own is drawn anew at every reset.
-        task: the task, with its protocol.
+        model: the nominal model, also where the plant's own is drawn anew at every reset; a copy.
+        task: the task, with its protocol; a copy.
         pressure: gauge pressure that the trial begins at (Pa).
         period: time of a control step (s).
         action_delay: how late a command reaches the station (s), whole periods.

@@ -1,5 +1,6 @@
 """The environment: a task on a plant, seen through the plant's sensors."""
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
@@ -16,7 +17,7 @@ from pma_gym.envs.command import CommandLine
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.kernel_writer import BAD_ACTION
-from pma_gym.envs.knowledge import Reading, Station
+from pma_gym.envs.knowledge import Reading, Reference, Station, detached_task
 from pma_gym.envs.options import (
     Pressure,
     check_known,
@@ -502,11 +503,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     @property
     def station(self) -> Station:
-        """What a controller may know: what it was designed with and how it is driven."""
+        """What a controller may know, in copies: what it was designed with, how it is driven."""
         options = self.options
         return Station(
-            self._engine.told,
-            self.task,
+            copy.copy(self._engine.told),
+            self._detached_task,
             self.pressure,
             options.period,
             options.action_delay * options.period,
@@ -554,9 +555,15 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         """Voltage of the task's actuator that the station heard in every step so far (V)."""
         return self._engine.voltages[: self._count].copy()
 
-    def reference(self, time: float) -> float:
-        """The reference at a time (s): extension, contraction (m) or rotation (rad)."""
-        return self.task.protocol.at(time)
+    @property
+    def reference(self) -> Reference:
+        """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
+        return Reference(self._detached_task.protocol)
+
+    @cached_property
+    def _detached_task(self) -> Task:
+        """What controllers get of the task; made once, so that repeated trials have equal ones."""
+        return detached_task(self.task)
 
     def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
         """The action that commands these voltages (V), held to 0-10 V.

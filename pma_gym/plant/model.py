@@ -1,6 +1,7 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
+import os
 import reprlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -11,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from pma_gym.documents import DocumentError, is_file, read_toml
+from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.limits import LimitError
@@ -207,15 +208,58 @@ def load_model(source: "str | Path | Model") -> Model:
     shipped = shipped_models()
     if str(source) in shipped:
         return _read(shipped[str(source)])
-    path = Path(source)
-    if path.suffix == ".toml" and is_file(path):
-        return _read(path)
+    if is_path(source):
+        return _read(_existing(Path(source)))
     near = difflib.get_close_matches(str(source), list(shipped), 1)
     hint = f"; did you mean {near[0]!r}?" if near else ""
     raise ModelError(
         f"no model {str(source)[:200]!r}: give a shipped name ({', '.join(shipped)}) "
         f"or the path of a .toml file{hint}"
     )
+
+
+def is_path(source: str | Path) -> bool:
+    """Whether text names a file, not something shipped: it has a separator or ends in .toml.
+
+    >>> [is_path(text) for text in ("station", "station.toml", "mine/station")]
+    [False, True, True]
+    """
+    text = str(source)
+    separators = {os.sep, os.altsep or os.sep, "/"}
+    return text.endswith(".toml") or any(each in text for each in separators)
+
+
+def missing_file(path: Path, ending: str = ".toml") -> str:
+    """Why a path cannot be read as a file of one ending, and what to do; empty if it can be.
+
+    Args:
+        path: as it was given.
+        ending: how the file's name must end.
+    """
+    if path.is_dir():
+        return f"{path} is a folder; give the path of a {ending} file in it"
+    if path.is_file():
+        return "" if path.suffix == ending else f"{path} must end in {ending}; rename it"
+    if path.exists():
+        return f"{path} is no ordinary file; give the path of a {ending} file"
+    where = "" if path.is_absolute() else f" in {Path.cwd()}"
+    if not path.parent.is_dir():
+        return f"no such file {path}{where}: there is no folder {path.parent}; check the path"
+    stems = [each.stem for each in path.parent.glob(f"*{ending}")]
+    near = difflib.get_close_matches(path.stem, stems, 1)
+    hint = (
+        f"did you mean {path.parent / near[0]}{ending}?"
+        if near
+        else "check the name and the folder"
+    )
+    return f"no such file {path}{where}; {hint}"
+
+
+def _existing(path: Path) -> Path:
+    fault = missing_file(path)
+    if fault:
+        raise ModelError(fault)
+    return path
 
 
 def _read(path: Path) -> Model:

@@ -1,15 +1,18 @@
 """Somebody's own controller: scored beside the others, or told in plain words what to mend."""
 
-import time
+import json
 from functools import partial
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.comparison.case import Case, run_case
 from benchmarks.comparison.guard import Guarded, LateError
+from benchmarks.comparison.journal import Journal
+from benchmarks.comparison.scores import print_clipping
 from benchmarks.comparison.suite import NOMINAL, Episode
 from benchmarks.contender import Contender, ControllerError
 from benchmarks.processes import run_all
@@ -121,7 +124,6 @@ def dies():
 
 def test_what_takes_too_long_is_ended_and_the_others_are_not():
     results = {}
-    began = time.monotonic()
     works = [partial(loops, 0.3), is_quick, dies, is_quick]
     assert run_all(works, 2, results.__setitem__, wary=True)
     assert results[1] == results[3] == "quick"
@@ -129,7 +131,6 @@ def test_what_takes_too_long_is_ended_and_the_others_are_not():
     assert str(results[0]).startswith("thinking took over 0.3 s and was ended; look for an endless")
     # Of works that are not trusted none is run twice.
     assert isinstance(results[2], ProcessDied) and "again" not in str(results[2])
-    assert time.monotonic() - began < 30.0
 
 
 def invoke(folder, *arguments):
@@ -174,3 +175,84 @@ def test_bad_input_is_one_message_and_exit_code_2(source, message, tmp_path):
     done = CliRunner().invoke(app, ["add", source.format(tmp_path)])
     assert done.exit_code == 2 and done.stdout == ""
     assert message.format(tmp_path) in done.stderr and done.stderr.count("\n") == 1
+
+
+SPY = """
+import gc, json, sys
+from pathlib import Path
+class Spy:
+    name = "spy"
+    def see(self, environment):
+        raise AssertionError("it was shown the environment")
+    def reset(self, reference, station):
+        kinds = [type(each).__name__ for each in gc.get_objects()]
+        frame = sys._getframe()
+        while frame:
+            kinds += [type(each).__name__ for each in frame.f_locals.values()]
+            frame = frame.f_back
+        kinds.append(type(getattr(reference, "__self__", None)).__name__)
+        Path(__file__).with_suffix(".json").write_text(json.dumps(sorted(set(kinds))))
+    def act(self, observation, now):
+        return 11.0 if now < 1.0 else -0.5 if now < 1.5 else 2.0
+"""
+
+
+def test_a_controller_from_a_file_finds_no_environment_and_its_clipping_is_counted(tmp_path):
+    path = tmp_path / "spy.py"
+    path.write_text(SPY)
+    row = guarded(Contender("Spy", path=str(path)))
+    kinds = json.loads(path.with_suffix(".json").read_text())
+    assert "Station" in kinds and not {"PMAEnv", "PMAVectorEnv", "Engine"} & set(kinds)
+    assert row["clipped_share"] == pytest.approx(150 / 501) and row["clipped_v"] == 1.0
+    with (tmp_path / "terminal.txt").open("w") as terminal:
+        print_clipping([row], Console(file=terminal, width=200))
+    assert (
+        "Spy: 30 % of its commands were below 0 V or above 10 V, by up to 1 V, in 1 of 1"
+        in (tmp_path / "terminal.txt").read_text()
+    )
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1\nx = 1 / 0\nclass Mine: pass", "ZeroDivisionError: .*line 2 of mine.py"),
+        (
+            "import deep\nclass Mine:\n def __init__(self):\n  deep.fail()",
+            "line 4 of mine.py, which calls line 2 of deep.py",
+        ),
+    ],
+)
+def test_a_file_that_raises_before_any_trial_names_its_line(text, message, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "deep.py").write_text("def fail():\n    raise OSError('no')\n")
+    (tmp_path / "mine.py").write_text(text)
+    with pytest.raises(ControllerError, match=message):
+        Contender("Mine", path=str(tmp_path / "mine.py")).make()
+
+
+def test_a_controller_is_taken_out_of_a_journal_and_the_others_keep_their_bytes(tmp_path):
+    (tmp_path / "small.toml").write_text(SUITE)
+    folder = tmp_path / "results" / "small"
+    folder.mkdir(parents=True)
+    others = b'{"controller": "pid", "rmse": 1e-3}\n{"contr\n\xff\n{"controller": "pid"}'
+    mine = b'{"controller": "Mine", "failure": "it broke"}\n'
+    journal = folder / "journal.jsonl"
+    journal.write_bytes(mine + others[:36] + mine + others[36:])
+    (folder / "run.json").write_text('{"contenders": {"Mine": {}, "pid": {"key": "a"}}}')
+    suite = str(tmp_path / "small.toml")
+    options = ["--suite", suite, "--results", str(tmp_path / "results")]
+    wrong = CliRunner().invoke(app, ["remove", "Mien", *options])
+    assert wrong.exit_code == 2
+    assert f"no rows of 'Mien' in {journal}; they have rows of Mine, pid; did you mean Mine?" in (
+        wrong.stderr
+    )
+    with Journal(journal):
+        busy = CliRunner().invoke(app, ["remove", "Mine", *options])
+    assert busy.exit_code == 2 and f"a run is writing to {journal}; wait" in busy.stderr
+    before = journal.read_bytes()
+    done = CliRunner().invoke(app, ["remove", "Mine", *options])
+    assert done.exit_code == 0 and f"{journal}: 2 rows of Mine removed" in done.stdout
+    assert journal.read_bytes() == before.replace(mine, b"")
+    assert journal.read_bytes().startswith(others)
+    assert json.loads((folder / "run.json").read_text())["contenders"] == {"pid": {"key": "a"}}
+    assert not list(folder.glob(".*partial"))

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
-from benchmarks.comparison import leaderboard as module
+from benchmarks.comparison import bounds as module
 from benchmarks.comparison.errors import Measure, Record, is_bound, measures, pooled_measure
 from benchmarks.comparison.journal import JOURNAL, Journal
 from benchmarks.comparison.leaderboard import Leaderboard, read_leaderboard

@@ -113,7 +113,7 @@ def test_controllers_are_given_the_nominal_station(make, uncertain):
     env = make(model=uncertain, randomisation="varied")
     for seed in range(3):
         env.reset(seed=seed)
-        assert env.station.model is uncertain
+        assert env.station.model == uncertain
         assert env.plant.model is not uncertain
         assert env.plant.model.parameters != uncertain.parameters
 

@@ -106,7 +106,7 @@ def test_without_disturbances_nothing_is_there(make):
     assert "memory_operator" not in env.nominal_plant.states
     only = make(disturbances="regulator")
     only.reset(seed=0)
-    assert only.nominal_plant.model is only.station.model
+    assert only.nominal_plant.model == only.station.model
     assert only.events.pulse_times.size == 0 and only.events.step_times.size == 2
 
 

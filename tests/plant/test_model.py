@@ -270,9 +270,24 @@ def test_bytes_that_are_no_text_are_refused(tmp_path):
 def test_no_such_model_names_the_nearest(tmp_path):
     with pytest.raises(ModelError, match=r"no model 'stations': give .*; did you mean 'station'\?"):
         load_model("stations")
-    missing = tmp_path / "nowhere.toml"
-    with pytest.raises(ModelError, match=r"nowhere\.toml.*or the path of a \.toml file"):
-        load_model(missing)
+
+
+def test_a_path_that_leads_to_no_model_file_is_said_to_be_that(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.toml").touch()
+    (tmp_path / "mine.txt").touch()
+    for source, message in {
+        "nowhere.toml": f"no such file nowhere.toml in {tmp_path}; check the name and the folder",
+        "mien.toml": f"no such file mien.toml in {tmp_path}; did you mean mine.toml?",
+        "sub/station": f"no such file sub/station in {tmp_path}: there is no folder sub; check",
+        str(tmp_path / "x.toml"): f"no such file {tmp_path}/x.toml; check",
+        str(tmp_path): f"{tmp_path} is a folder; give the path of a .toml file in it",
+        "./mine.txt": "mine.txt must end in .toml; rename it",
+        "/dev/null": "/dev/null is no ordinary file",
+    }.items():
+        with pytest.raises(ModelError) as caught:
+            load_model(source)
+        assert str(caught.value).startswith(message)
 
 
 def test_a_model_built_in_code_is_checked_as_a_file_is():

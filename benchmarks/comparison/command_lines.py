@@ -1,0 +1,38 @@
+"""Commands that messages name, such that they work as they stand in the folder of the user."""
+
+import shlex
+from pathlib import Path
+
+from benchmarks.comparison.suite import FrozenSuite
+from benchmarks.files import RESULTS
+
+
+def run_command(suite: FrozenSuite, folder: Path) -> str:
+    """What runs a suite into a folder.
+
+    >>> from benchmarks.comparison.suite import frozen_suite
+    >>> run_command(frozen_suite("nominal"), Path("results/nominal"))
+    'python -m benchmarks run --suite nominal'
+    >>> run_command(frozen_suite("nominal"), Path("my results"))
+    "python -m benchmarks run --suite nominal --out 'my results'"
+    """
+    return _joined("run", "--suite", suite.source, *_folder("--out", suite, folder))
+
+
+def report_command(suite: FrozenSuite, folder: Path) -> str:
+    """What writes the page of a folder's results."""
+    return _joined("report", suite.source, *_folder("--results", suite, folder))
+
+
+def remove_command(name: str, suite: FrozenSuite, folder: Path) -> str:
+    """What takes a controller's rows out of a folder's journal."""
+    results = [] if folder.parent == RESULTS else ["--results", str(folder.parent)]
+    return _joined("remove", name, "--suite", suite.source, *results)
+
+
+def _folder(option: str, suite: FrozenSuite, folder: Path) -> list[str]:
+    return [] if folder == RESULTS / suite.name else [option, str(folder)]
+
+
+def _joined(*words: str) -> str:
+    return shlex.join(["python", "-m", "benchmarks", *words])
