@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pma_gym.envs.advance import NOT_READ
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import Engine
+from pma_gym.envs.history import History
 from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.knowledge import Reading, Station
 from pma_gym.envs.options import (
@@ -24,6 +25,7 @@ from pma_gym.envs.options import (
 )
 from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
 from pma_gym.envs.summary import episode_summary, last_info, step_info
+from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task
 
@@ -191,6 +193,9 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}
 
+    _index = 0
+    """Its number in the engine."""
+
     def __init__(
         self, task: str | Task = "displacement", render_mode: str | None = None, **options: Any
     ) -> None:
@@ -208,18 +213,20 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
         self.action_space = self._commands.space
         # A film of every step plays in real time.
         self.metadata = self.metadata | {"render_fps": round(self.options.control_rate_hz)}
-        record = self._engine.record
-        self._places = record.places
         self._row = self._engine.records[0, :, 0]
-        # The record holds a reading's parts side by side.
-        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._heard = slice(heard, heard + len(PARTS))
+        self._find_places()
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         self._made = self._engine.advance(self._observed.copy, self._given)
-        self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
         self._wait(NOT_BEGUN)
+
+    def _find_places(self) -> None:
+        self._places = self._engine.record.places
+        # The record holds a reading's parts side by side.
+        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._heard = slice(heard, heard + len(PARTS))
+        self._datum = START if START in self._places else "zero_contraction"
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -285,7 +292,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
 
     def _info(self) -> dict[str, Any]:
         """Numbers of the last step or reset; what compiled code makes in between."""
-        return step_info(self._engine, 0)
+        return step_info(self._engine, self._index)
 
     def _wait(self, why: str | None) -> None:
         """Let no step be made until `reset`, and say why; None to let them."""
@@ -309,14 +316,17 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @cached_property
     def plant(self) -> Plant:
         """The Plant of this episode; differs from the nominal one with `randomisation`."""
-        model = self._engine.models[0]
+        return self._episode_plant()
+
+    def _episode_plant(self) -> Plant:
+        model = self._engine.models[self._index]
         nominal = self.nominal_plant
         return nominal if model is nominal.model else Plant(model, nominal.tolerance)
 
     @property
     def pressure(self) -> float:
         """Gauge pressure that this episode began at (Pa)."""
-        return float(self._engine.pressures[0])
+        return float(self._engine.pressures[self._index])
 
     @property
     def condition(self) -> Condition:
@@ -383,7 +393,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     @property
     def events(self) -> Events:
         """What disturbs this episode, and when; not for controllers."""
-        return self._engine.events()
+        return self._engine.events(self._index)
 
     @property
     def station(self) -> Station:
@@ -469,7 +479,7 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
             None. An exercise has `exercise_summaries` too, and its RMSE in N m where it prescribes
             a moment.
         """
-        return episode_summary(self._engine, 0)
+        return episode_summary(self._engine, self._index)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, shape (400, 800, 3).
@@ -483,14 +493,25 @@ class PMAEnv(gym.Env[NDArray[np.float32], NDArray[np.float32]]):
                 'render_mode="rgb_array"'
             )
             return None
+        return self.picture()
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture that `render` gives, whatever the render mode."""
         if self._idle == NOT_BEGUN:
             raise self._needs_reset("render()")
+        return self._drawing().draw(self, self._history())
+
+    def _history(self) -> History:
+        position = self.trajectory()
+        return History(np.arange(len(position)) / SAMPLE_RATE_HZ, position, self.voltages)
+
+    def _drawing(self) -> "Picture":
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.picture import Picture
 
             self._picture = Picture(self.task)
-        return self._picture.draw(self)
+        return self._picture
 
     def close(self) -> None:
         """Free the picture."""

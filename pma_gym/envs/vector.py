@@ -1,7 +1,7 @@
 """Many environments that step together, in SIMD lanes and threads."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -13,6 +13,8 @@ from pma_gym.envs.advance import TRUTHS
 from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.engine import ActionError, Engine
+from pma_gym.envs.history import RecordingEngine
+from pma_gym.envs.member import BatchMember
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import (
     Pressure,
@@ -26,6 +28,9 @@ from pma_gym.envs.options import (
 from pma_gym.envs.record import PARTS
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
+
+if TYPE_CHECKING:
+    from pma_gym.envs.picture import Picture
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
 
@@ -50,7 +55,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
-        render_mode: None; a batch draws nothing.
+        render_mode: None or `rgb_array`; a batch that renders keeps the course of every episode.
         options: as `PMAEnv`.
 
     Attributes:
@@ -67,7 +72,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
     """
 
     metadata: dict[str, Any] = {
-        "render_modes": [],
+        "render_modes": ["rgb_array"],
         "render_fps": 100,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -90,10 +95,8 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         if not isinstance(autoreset_mode, AutoresetMode):
             check_named("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
         if render_mode is not None:
-            raise ValueError(
-                f"a vector environment draws nothing, got render_mode={render_mode!r}; render one "
-                "PMAEnv of the same seed"
-            )
+            check_named("render_mode", render_mode, self.metadata["render_modes"])
+        self.render_mode = render_mode
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.options = parse_options(options)
@@ -107,7 +110,8 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
                 raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
             check_pressures(pressures_kpa, num_envs)
         single = precision == "single"
-        self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
+        kind = Engine if render_mode is None else RecordingEngine
+        self.engine = kind(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
         self.table: ObservationTable = self.engine.table
         self.single_observation_space = self.table.space
         self.single_action_space = CommandLine(self.options, self.task.actuator).space
@@ -121,6 +125,7 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         # Which of them have ended, None if none has: looking through them takes a microsecond.
         self._waiting: NDArray[np.int64] | None = None
         self._idle = True
+        self._picture: Picture | None = None
 
     def reset(
         self,
@@ -309,8 +314,46 @@ class PMAVectorEnv(VectorEnv[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Gauge pressure that every episode began at (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
+    def member(self, index: int) -> BatchMember:
+        """One of the environments, to be read as a `PMAEnv`.
+
+        Args:
+            index: its number, from 0; negative ones count from the end.
+        Raises:
+            IndexError: there is no such environment.
+        """
+        if not -self.num_envs <= index < self.num_envs:
+            raise IndexError(
+                f"there is no environment {index} in a batch of {self.num_envs}: numbers go from "
+                f"{-self.num_envs} to {self.num_envs - 1}"
+            )
+        return BatchMember(self, index % self.num_envs)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+        """A picture of every station and of its trial so far, shape (400, 800, 3) each.
+
+        Raises:
+            gymnasium.error.ResetNeeded: an environment has no episode yet.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render mode; make the environments with "
+                'render_mode="rgb_array"'
+            )
+            return None
+        return tuple(self.member(i).picture() for i in range(self.num_envs))
+
+    def _drawing(self) -> "Picture":
+        if self._picture is None:
+            # Imported here: environments without pictures need no matplotlib.
+            from pma_gym.envs.picture import Picture
+
+            self._picture = Picture(self.task)
+        return self._picture
+
     def close_extras(self, **kwargs: Any) -> None:
-        """Send the threads home."""
+        """Free the picture and end the threads."""
+        self._picture = None
         self.engine.close()
 
 
