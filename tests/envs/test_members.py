@@ -58,7 +58,7 @@ def test_pictures_go_on_through_the_ends_of_episodes(fragile):
     envs = PMAVectorEnv(3, render_mode="rgb_array", **options)
     envs.reset(seed=1)
     first, ended = envs.render(), 0
-    for k in range(130):
+    for _ in range(130):
         *_, terminated, truncated, _ = envs.step(np.array([[1.0], [-0.9], [-0.9]], np.float32))
         frames = envs.render()
         if terminated[0]:
