@@ -7,6 +7,7 @@ JOBS ?= 2
 PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+NAMES ?=
 
 EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
@@ -21,11 +22,11 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test lint style types layers pages docs clean distclean
+.PHONY: help bench peers test test-integrations lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s%s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-26s%s\n", $$1, $$2 }'
 	@echo "Variables: PYTHON=python3.12, BENCH_ARGS='...', PYTEST_ARGS='-k name', JOBS=2 (tests at once)"
 
 bench: $(CORE) ## Run the benchmark (python -m benchmarks); its report goes to results/.
@@ -36,6 +37,9 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+
+test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrations/, NAMES='skrl zoo'; 10 GB).
+	$(BIN)/python tests/integrations/run.py $(NAMES)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 
@@ -55,12 +59,12 @@ pages: $(FULL)
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
-clean: ## Remove what the tools generated, but neither .venv, .peers nor results/.
+clean: ## Remove what the tools generated, but none of .venv, .peers, .integrations or results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## Remove .venv and .peers too.
-	rm -rf $(VENV) .peers
+distclean: clean ## Remove .venv, .peers and .integrations too.
+	rm -rf $(VENV) .peers .integrations
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
 $(BIN)/pip:
