@@ -1,13 +1,11 @@
 """An engine that keeps what the pictures of a batch draw: positions and voltages by step."""
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.envs.engine import Engine
-from pma_gym.envs.options import Pressure
 from pma_gym.units import SI_FACTORS
 
 
@@ -41,31 +39,41 @@ class RecordingEngine(Engine):
         self._shown = f"{protocol.quantity}_{protocol.suffix}", SI_FACTORS[protocol.unit]
         # A batch may step an episode that has ended once more.
         steps = self.task.steps(self.options.control_rate_hz) + 2
-        self._positions = np.zeros((steps + 1, self.count))
-        self._voltages = np.zeros((steps, self.count))
+        self._every = np.arange(self.count)
+        self._positions = np.full((steps + 1, self.count), np.nan)
+        self._voltages = np.full((steps, self.count), np.nan)
 
     def step(self) -> int:
         """Step, see `Engine`, and write down where each environment is."""
+        self._follow()
         ended = super().step()
-        every = np.arange(self.count)
-        counts = np.minimum(self.counts(), len(self._voltages))
-        self._write(counts, every)
-        self._voltages[np.maximum(counts - 1, 0), every] = self.numbers(
-            f"{self.task.actuator}_voltage"
-        )
+        counts = self._counts()
+        self._positions[counts, self._every] = self._present()
+        voltages = self.numbers(f"{self.task.actuator}_voltage")
+        self._voltages[np.maximum(counts - 1, 0), self._every] = voltages
         return ended
 
-    def reset(self, indices: NDArray[np.int64], wanted: Sequence[Pressure] | None = None) -> None:
-        """Begin an episode, see `Engine`, and write down where it begins."""
-        super().reset(indices, wanted)
-        self._write(np.zeros(len(indices), np.int64), indices)
+    def _counts(self) -> NDArray[np.int64]:
+        return np.minimum(self.counts(), len(self._voltages))
 
-    def _write(self, counts: NDArray[np.int64], indices: NDArray[np.int64]) -> None:
+    def _present(self) -> NDArray[np.float64]:
         name, factor = self._shown
-        self._positions[counts, indices] = self.numbers(name)[indices] * factor
+        return self.numbers(name) * factor
+
+    def _follow(self) -> None:
+        """Begin the courses anew of environments that are not where they were left.
+
+        They were reset, or a state was put into them.
+        """
+        counts, present = self._counts(), self._present()
+        moved = self._every[self._positions[counts, self._every] != present]
+        if len(moved):
+            self._positions[:, moved], self._voltages[:, moved] = np.nan, np.nan
+            self._positions[counts[moved], moved] = present[moved]
 
     def history(self, index: int) -> History:
-        """The course of an environment's episode at its control steps."""
+        """The course of an environment's episode at its control steps, NaN where unknown."""
+        self._follow()
         count = min(self.steps(index), len(self._voltages))
         return History(
             np.arange(count + 1.0) * self.options.period,

@@ -1,7 +1,8 @@
 """One environment of a batch, read as a single environment."""
 
+import copy
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -114,6 +115,34 @@ class BatchMember(PMAEnv):
             RuntimeError: always.
         """
         raise RuntimeError(f"{TOGETHER} and step together; call step() of the batch")
+
+    def get_state(self) -> NoReturn:
+        """Refused: the batch has the state.
+
+        Raises:
+            RuntimeError: always.
+        """
+        raise RuntimeError(f"{TOGETHER}; take the state of the whole batch, by its get_state()")
+
+    def set_state(self, state: object) -> NoReturn:
+        """Refused: the batch has the state.
+
+        Raises:
+            RuntimeError: always.
+        """
+        raise RuntimeError(f"{TOGETHER}; put a state into the whole batch, by its set_state()")
+
+    def __copy__(self) -> Self:
+        """Another view of the same environment."""
+        return type(self)(self._batch, self._index)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A view of the same environment in a copy of the batch."""
+        return type(self)(copy.deepcopy(self._batch, memo), self._index)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The batch and the number, which a pickle of a view holds."""
+        return type(self), (self._batch, self._index)
 
     def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
         """The action that commands these voltages (V), see `PMAEnv.action`."""
