@@ -39,11 +39,11 @@ class Library:
 LIBRARIES = {
     "torchrl": Library("TorchRL", "torchrl_ppo.py", "torchrl", ("torchrl",)),
     "rllib": Library("RLlib", "rllib_ppo.py", "ray", ("ray[rllib]",)),
-    # The zoo's `enjoy` imports requests, Tianshou's experiments joblib, without asking for them.
+    # The zoo imports requests without asking for it; Tianshou imports what its extra `eval` has.
     "zoo": Library("RL Baselines3 Zoo", "zoo.py", "rl_zoo3", ("rl_zoo3", "requests")),
     "cleanrl": Library("CleanRL", "cleanrl_ppo.py", "cleanrl", ("cleanrl",)),
     "skrl": Library("skrl", "skrl_ppo.py", "skrl", ("skrl[torch]",)),
-    "tianshou": Library("Tianshou", "tianshou_ppo.py", "tianshou", ("tianshou", "joblib")),
+    "tianshou": Library("Tianshou", "tianshou_ppo.py", "tianshou", ("tianshou[eval]",)),
 }
 
 
