@@ -8,6 +8,7 @@ PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 EXAMPLES ?= 100000
+NAMES ?=
 
 EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
@@ -22,11 +23,11 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test fuzz lint style types layers pages docs clean distclean
+.PHONY: help bench peers test fuzz test-integrations lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s%s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-26s%s\n", $$1, $$2 }'
 	@echo "Variables: PYTHON=python3.12, BENCH_ARGS='...', PYTEST_ARGS='-k name', JOBS=2 (tests at once)"
 
 bench: $(CORE) ## Run the benchmark (python -m benchmarks); its report goes to results/.
@@ -40,6 +41,9 @@ test: $(FULL) ## Run the tests and the examples in the docstrings.
 
 fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
 	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
+
+test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrations/, NAMES='skrl zoo'; 10 GB).
+	$(BIN)/python tests/integrations/run.py $(NAMES)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 
@@ -59,12 +63,12 @@ pages: $(FULL)
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
-clean: ## Remove what the tools generated, but neither .venv, .peers nor results/.
+clean: ## Remove what the tools generated, but none of .venv, .peers, .integrations or results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## Remove .venv and .peers too.
-	rm -rf $(VENV) .peers
+distclean: clean ## Remove .venv, .peers and .integrations too.
+	rm -rf $(VENV) .peers .integrations
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
 $(BIN)/pip:

@@ -4,6 +4,7 @@ The only importer of matplotlib in the environments; `PMAEnv.render` imports it 
 What never changes is drawn once; each picture restores it and draws what moves on top.
 """
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pma_gym.envs.history import History
 from pma_gym.envs.rig_drawing import FAINT, INK, REFERENCE, RigDrawing
-from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 
 WIDTH, HEIGHT, DPI = 800, 400, 100
 ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
-STRIDE = 4
-"""Of the samples at 384 Hz one in four is drawn: more than there are pixels."""
+MOST_RATE_HZ = 100.0
+"""Positions are drawn at most at about this rate: more than there are pixels."""
 
 
 _AXIS = {"excess": "moment's excess"}
@@ -52,19 +53,20 @@ class Picture:
         self._canvas.draw()
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
-    def draw(self, env: "PMAEnv") -> NDArray[np.uint8]:
+    def draw(self, env: "PMAEnv", history: History) -> NDArray[np.uint8]:
         """The picture now.
 
         Args:
             env: an environment of the task, in or after an episode.
+            history: the course of its episode.
         Returns:
             RGB of shape (400, 800, 3), a new array each time.
         """
         self._rig.update(env)
-        position = env.trajectory()[::STRIDE] / self._factor
-        self._actual.set_data(np.arange(len(position)) * STRIDE / SAMPLE_RATE_HZ, position)
+        stride = _stride(history.time)
+        self._actual.set_data(history.time[::stride], history.position[::stride] / self._factor)
         self._now.set_data([env.time], [env.position / self._factor])
-        held = np.append(env.voltages, env.voltages[-1:])
+        held = np.append(history.voltages, history.voltages[-1:])
         self._volts.set_data(np.arange(len(held)) * env.options.period, held)
         self._canvas.restore_region(self._still)
         for axes, artist in self._moving:
@@ -121,3 +123,12 @@ class Picture:
         axes.xaxis.label.set(size=8, color=INK)
         axes.yaxis.label.set(size=8, color=INK)
         return axes
+
+
+def _stride(time: NDArray[np.float64]) -> int:
+    """One in how many positions is drawn.
+
+    >>> _stride(np.arange(9) / 384.0), _stride(np.arange(9) / 100.0), _stride(np.zeros(1))
+    (4, 1, 1)
+    """
+    return math.ceil(0.999 / (MOST_RATE_HZ * (time[1] - time[0]))) if len(time) > 1 else 1

@@ -16,6 +16,7 @@ from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import Engine
+from pma_gym.envs.history import History
 from pma_gym.envs.kernel_writer import BAD_ACTION
 from pma_gym.envs.knowledge import Reading, Reference, Station, detached_task
 from pma_gym.envs.options import (
@@ -34,6 +35,7 @@ from pma_gym.envs.snapshot import put, take
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import episode_summary, last_info, step_info
+from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.tasks import Events, Human, Task
 
@@ -210,6 +212,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}
 
+    _index = 0
+    """Its number in the engine."""
+
     def __init__(
         self, task: str | Task = "displacement", render_mode: str | None = None, **options: Any
     ) -> None:
@@ -238,20 +243,22 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         """Point into the engine."""
         self.nominal_plant = self._engine.nominal
         self.table = self._engine.table
-        record = self._engine.record
-        self._places = record.places
         self._row = self._engine.records[0, :, 0]
-        # The record holds a reading's parts side by side.
-        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._heard = slice(heard, heard + len(PARTS))
+        self._find_places()
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         self._made = self._engine.advance(self._observed.copy, self._given)
         if callable(self.options.reward):
             self._made = self._rewarded(self._made)
-        self._datum = START if START in self._places else "zero_contraction"
         self._picture: Picture | None = None
         self._wait(self._idle)
+
+    def _find_places(self) -> None:
+        self._places = self._engine.record.places
+        # The record holds a reading's parts side by side.
+        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._heard = slice(heard, heard + len(PARTS))
+        self._datum = START if START in self._places else "zero_contraction"
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -267,7 +274,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
             TypeError: an unknown option.
             ValueError: a pressure out of range.
         """
-        wanted, seed = self._wanted_pressure(options or {}), parse_seed(seed)
+        wanted, seed = self._wanted_pressure(options or {}), parse_seed(self._or_drawn(seed))
         super().reset(seed=seed)
         self._wait(NOT_BEGUN)
         # Unseeded, it begins with the seed that `np_random_seed` says.
@@ -335,7 +342,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     def _info(self) -> dict[str, Any]:
         """Numbers of the last step or reset; what compiled code makes in between."""
-        return step_info(self._engine, 0)
+        return step_info(self._engine, self._index)
 
     def _wait(self, why: str | None) -> None:
         """Let no step be made until `reset`, and say why; None to let them."""
@@ -425,14 +432,17 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     @cached_property
     def plant(self) -> Plant:
         """The Plant of this episode; differs from the nominal one with `randomisation`."""
-        model = self._engine.models[0]
+        return self._episode_plant()
+
+    def _episode_plant(self) -> Plant:
+        model = self._engine.models[self._index]
         nominal = self.nominal_plant
         return nominal if model is nominal.model else Plant(model, nominal.tolerance)
 
     @property
     def pressure(self) -> float:
         """Gauge pressure that this episode began at (Pa)."""
-        return float(self._engine.pressures[0])
+        return float(self._engine.pressures[self._index])
 
     @property
     def condition(self) -> Condition:
@@ -499,7 +509,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     @property
     def events(self) -> Events:
         """What disturbs this episode, and when; not for controllers."""
-        return self._engine.events()
+        return self._engine.events(self._index)
 
     @property
     def station(self) -> Station:
@@ -591,7 +601,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
             words, or "". An exercise has `exercise_summaries` too, and its RMSE in N m where it
             prescribes a moment.
         """
-        return episode_summary(self._engine, 0)
+        return episode_summary(self._engine, self._index)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, shape (400, 800, 3).
@@ -605,14 +615,25 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
                 'render_mode="rgb_array"'
             )
             return None
+        return self.picture()
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The picture that `render` gives, whatever the render mode."""
         if self._idle == NOT_BEGUN:
             raise self._needs_reset("render()")
+        return self._drawing().draw(self, self._history())
+
+    def _history(self) -> History:
+        position = self.trajectory()
+        return History(np.arange(len(position)) / SAMPLE_RATE_HZ, position, self.voltages)
+
+    def _drawing(self) -> "Picture":
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.picture import Picture
 
             self._picture = Picture(self.task)
-        return self._picture.draw(self)
+        return self._picture
 
     def close(self) -> None:
         """Free the picture."""

@@ -2,15 +2,20 @@
 
 import time
 from collections.abc import Sequence
+from numbers import Integral
 from typing import Any
 
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
+from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
+from pma_gym.envs.member import TOGETHER, BatchMember, refusal
 from pma_gym.envs.options import check_known
+from pma_gym.envs.registered import is_id, registered
 from pma_gym.envs.summary import last_info
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import Task
@@ -21,18 +26,36 @@ class EngineVecEnv(VecEnv):
 
     Attributes:
         envs: the PMAVectorEnv.
+        together: names of methods that one environment cannot do without the others.
     """
 
     envs: PMAVectorEnv
+    together: tuple[str, ...] = ("step", "reset")
 
     def close(self) -> None:
         """Free the environments."""
         self.envs.close()
 
+    def _members(self, indices: VecEnvIndices) -> list[BatchMember]:
+        """The environments that are asked for: all, one by its number, or some."""
+        chosen = [indices] if isinstance(indices, Integral) else indices
+        numbers = range(self.num_envs) if chosen is None else chosen
+        return [self.envs.member(int(i)) for i in numbers]  # type: ignore[union-attr]
+
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
-        """An attribute of the environments, the same for each."""
-        value = getattr(self.envs, attr_name)
-        return [value for _ in self._get_indices(indices)]
+        """An attribute of each environment, as `PMAEnv` has it."""
+        return [self._read(member, attr_name) for member in self._members(indices)]
+
+    def _read(self, member: BatchMember, name: str) -> Any:  # noqa: ANN401 - an attribute
+        try:
+            return getattr(member, name)
+        except AttributeError as error:
+            if hasattr(BatchMember, name) or not hasattr(self.envs, name):
+                raise
+            raise AttributeError(
+                f"one environment of the batch has no {name!r}, only the whole batch has: read "
+                f"it from the attribute envs of the {type(self).__name__}, .envs.{name}"
+            ) from error
 
     def set_attr(
         self,
@@ -40,8 +63,12 @@ class EngineVecEnv(VecEnv):
         value: Any,  # noqa: ANN401 - as the base class has it
         indices: VecEnvIndices = None,
     ) -> None:
-        """Refused: environments that share an engine have no attributes of their own."""
-        raise AttributeError(f"{attr_name} cannot be set: make the environments anew")
+        """Refused: environments that share an engine have no attributes of their own.
+
+        Raises:
+            AttributeError: always; says what can be done instead.
+        """
+        raise AttributeError(refusal(attr_name))
 
     def env_method(
         self,
@@ -50,17 +77,26 @@ class EngineVecEnv(VecEnv):
         indices: VecEnvIndices = None,
         **method_kwargs: Any,
     ) -> list[Any]:
-        """Call a method of the `PMAVectorEnv` once; its result for each environment asked for."""
-        result = getattr(self.envs, method_name)(*method_args, **method_kwargs)
-        return [result for _ in self._get_indices(indices)]
+        """Call a method of each environment asked for, as `PMAEnv` has it.
+
+        Raises:
+            RuntimeError: a method that the environments of the batch can only do together.
+        """
+        if method_name in self.together:
+            raise RuntimeError(
+                f"{method_name}() cannot be called for single environments: {TOGETHER}; call "
+                f"{method_name}() of the {type(self).__name__}"
+            )
+        methods = [self._read(member, method_name) for member in self._members(indices)]
+        return [method(*method_args, **method_kwargs) for method in methods]
 
     def env_is_wrapped(self, wrapper_class: type, indices: VecEnvIndices = None) -> list[bool]:
-        """Whether an environment is wrapped; Monitor's `episode` is in the infos without it."""
-        return [False for _ in self._get_indices(indices)]
+        """True for Monitor, whose `episode` the infos hold; no other wrapper is in a batch."""
+        return [wrapper_class is Monitor for _ in self._members(indices)]
 
     def get_images(self) -> Sequence[np.ndarray | None]:
-        """None: render one environment of the same seed."""
-        return [None] * self.num_envs
+        """A picture of each environment, or None for each without a render mode."""
+        return self.envs.render() or [None] * self.num_envs
 
 
 class SB3VecEnv(EngineVecEnv):
@@ -72,7 +108,8 @@ class SB3VecEnv(EngineVecEnv):
 
     Args:
         num_envs: how many environments.
-        task: name of a task, or a Task; as `PMAEnv`.
+        task: name of a task, or a Task, as `PMAEnv`; or the id of a registered environment, whose
+            own options those given here are added to.
         options: as `PMAVectorEnv`, but for the autoreset mode, which is SAME_STEP.
 
     Attributes:
@@ -85,13 +122,22 @@ class SB3VecEnv(EngineVecEnv):
         >>> _ = model.learn(4096)
     """
 
+    together = ("step",)
+    spec: EnvSpec | None = None
+
     def __init__(self, num_envs: int, task: str | Task = "displacement", **options: Any) -> None:
         """Make the environments."""
         check_known("option", [name for name in options if name == "autoreset_mode"], ())
+        if is_id(task):
+            self.spec, options = registered(task, options)
+            task = options.pop("task", "displacement")
         self.envs = _Batch(num_envs, task, autoreset_mode=AutoresetMode.SAME_STEP, **options)
+        self.envs.spec = self.spec
         super().__init__(
             num_envs, self.envs.single_observation_space, self.envs.single_action_space
         )
+        # A recorded video plays in real time.
+        self.metadata = self.metadata | {"render_fps": self.envs.metadata["render_fps"]}
         self._actions = np.zeros(self.envs.action_space.shape or (), np.float32)
         self._nothing: list[dict[str, Any]] = [{} for _ in range(num_envs)]
         self._returns = np.zeros(num_envs)
@@ -106,6 +152,20 @@ class SB3VecEnv(EngineVecEnv):
         self._reset_seeds()
         self._reset_options()
         return observations
+
+    def env_method(
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: VecEnvIndices = None,
+        **method_kwargs: Any,
+    ) -> list[Any]:
+        """Call a method of each environment asked for, as `PMAEnv` has it; `reset` too."""
+        results = super().env_method(method_name, *method_args, indices=indices, **method_kwargs)
+        if method_name == "reset":
+            begun = [member.index for member in self._members(indices)]
+            self._returns[begun], self._lengths[begun] = 0.0, 0
+        return results
 
     def _pressures(self) -> list[Any]:
         for options in self._options:

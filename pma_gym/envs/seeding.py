@@ -6,13 +6,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+SEEDS = 1 << 31
+"""Seeds are drawn below this number, which fits every library's integers."""
+
 
 class SeededByReset:
     """Everything random in an episode follows from the seed that `reset` was given last.
 
     Compiled code draws by that seed, the episode's number and the step's, and never from
-    `np_random`: that generator begins anew with each seed, and is there for wrappers and users.
+    `np_random`: that generator begins anew with each seed, and is there for wrappers and users. A
+    generator that is set as `np_random` gives the seed of the next `reset` that is given none.
     """
+
+    _drawn: int | None = None
 
     @property
     def np_random(self) -> np.random.Generator:
@@ -21,12 +27,19 @@ class SeededByReset:
 
     @np_random.setter
     def np_random(self, value: object) -> None:
-        raise AttributeError(
-            "np_random cannot be set: everything random in an episode follows from the seed that "
-            f"reset(seed=...) is given, not from a generator; got {type(value).__name__}; call "
-            "reset(seed=...) with a whole number instead, such as "
-            "reset(seed=int(generator.integers(2**31)))"
-        )
+        if not isinstance(value, np.random.Generator):
+            raise TypeError(
+                f"np_random must be a numpy.random.Generator, got {type(value).__name__}; set "
+                "numpy.random.default_rng(seed), or call reset(seed=...)"
+            )
+        self._drawn = int(value.integers(SEEDS))
+
+    def _or_drawn(self, seed: Any) -> Any:  # noqa: ANN401
+        """The seed that a reset was given, or what was drawn for it from a generator."""
+        if seed is None and self._drawn is not None:
+            seed = self._drawn
+        self._drawn = None
+        return seed
 
 
 def own_seeds(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -17,6 +17,8 @@ from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
 from pma_gym.envs.command import CommandLine
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.engine import ActionError, Engine
+from pma_gym.envs.history import RecordingEngine
+from pma_gym.envs.member import BatchMember
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import (
     Pressure,
@@ -37,6 +39,9 @@ from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
+
+if TYPE_CHECKING:
+    from pma_gym.envs.picture import Picture
 
 OWN = ("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa", "render_mode")
 """Keyword arguments of a batch beside the options."""
@@ -66,7 +71,7 @@ class PMAVectorEnv(
         precision: `double`, or `single`: faster, positions mostly within 2e-5 of their range, and
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
-        render_mode: None; a batch draws nothing.
+        render_mode: None or `rgb_array`; a batch that renders keeps the course of every episode.
         options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
@@ -83,7 +88,7 @@ class PMAVectorEnv(
     """
 
     metadata: dict[str, Any] = {
-        "render_modes": [],
+        "render_modes": ["rgb_array"],
         "render_fps": 100,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -107,10 +112,8 @@ class PMAVectorEnv(
         if not isinstance(autoreset_mode, AutoresetMode):
             check_named("autoreset_mode", autoreset_mode, [mode.value for mode in AutoresetMode])
         if render_mode is not None:
-            raise ValueError(
-                f"a vector environment draws nothing, got render_mode={render_mode!r}; render one "
-                "PMAEnv of the same seed"
-            )
+            check_named("render_mode", render_mode, self.metadata["render_modes"])
+        self.render_mode = render_mode
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.options = parse_options(options, "PMAVectorEnv.__init__()", OWN)
@@ -124,7 +127,8 @@ class PMAVectorEnv(
                 raise ValueError("give either pressure_kpa for all or pressures_kpa for each")
             pressures_kpa = parse_pressures(pressures_kpa, num_envs)
         single = precision == "single"
-        self.engine = Engine(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
+        kind = Engine if render_mode is None else RecordingEngine
+        self.engine = kind(self.task, self.options, num_envs, int(threads), single, pressures_kpa)
         self.single_observation_space = self.engine.table.space
         self.single_action_space = CommandLine(self.options, self.task.actuator).space
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -146,6 +150,7 @@ class PMAVectorEnv(
         self.table: ObservationTable = self.engine.table
         self._given = self.engine.actions[: self.num_envs]
         self._advance = self._rewarded if callable(self.options.reward) else self.engine.step
+        self._picture: Picture | None = None
         if self.closed:
             self.engine.close()
 
@@ -170,7 +175,7 @@ class PMAVectorEnv(
         check_known("reset option", given, RESET_OPTIONS)
         indices = masked(given["reset_mask"], self.num_envs) if "reset_mask" in given else self._all
         wanted = wanted_pressures(given, indices, self.num_envs)
-        seeds = self._own_seeds(all_seeds(seed, self.num_envs), indices)
+        seeds = self._own_seeds(all_seeds(self._or_drawn(seed), self.num_envs), indices)
         # Should it fail on the way, these have no episode.
         self._begun[indices], self._idle = False, True
         self.engine.seed(indices, seeds)
@@ -438,8 +443,46 @@ class PMAVectorEnv(
         """Gauge pressure that every episode began at (Pa), shape (num_envs,)."""
         return self.engine.pressures.copy()
 
+    def member(self, index: int) -> BatchMember:
+        """One of the environments, to be read as a `PMAEnv`.
+
+        Args:
+            index: its number, from 0; negative ones count from the end.
+        Raises:
+            IndexError: there is no such environment.
+        """
+        if not -self.num_envs <= index < self.num_envs:
+            raise IndexError(
+                f"there is no environment {index} in a batch of {self.num_envs}: numbers go from "
+                f"{-self.num_envs} to {self.num_envs - 1}"
+            )
+        return BatchMember(self, index % self.num_envs)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
+        """A picture of every station and of its trial so far, shape (400, 800, 3) each.
+
+        Raises:
+            gymnasium.error.ResetNeeded: an environment has no episode yet.
+        """
+        if self.render_mode is None:
+            gym.logger.warn(
+                "render() draws nothing without a render mode; make the environments with "
+                'render_mode="rgb_array"'
+            )
+            return None
+        return tuple(self.member(i).picture() for i in range(self.num_envs))
+
+    def _drawing(self) -> "Picture":
+        if self._picture is None:
+            # Imported here: environments without pictures need no matplotlib.
+            from pma_gym.envs.picture import Picture
+
+            self._picture = Picture(self.task)
+        return self._picture
+
     def close_extras(self, **kwargs: Any) -> None:
-        """Send the threads home."""
+        """Free the picture and end the threads."""
+        self._picture = None
         self.engine.close()
 
 

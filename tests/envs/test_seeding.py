@@ -1,4 +1,4 @@
-"""`np_random_seed` says how to begin again; `np_random` is for users and cannot be replaced."""
+"""`np_random_seed` says how to begin again; a generator set as `np_random` gives a seed."""
 
 import gymnasium as gym
 import numpy as np
@@ -35,21 +35,30 @@ def test_draws_from_np_random_change_no_episode(single, course, same):
     assert same([*course(env, 3), env.reset()], [*course(other, 3), other.reset()])
 
 
-@pytest.mark.parametrize("env", [PMAEnv(), PMAVectorEnv(2)], ids=["single", "batch"])
-def test_np_random_is_read_only_with_the_fix(env):
-    with pytest.raises(
-        AttributeError, match=r"np_random cannot be set: .*call reset\(seed=\.\.\.\)"
-    ):
-        env.np_random = np.random.default_rng(5)
+@pytest.mark.parametrize("make", [PMAEnv, lambda: PMAVectorEnv(2)], ids=["single", "batch"])
+def test_a_generator_that_is_set_gives_the_seed_of_the_next_reset(make, same):
+    """As Tianshou's environments are seeded."""
+    env, other = make(), make()
+    for each in (env, other):
+        each.reset(seed=1)
+        each.np_random = np.random.default_rng(5)
+    assert same(env.reset(), other.reset())
+    third = make()
+    third.np_random = np.random.default_rng(6)
+    assert not same(third.reset()[0], env.reset()[0])
+    # A seed that is given counts, and a generator only once.
+    env.np_random = np.random.default_rng(7)
     env.reset(seed=3)
     assert env.np_random_seed == 3
     assert isinstance(env.np_random, np.random.Generator)
+    with pytest.raises(TypeError, match="must be a numpy.random.Generator, got int"):
+        env.np_random = 5
 
 
 def test_wrappers_say_the_same():
     env = gym.wrappers.TimeLimit(gym.make("pma_gym/IsokineticDisplacement-v0"), 10)
-    with pytest.raises(AttributeError, match="np_random cannot be set"):
-        env.np_random = np.random.default_rng(5)
+    with pytest.raises(TypeError, match="np_random must be a numpy.random.Generator"):
+        env.np_random = 5
     env.reset(seed=5)
     assert env.np_random_seed == 5
 

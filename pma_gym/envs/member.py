@@ -1,0 +1,191 @@
+"""One environment of a batch, read as a single environment."""
+
+import copy
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NoReturn, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.envs.command import CommandLine
+from pma_gym.envs.history import History, RecordingEngine
+from pma_gym.envs.options import check_known
+from pma_gym.envs.pma_env import NOT_BEGUN, RESET_OPTIONS, PMAEnv
+from pma_gym.envs.summary import step_info
+from pma_gym.plant.plant import Plant
+from pma_gym.tasks import limit_in_words
+
+if TYPE_CHECKING:
+    from pma_gym.envs.vector import PMAVectorEnv
+
+TOGETHER = "the environments of a batch share one engine"
+
+
+class BatchMember(PMAEnv):
+    """One environment of a `PMAVectorEnv`: everything that can be read of a `PMAEnv`.
+
+    It is a view: it shows the episode that runs in the batch when it is asked. `reset` begins an
+    episode in this environment alone. It has no `step`, since the environments of a batch step
+    together, and takes no attributes.
+
+    Args:
+        batch: the batch.
+        index: number of the environment, from 0.
+    """
+
+    _batch: "PMAVectorEnv"
+
+    def __init__(self, batch: "PMAVectorEnv", index: int) -> None:
+        """Find the environment's numbers in the batch."""
+        engine = batch.engine
+        block, lane = divmod(index, engine.width)
+        # A view takes no attributes, see `__setattr__`.
+        values = {
+            "_batch": batch,
+            "_engine": engine,
+            "_index": index,
+            "_row": engine.records[block, :, lane],
+            "_commands": CommandLine(batch.options, batch.task.actuator),
+            "render_mode": batch.render_mode,
+            "spec": batch.spec,
+            "metadata": {k: v for k, v in batch.metadata.items() if k != "autoreset_mode"},
+            "options": batch.options,
+            "task": batch.task,
+            "nominal_plant": engine.nominal,
+            "table": batch.table,
+            "observation_space": batch.single_observation_space,
+            "action_space": batch.single_action_space,
+        }
+        self.__dict__.update(values)
+        self._find_places()
+
+    @property
+    def index(self) -> int:
+        """Its number in the batch."""
+        return self._index
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Take what the class sets; refuse anything else."""
+        if name not in _OWN:
+            raise AttributeError(refusal(name))
+        super().__setattr__(name, value)
+
+    def set_wrapper_attr(self, name: str, value: object, *, force: bool = True) -> NoReturn:
+        """Refused: see the class."""
+        raise AttributeError(refusal(name))
+
+    @property
+    def _idle(self) -> str | None:  # type: ignore[override]
+        """Why there is no episode to go on with; None if there is one."""
+        if not self._batch._begun[self._index]:
+            return NOT_BEGUN
+        return "the episode ended" if self._batch._ended[self._index] else None
+
+    @property
+    def ended_by(self) -> str:  # type: ignore[override]
+        """The limit that terminated the episode, in words, or ""."""
+        model = self._engine.models[self._index]
+        return limit_in_words(model, self._number("ended"), self.task.exercise)
+
+    @property
+    def plant(self) -> Plant:  # type: ignore[override]
+        """The Plant of this episode; differs from the nominal one with `randomisation`."""
+        return self._episode_plant()
+
+    def station_info(self) -> dict[str, Any]:
+        """The numbers of `PMAEnv`'s info in the last step or reset."""
+        return step_info(self._engine, self._index)
+
+    def reset(
+        self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode in this environment; the others go on. See `PMAEnv.reset`."""
+        check_known("reset option", options or {}, RESET_OPTIONS)
+        mask = np.arange(self._batch.num_envs) == self._index
+        seeds = [seed if mine else None for mine in mask.tolist()]
+        observations, _ = self._batch.reset(
+            seed=seeds, options={**(options or {}), "reset_mask": mask}
+        )
+        return observations[self._index].copy(), self.station_info()
+
+    def step(self, action: object) -> NoReturn:
+        """Refused: the environments of a batch step together.
+
+        Raises:
+            RuntimeError: always.
+        """
+        raise RuntimeError(f"{TOGETHER} and step together; call step() of the batch")
+
+    def get_state(self) -> NoReturn:
+        """Refused: the batch has the state.
+
+        Raises:
+            RuntimeError: always.
+        """
+        raise RuntimeError(f"{TOGETHER}; take the state of the whole batch, by its get_state()")
+
+    def set_state(self, state: object) -> NoReturn:
+        """Refused: the batch has the state.
+
+        Raises:
+            RuntimeError: always.
+        """
+        raise RuntimeError(f"{TOGETHER}; put a state into the whole batch, by its set_state()")
+
+    def __copy__(self) -> Self:
+        """Another view of the same environment."""
+        return type(self)(self._batch, self._index)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A view of the same environment in a copy of the batch."""
+        return type(self)(copy.deepcopy(self._batch, memo), self._index)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """The batch and the number, which a pickle of a view holds."""
+        return type(self), (self._batch, self._index)
+
+    def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
+        """The action that commands these voltages (V), see `PMAEnv.action`."""
+        self._commands.begin(self._number("rest_regulator"))
+        return super().action(voltage, regulator_voltage)
+
+    @property
+    def voltages(self) -> NDArray[np.float64]:
+        """Voltage of the task's actuator in every step so far (V), of a batch that renders."""
+        return self._history().voltages
+
+    def trajectory(self) -> NoReturn:
+        """Refused: a batch does not keep it.
+
+        Raises:
+            AttributeError: always.
+        """
+        raise AttributeError(
+            "a batch keeps no trajectory at 384 Hz; step a single PMAEnv with the same seed and "
+            "actions, which has the same episode"
+        )
+
+    def _history(self) -> History:
+        if not isinstance(self._engine, RecordingEngine):
+            raise AttributeError(
+                "a batch keeps the voltages of its episodes only when it renders; make it with "
+                'render_mode="rgb_array"'
+            )
+        return self._engine.history(self._index)
+
+    def _drawing(self) -> Any:  # noqa: ANN401 - a Picture, whose module needs matplotlib
+        return self._batch._drawing()
+
+    def close(self) -> None:
+        """Do nothing: the batch has the picture and the threads."""
+
+
+_OWN = ("_places", "_datum", "_heard", "_np_random", "_np_random_seed")
+
+
+def refusal(name: str) -> str:
+    """Why an attribute of an environment in a batch cannot be set, and what can be done."""
+    return (
+        f"attribute {name!r} cannot be set: {TOGETHER}, and have no attributes of their own; give "
+        "options when the environments are made, and pressure_kpa by set_options() before reset()"
+    )
