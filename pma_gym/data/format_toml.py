@@ -52,14 +52,19 @@ def _choice(table: Mapping[str, object], key: str, known: tuple[str, ...]) -> st
 def _encoding(value: object) -> str | None:
     if value is None:
         return None
-    if isinstance(value, str):
-        try:
-            # Codecs like "zip" are none of text.
-            b"".decode(codecs.lookup(value).name)
-            return value
-        except (LookupError, ValueError):
-            pass
+    if isinstance(value, str) and _is_text_encoding(value):
+        return value
     raise _wrong("encoding", "the name of a text encoding", value, 'encoding = "cp1252"')
+
+
+def _is_text_encoding(name: str) -> bool:
+    """Whether a codec makes text of bytes: not "zip", nor those of internet names."""
+    try:
+        # The bytes need not be text in it.
+        b"aaaa".decode(codecs.lookup(name).name, "replace")
+    except (LookupError, ValueError):
+        return False
+    return codecs.lookup(name).name not in ("idna", "punycode", "undefined")
 
 
 def _header_row(value: object) -> int | None:

@@ -21,6 +21,8 @@ BLANKS = " "
 
 _LOOKED_AT = 1000
 """Lines by which the separator is chosen."""
+_SEARCHED = 200
+"""Rows from the top among which a header is looked for."""
 _SHARE = 0.6
 """Share of the lines that must agree on their number of separators."""
 
@@ -109,19 +111,18 @@ def _uncommented_header(rows: list[Row], request: Request) -> list[Row]:
 
     NumPy and gnuplot write `# time_s, load_n`.
     """
-    leading = [i for i, row in enumerate(rows) if str(row[1][0]).lstrip().startswith(COMMENTS)]
-    leading = [i for n, i in enumerate(leading) if n == i]
-    if not leading or any(
-        request.is_time(str(cell).strip()) for _, row in rows[:200] for cell in row
-    ):
+    marked = [str(row[1][0]).lstrip().startswith(COMMENTS) for row in rows[:_SEARCHED]]
+    leading = marked.index(False) if False in marked else 0
+    named = (cell for _, row in rows[leading:_SEARCHED] for cell in row)
+    if not leading or any(request.is_time(str(cell).strip()) for cell in named):
         return rows
-    number, texts = rows[leading[-1]]
+    number, texts = rows[leading - 1]
     row = [str(cell) for cell in texts]
     bare = [re.sub(r"^\s*(?:#|%|//)+\s*", "", row[0]), *row[1:]]
     bare = bare[1:] if not bare[0].strip() else bare
     if any(request.is_time(cell.strip()) for cell in bare):
         rows = list(rows)
-        rows[leading[-1]] = (number, bare)
+        rows[leading - 1] = (number, bare)
     return rows
 
 

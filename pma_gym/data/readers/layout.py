@@ -177,12 +177,10 @@ def _text(cell: object) -> str:
 
 
 def _names(file: str, row: Row) -> list[str]:
-    """Names of the columns, less the empty ones at the end."""
+    """Names of the columns, "" where there is none."""
     names = [_text(cell) for cell in row[1]]
     for name in names:
         check_limit(f"the header of {file}", "cell_characters", len(name))
-    while names and not names[-1]:
-        names.pop()
     check_limit(file, "columns", len(names))
     return names
 
@@ -218,6 +216,7 @@ def _units(rows: Sequence[Row], width: int) -> tuple[dict[int, str], list[str]]:
 def _check_rows(file: str, samples: Sequence[Row], header: Sequence[str], padded: bool) -> None:
     """Refuse rows of another length than the header's, and rows that are no samples."""
     width = len(header)
+    least = max((i + 1 for i, name in enumerate(header) if name), default=0)
     for number, row in samples:
         if not _is_sample(row) and any(_filled(cell) for cell in row):
             again = [_text(cell) for cell in row[:width]] == list(header)
@@ -229,9 +228,9 @@ def _check_rows(file: str, samples: Sequence[Row], header: Sequence[str], padded
                     else "remove the row, or let it begin with #"
                 )
             )
-        if (len(row) < width and not padded) or any(_filled(cell) for cell in row[width:]):
+        if (len(row) < least and not padded) or any(_filled(cell) for cell in row[width:]):
             raise TrialError(
-                f"row {number} of {file} has {len(row)} cells, its header has {width}; complete "
+                f"row {number} of {file} has {len(row)} cells, its header has {least}; complete "
                 "the row, and write numbers with a decimal point (a decimal comma splits a cell)"
             )
 
