@@ -63,7 +63,7 @@ def _table(content: bytes, file: str, request: Request) -> Table:
         for name in dict.fromkeys(schema.names)
         if name in leaves and (kinds[name] != "text" or request.is_known(name)) and kinds[name]
     ]
-    _check_pages(content, file, meta, leaves, {name: kinds[name] for name in taken})
+    _check_pages(content, file, {leaves.index(name): kinds[name] for name in taken})
     texts = [name for name in taken if kinds[name] == "text"]
     source = parquet.ParquetFile(
         io.BytesIO(content),
@@ -101,33 +101,17 @@ def _kind(type_: Any) -> str:  # noqa: ANN401
     return "text" if text else ""
 
 
-def _check_pages(
-    content: bytes,
-    file: str,
-    meta: Any,  # noqa: ANN401
-    leaves: list[str],
-    kinds: dict[str, str],
-) -> None:
+def _check_pages(content: bytes, file: str, kinds: dict[int, str]) -> None:
     """Refuse pages that unpack beyond the limit; what the file's end declares is not trusted."""
     unpacked = 0
-    check_limit(file, "rows", meta.num_row_groups)
-    for group in range(meta.num_row_groups):
-        chunks = meta.row_group(group)
-        for index, name in enumerate(leaves):
-            if name not in kinds:
-                continue
-            chunk = chunks.column(index)
-            start = chunk.data_page_offset
-            if chunk.has_dictionary_page and chunk.dictionary_page_offset:
-                start = min(start, chunk.dictionary_page_offset)
-            for page in read_pages(content, start, chunk.total_compressed_size):
-                unpacked += page.unpacked
-                check_limit(file, "table_mib", unpacked / 2**20)
-                if kinds[name] == "text" and page.encoding == DELTA_BYTE_ARRAY:
-                    raise UnreadableError(
-                        f"column {name!r} of {file} holds texts that refer to each other; write "
-                        "numbers, or texts with another encoding"
-                    )
+    for index, page in read_pages(content):
+        unpacked += page.unpacked if index in kinds else 0
+        check_limit(file, "table_mib", unpacked / 2**20)
+        if kinds.get(index) == "text" and page.encoding == DELTA_BYTE_ARRAY:
+            raise UnreadableError(
+                f"column {index + 1} of {file} holds texts that refer to each other; write "
+                "numbers, or texts with another encoding"
+            )
 
 
 def _cells(column: Any, kind: str, is_time: bool, file: str) -> Cells:  # noqa: ANN401

@@ -281,7 +281,7 @@ def test_texts_that_refer_to_each_other_are_refused(tmp_path, parquet):
         use_dictionary=False,
         column_encoding={"load_n": "DELTA_BYTE_ARRAY"},
     )
-    assert "'load_n' of a.parquet holds texts that refer to each other" in refused(path)
+    assert "column 4 of a.parquet holds texts that refer to each other" in refused(path)
 
 
 def test_a_wide_file_is_refused_at_once(tmp_path, monkeypatch):
