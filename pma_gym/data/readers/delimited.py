@@ -1,7 +1,6 @@
 """Text tables: cells between commas, semicolons, tabs, bars or blanks."""
 
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from pma_gym.data.readers import labview
 from pma_gym.data.readers.decoding import decode_text
 from pma_gym.data.readers.layout import COMMENTS, Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import check_limit
 
@@ -51,9 +51,9 @@ def split_rows(text: str, file: str, request: Request) -> list[Row]:
     Raises:
         TrialError: quotes that do not end, or more rows, columns or cells than are read.
     """
-    lines = list(io.StringIO(text, newline=""))
-    check_limit(file, "rows", len(lines))
+    lines = split_lines(text, file)
     separator = request.format.separator or choose_separator(lines, request)
+    check_widths(lines, separator, file)
     rows: list[Row] = []
     cells = 0
     for number, row in _split(lines, separator, file):

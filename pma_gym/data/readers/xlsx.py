@@ -96,6 +96,8 @@ def _tables(archive: zipfile.ZipFile, file: str, request: Request, size: int) ->
     names = {info.filename for info in infos}
     sheets, epoch = _sheet_names(archive, names)
     check_limit(file, "sheets", len(sheets))
+    if len({part for _, _, part in sheets}) < len(sheets):
+        raise _BadXml("two of its sheets are one")
     texts = _shared_texts(archive, file) if _TEXTS in names else []
     dates = _date_styles(archive) if _STYLES in names else set()
     book = _Book(texts, dates, epoch)
