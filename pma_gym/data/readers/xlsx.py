@@ -43,12 +43,10 @@ class _Sheet:
     Attributes:
         rows: number and cells of rows that are not empty.
         unstored: (row, column) of formulas without a stored value.
-        stored: columns in which some formula has one.
     """
 
     rows: list[Row] = field(default_factory=list)
     unstored: list[tuple[int, int]] = field(default_factory=list)
-    stored: set[int] = field(default_factory=set)
 
 
 @dataclass
@@ -146,9 +144,9 @@ def _arranged(
 
 
 def _check_formulas(table: Table, sheet: _Sheet, title: str) -> None:
-    """Refuse a column of formulas whose values a spreadsheet program never stored."""
+    """Refuse formulas whose values a spreadsheet program never stored."""
     rows = set(table.rows)
-    lost = [(r, c) for r, c in sheet.unstored if c not in sheet.stored and r in rows]
+    lost = [(row, column) for row, column in sheet.unstored if row in rows]
     if lost:
         row, column = lost[0]
         more = f" and {len(lost) - 1} more" if len(lost) > 1 else ""
@@ -331,11 +329,9 @@ class _SheetReader:
         assert self._cell is not None
         value = self._value(self._cell)
         if self._formula:
-            if value is None:
-                if len(self.sheet.unstored) < 2_000_000:
-                    self.sheet.unstored.append((self._number, self._column))
-            else:
-                self.sheet.stored.add(self._column)
+            # A formula that gives an empty text says so: its type is "str".
+            if value is None and self._cell.get("t") != "str":
+                self.sheet.unstored.append((self._number, self._column))
         self._cell = None
         if value is None:
             return

@@ -409,3 +409,17 @@ def test_a_format_that_cannot_be_used_is_refused(tmp_path, line, message):
     (tmp_path / "dataset.toml").write_text(f"[format]\n{line}")
     with pytest.raises(TrialError, match=re.escape(message)):
         read_dataset(tmp_path)
+
+
+def test_a_known_mark_in_many_cells_is_no_unit(tmp_path):
+    rows = lines()
+    rows[9:27] = [row.replace(f",{row.split(',')[2]},", ",-999,") for row in rows[9:27]]
+    assert "contraction_mm of ramp.csv is -999 in row 10, 11" in refused(tmp_path, "\n".join(rows))
+
+
+def test_a_mark_in_a_command_is_no_count_of_a_daq(tmp_path):
+    rows = lines()
+    rows[9] = rows[9].replace(f",{rows[9].split(',')[1]},", ",-999,", 1)
+    message = refused(tmp_path, "\n".join(rows))
+    assert "motor_voltage_v of ramp.csv is -999 in row 10" in message
+    assert "DAQ" not in message
