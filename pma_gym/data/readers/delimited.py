@@ -11,7 +11,7 @@ from pma_gym.data.readers.layout import COMMENTS, Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
 from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.limits import check_limit
+from pma_gym.limits import check_limit, limit
 
 SEPARATORS = ("\t", ";", "|", ",")
 """In the order of preference: a comma may be a decimal mark where another one separates."""
@@ -55,13 +55,14 @@ def split_rows(text: str, file: str, request: Request) -> list[Row]:
     separator = request.format.separator or choose_separator(lines, request)
     check_widths(lines, separator, file)
     rows: list[Row] = []
-    cells = 0
+    cells, most_columns, most_cells = 0, limit("columns"), limit("cells")
     for number, row in _split(lines, separator, file):
         if not any(cell.strip() for cell in row):
             continue
-        check_limit(file, "columns", len(row))
         cells += len(row)
-        check_limit(file, "cells", cells)
+        if len(row) > most_columns or cells > most_cells:
+            check_limit(file, "columns", len(row))
+            check_limit(file, "cells", cells)
         rows.append((number, row))
     return _uncommented_header(rows, request)
 
