@@ -328,3 +328,11 @@ def test_a_text_of_many_short_lines_is_refused(tmp_path, monkeypatch):
     monkeypatch.setenv("PMA_GYM_MAX_TEXT_MIB", "1")
     (tmp_path / "a.txt").write_text("x" * 2**21)
     assert "limit of 1 MiB a text file" in refused(tmp_path / "a.txt")
+
+
+def test_an_odd_tdms_file_prints_nothing(tmp_path, capfd):
+    path = tmp_path / "a.tdms"
+    tdms(path, {"log": COLUMNS})
+    path.write_bytes(path.read_bytes() + (b"TDSm" + struct.pack("<iIQQ", 0, 4711, 0, 0)) * 9)
+    check(read_trial(path))
+    assert capfd.readouterr() == ("", "")
