@@ -11,7 +11,7 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -33,7 +33,7 @@ from pma_gym.data.trial_columns import (
     suggestion,
 )
 from pma_gym.data.trial_formats import ENCODERS
-from pma_gym.data.trial_hints import mapping_line
+from pma_gym.data.trial_hints import looks_like, mapping_line
 from pma_gym.data.trial_loading import load_table
 from pma_gym.files import OutputError, check_output, replace_file
 
@@ -69,7 +69,7 @@ def read_trial(
     Returns:
         The trial; its provenance is what the file carries (a CSV file carries none).
     Raises:
-        TrialError: the file cannot be used; names file, row, column, rule and mend.
+        TrialError: the file cannot be used; names file, row, column, rule and fix.
     Warns:
         TrialWarning: what is passed over or converted: unknown columns, titles, footers, repeated
             rows, dates; a time of over ten minutes, which may be no seconds; readings at an end of
@@ -210,12 +210,22 @@ def _match(table: Table, mapping: ColumnMap) -> list[Source]:
         raise kind(
             f"{table.file} has no column time_s; its columns are "
             f"{', '.join(strange or _few(named))}; rename one, or map it in [columns]"
+            f"{_time_hint(unknown.values())}"
         )
     if strange:
         _warn(f"{table.file}: unknown columns are ignored: {', '.join(strange)}")
     if absent:
         _warn(f"{table.file} lacks columns that [columns] maps: {', '.join(absent)}")
     return found
+
+
+def _time_hint(names: Iterable[str]) -> str:
+    """The line of `[columns]` for a column that looks like the time, if one does."""
+    for name in names:
+        guess = looks_like(name)
+        if guess and guess[0].kind == "time":
+            return f" of dataset.toml, for example: {mapping_line(name, *guess)}"
+    return ""
 
 
 def _doubt_time(time: NDArray[np.float64], table: Table) -> None:
