@@ -301,3 +301,17 @@ def test_unchanged_seeds_are_read(suffix, tmp_path):
     for content in text_seeds() if suffix == ".csv" else binary_seeds(suffix):
         check(suffix, content, tmp_path, counts)
     assert counts["read"] >= counts.get("refused", 0)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "seed"),
+    [
+        # pyarrow's own description of a damaged file ended the process.
+        (".parquet", 213),
+        # zipfile raised what it does not name: a negative place in the file.
+        (".xlsx", 10515),
+        (".xlsx", 16025),
+    ],
+)
+def test_what_once_failed_is_one_message(suffix, seed, tmp_path):
+    check(suffix, example(suffix, seed), tmp_path)
