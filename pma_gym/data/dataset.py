@@ -5,13 +5,13 @@ import re
 import warnings
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pma_gym.data.dataset_checks import check_signals, empty_runs
 from pma_gym.data.dataset_toml import DESCRIPTION, Description, read_description
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_columns import TrialError
+from pma_gym.data.trial_columns import ColumnMap, TrialError
 from pma_gym.data.trial_files import TrialWarning, read_header, read_trial
 from pma_gym.data.trial_formats import DECODERS
 from pma_gym.data.trial_hints import strange_columns
@@ -51,11 +51,17 @@ class Dataset:
         title: a line for people.
         model: name or path of the model to compare them with; None if none is named.
         trials: in the order of their files' names.
+        folder: where they were read from; None for trials that are no files.
+        columns: the lab's names to ours, as `dataset.toml` has them.
+        checked: what the checks of the data said; None before they ran.
     """
 
     title: str
     model: str | None
     trials: tuple[NamedTrial, ...]
+    folder: Path | None = None
+    columns: ColumnMap = field(default_factory=dict)
+    checked: tuple[str, ...] | None = None
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -85,7 +91,8 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     trials = tuple(_named(path, description, doubts) for path in files)
     for message in _gathered(doubts, len(files)):
         warnings.warn(message, TrialWarning, stacklevel=2)
-    return Dataset(description.title or folder.resolve().name, description.model, trials)
+    title = description.title or folder.resolve().name
+    return Dataset(title, description.model, trials, folder, description.columns)
 
 
 def _files(folder: Path) -> list[Path]:
