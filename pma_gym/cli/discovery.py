@@ -14,7 +14,6 @@ from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
 from pma_gym.cli.terminal import say, warnings_said
 from pma_gym.data.dataset import Dataset, read_dataset
-from pma_gym.data.trial_files import encode_trial
 from pma_gym.files import OutputError
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -70,6 +69,7 @@ def diagnose(
     results.check(force, resume)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
+    from pma_gym.discovery.proposed_file import proposed_file
     from pma_gym.discovery.report import report_page
 
     with results.opened(resume):
@@ -83,7 +83,7 @@ def diagnose(
             ).encode(),
         }
         if found.next_experiment:
-            files["next.csv"] = encode_trial(found.next_experiment.trial, "next.csv")
+            files["next.csv"] = proposed_file(found.next_experiment.trial, trials, given)
         results.write(files)
     from pma_gym.discovery.summary import diagnosis_summary
 

@@ -22,8 +22,8 @@ MATTERS = 0.01
 """Share of a step that rounding must be, to matter: less shakes no signal beyond its noise."""
 
 LEAST_SHARE, LEAST_COUNT = 0.01, 5
-"""Share and number of steps that must be of the rarer length: a few longer steps are rows that are
-missing, not rounding."""
+"""Share and number of steps that must be of the rarer length where the other is one last digit: a
+few longer steps are rows that are missing, not rounding."""
 
 TOLERANCE = 0.6
 """Largest distance of a stamp from the even clock, in last digits: half of one, and what a straight
@@ -75,10 +75,13 @@ def even_clock(time: Array) -> EvenClock | None:
     steps = np.diff(np.rint(since / quantum))
     if (steps < 0).any() or (steps == steps[0]).all():
         return None
-    common = steps[steps <= 1.5 * np.median(steps) + 1.0]
-    short, long = float(common.min()), float(common.max())
-    rarer = min(np.sum(common == short), np.sum(common == long))
-    if long - short != 1.0 or rarer < max(LEAST_COUNT, LEAST_SHARE * common.size):
+    usual = float(np.median(steps))
+    short = usual - 1.0 if np.sum(steps == usual - 1.0) > np.sum(steps == usual + 1.0) else usual
+    long = short + 1.0
+    rarer = min(np.sum(steps == short), np.sum(steps == long))
+    # A row that is missing makes a step of 1 one of 2: then rounding must show more often.
+    least = max(LEAST_COUNT, LEAST_SHARE * steps.size) if short <= 1.0 else 1
+    if (steps < short).any() or rarer < least:
         return None
     counts = _counts(steps, long)
     step, offset = np.polyfit(counts, since, 1)

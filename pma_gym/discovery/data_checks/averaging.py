@@ -20,10 +20,10 @@ Array = NDArray[np.float64]
 MOST_ROWS = 60_000
 """Rows of all trials together from which on they are averaged."""
 
-AIM_ROWS = 25_000
+AIM_ROWS = 16_000
 """Rows that are aimed at then."""
 
-SLOWEST_HZ = 90.0
+SLOWEST_HZ = 60.0
 """Least rate that is left: slower would hide the rotor's oscillation on the cable."""
 
 BEND = 1e-4
@@ -55,8 +55,8 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
     how = f"{most}" if least == most else f"{least} to {most}"
     return kept, [
         f"the {len(named)} trials have {total} rows: readings are averaged over {how} rows each, "
-        f"which leaves {left}; commands are kept to 0.01 % of their range. What is faster than that "
-        "is not looked for; cut the log to the part that matters if you need it"
+        f"which leaves {left}; commands are kept to 0.01 % of their range. What is faster "
+        "than that is not looked for: cut the log to the part that matters if you need it"
     ]
 
 

@@ -20,6 +20,9 @@ from pma_gym.discovery.data_checks.units import (
 )
 from pma_gym.plant.model import Model
 
+FAR_M = 0.02
+"""Distance from the simulated contraction (m) from which on a zero is proposed too."""
+
 COMMAND_OF = {"load": "load_command", "pressure": "pressure_command"}
 
 
@@ -68,7 +71,8 @@ def _of_motion(
         else:
             seen += f": {unit.words}"
         if not right:
-            said.append(f"{seen}; {_for_unit(dataset, named, quantity, unit)}")
+            zero = _zero(quantity, unit, [pair for pair in found if pair.number in numbers])
+            said.append(f"{seen}; {_for_unit(dataset, named, quantity, unit, zero)}")
         elif len(numbers) >= len(right):
             files = [named[number].name for number in numbers]
             said.append(f"{seen}, in {', '.join(files)}; {_renamed(name, unit)}")
@@ -82,12 +86,26 @@ def _renamed(name: str, unit: Unit) -> str:
     return f"rename the column to {other} there, and under [columns] of dataset.toml write: {line}"
 
 
-def _for_unit(dataset: Dataset, named: Sequence[NamedTrial], quantity: str, unit: Unit) -> str:
-    """How to correct a column that all files have in a unit."""
+def _for_unit(
+    dataset: Dataset, named: Sequence[NamedTrial], quantity: str, unit: Unit, zero: float = 0.0
+) -> str:
+    """How to correct a column that all files have in a unit, and from another zero (SI)."""
     names = [each.name for each in named]
     if unit.command:
         return _how(dataset, names, COMMAND_OF[quantity], unit.factor)
-    return _how(dataset, names, quantity, 1.0 / unit.factor, -unit.offset / unit.factor)
+    return _how(dataset, names, quantity, 1.0 / unit.factor, zero - unit.offset / unit.factor)
+
+
+def _zero(quantity: str, unit: Unit, found: Sequence[Pair]) -> float:
+    """What a corrected contraction is to be moved by (m): 0 unless it is far from a muscle's.
+
+    Its zero is free in every trial, so a whole millimetre will do.
+    """
+    if quantity != "contraction":
+        return 0.0
+    signals = [pair.signal(quantity)[1:] for pair in found]
+    away = float(np.median([np.median(s) - np.median(m) / unit.factor for s, m in signals]))
+    return round(1e3 * away) * 1e-3 if abs(away) > FAR_M else 0.0
 
 
 def _of_pressure(
