@@ -1,9 +1,9 @@
 """Long logs with fewer rows: readings averaged, commands kept.
 
-What a diagnosis costs grows with its rows. Readings are averaged over blocks of rows: nothing faster
-folds into what is left, and their noise falls. The average is a parabola's value at the block's
-middle (Savitzky and Golay), since a plain mean cuts the corners of a course, which a fit takes for
-physics. Commands keep every row that joining the others would miss.
+What a diagnosis costs grows with its rows. Readings are averaged over blocks of rows: nothing
+faster folds into what is left, and their noise falls. The average is a parabola's value at the
+block's middle (Savitzky and Golay), since a plain mean cuts the corners of a course, which a fit
+takes for physics. Commands keep every row that joining the others would miss.
 """
 
 import math
