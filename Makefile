@@ -21,7 +21,7 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test lint style types layers pages docs clean distclean
+.PHONY: help bench peers test fuzz lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -36,6 +36,9 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+
+fuzz: $(FULL) ## Feed changed files to every reader, PMA_GYM_FUZZ_EXAMPLES a test (default 10000).
+	PMA_GYM_FUZZ_EXAMPLES=$${PMA_GYM_FUZZ_EXAMPLES:-10000} $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 

@@ -2,11 +2,13 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
 from pma_gym.data.trial_files import place_in_file, read_header
@@ -50,13 +52,16 @@ class _Slip:
     extra: str = ""
 
 
-def check_signals(path: Path, trial: Trial, columns: ColumnMap) -> None:
+def check_signals(
+    path: Path, trial: Trial, columns: ColumnMap, form: FileFormat | None = None
+) -> None:
     """Refuse a trial whose values cannot be in the columns' units, or with a dead sensor.
 
     Args:
         path: its file.
         trial: what was read.
         columns: the lab's names to ours.
+        form: what the lab says about its files.
     Raises:
         TrialError: names file, column, row, rule and mend.
     """
@@ -68,12 +73,12 @@ def check_signals(path: Path, trial: Trial, columns: ColumnMap) -> None:
     for find in (_contraction, _pressure, _load, _rotation):
         slip = find(door)
         if slip:
-            raise TrialError(_slip_words(path, slip, door[slip.quantity], columns))
+            raise TrialError(_slip_words(path, slip, door[slip.quantity], columns, form))
     for quantity in trial.measurements:
         _check_alive(path, quantity, door)
 
 
-def empty_runs(path: Path, trial: Trial) -> Iterator[str]:
+def empty_runs(path: Path, trial: Trial, table: Table | None = None) -> Iterator[str]:
     """Words on measurements that are empty in over half of a trial's rows."""
     for quantity, values in trial.measurements.items():
         empty = np.isnan(values)
@@ -86,8 +91,9 @@ def empty_runs(path: Path, trial: Trial) -> Iterator[str]:
         edges = np.flatnonzero(np.diff(np.r_[0, empty, 0]))
         starts, ends = edges[::2], edges[1::2]
         longest = int(np.argmax(ends - starts))
-        first = place_in_file(path, int(starts[longest])).partition(" of ")[0]
-        last = place_in_file(path, int(ends[longest] - 1)).partition(" of ")[0]
+        place = table.place if table else partial(place_in_file, path)
+        first = place(int(starts[longest])).partition(" of ")[0]
+        last = place(int(ends[longest] - 1)).partition(" of ")[0]
         yield (
             f"{name} is empty in {empty.sum()} of {empty.size} rows, the longest gap from {first} "
             f"to {last}; there it counts as not measured"
@@ -101,10 +107,18 @@ def _span(values: Array | None) -> float:
     return float(np.nanmax(values) - np.nanmin(values))
 
 
+_BULK = 0.99
+"""Share of the readings that a unit is guessed from: one wild reading is no unit."""
+
+
 def _largest(values: Array | None) -> float:
+    """Largest magnitude of the bulk of the readings; 0 if nothing was measured."""
     if values is None or not np.isfinite(values).any():
         return 0.0
-    return float(np.nanmax(np.abs(values)))
+    sizes = np.sort(np.abs(values[np.isfinite(values)]))
+    # Of few readings all but the largest are the bulk.
+    last = min(int(np.ceil(_BULK * sizes.size)), max(sizes.size - 1, 1))
+    return float(sizes[last - 1])
 
 
 def _moved(door: dict[str, Array], quantity: str) -> str:
@@ -210,16 +224,18 @@ def _change(door: dict[str, Array], command: str) -> str:
     return f"{column.name} goes from {low:.4g} to {high:.4g} {column.unit}"
 
 
-def _slip_words(path: Path, slip: _Slip, values: Array, columns: ColumnMap) -> str:
+def _slip_words(
+    path: Path, slip: _Slip, values: Array, columns: ColumnMap, form: FileFormat | None
+) -> str:
     """The message on a column in another unit."""
     column = BY_QUANTITY[slip.quantity]
-    place = place_in_file(path, int(np.nanargmax(np.abs(values))))
+    place = place_in_file(path, int(np.nanargmax(np.abs(values))), columns, form)
     said = f"{column.name} {slip.seen} ({place}); it looks like {slip.unit}"
     if slip.extra:
         said += f", {slip.extra}"
     if not slip.factor:
         return f"{said}: give [columns] of dataset.toml a factor"
-    for name in read_header(path):
+    for name in read_header(path, columns, form):
         entry = columns.get(name)
         if (entry.get("name", name) if isinstance(entry, dict) else entry) == column.name:
             return f"{said}: multiply factor and offset of {name!r} in [columns] by {slip.factor:g}"

@@ -7,10 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from pma_gym.data.format_toml import file_format
+from pma_gym.data.readers.table import PART, FileFormat
 from pma_gym.data.trial_columns import ColumnMap, TrialError, sources, suggestion
 
 DESCRIPTION = "dataset.toml"
-_KEYS = ("title", "model", "columns", "trials")
+_KEYS = ("title", "model", "columns", "format", "trials")
 _TRIAL_KEYS = ("order", "repeat_of", "note")
 
 
@@ -22,12 +24,14 @@ class Description:
         title: a line for people; empty if none is given.
         model: name or path of a model, or None.
         columns: the lab's column names to ours.
+        form: what the files leave open: separator, decimal mark, encoding...
         trials: `order`, `repeat_of` and `note` by file name.
     """
 
     title: str = ""
     model: str | None = None
     columns: ColumnMap = field(default_factory=dict)
+    form: FileFormat = field(default_factory=FileFormat)
     trials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
 
@@ -59,6 +63,7 @@ def read_description(folder: Path, files: Sequence[str]) -> Description:
         title=_text(document, "title", DESCRIPTION) or "",
         model=_model(folder, _text(document, "model", DESCRIPTION)),
         columns=columns,
+        form=file_format(_table(document, "format")),
         trials=_trials(_table(document, "trials"), files),
     )
 
@@ -116,7 +121,8 @@ def _model(folder: Path, given: str | None) -> str | None:
 def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[str, Any]]:
     """What is said about each trial, checked."""
     for name, table in tables.items():
-        if name not in files:
+        # Which parts a file has is known when it has been read.
+        if name not in files and name.partition(PART)[0] not in files:
             raise TrialError(
                 f'[trials."{name}"] in {DESCRIPTION} names no file of the data set'
                 f"{suggestion(name, files)}; write the file's whole name, ending included"
@@ -145,7 +151,7 @@ def _check_repeat(
 ) -> None:
     if original is None:
         return
-    if original not in files:
+    if original not in files and original.partition(PART)[0] not in files:
         raise TrialError(
             f"repeat_of in {place} is {original!r}, which names no trial"
             f"{suggestion(original, files)}; write the file's whole name, ending included"

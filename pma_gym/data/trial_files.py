@@ -10,11 +10,18 @@ digits of the value at the door: within 4 ulp.
 import os
 import re
 import warnings
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.readers.cells import cell_number, decimal_mark, has_groups, looks_ambiguous
+from pma_gym.data.readers.clock import clock_seconds, epoch_seconds
+from pma_gym.data.readers.table import Cells, FileFormat, Table, UnreadableError, shown
+from pma_gym.data.readers.units import unit_factor
+from pma_gym.data.sentinels import check_sentinels
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_checks import check_commanded, check_time, check_values
 from pma_gym.data.trial_columns import (
@@ -25,10 +32,11 @@ from pma_gym.data.trial_columns import (
     sources,
     suggestion,
 )
-from pma_gym.data.trial_formats import DECODERS, ENCODERS, Table
+from pma_gym.data.trial_formats import ENCODERS
+from pma_gym.data.trial_hints import mapping_line
+from pma_gym.data.trial_loading import load_table
 from pma_gym.files import OutputError, check_output, replace_file
 
-_NEEDED = "a trial needs a header with time_s and a command, and a row for each sample"
 USUAL_S = 600.0
 """Longest trial (s) whose time is not doubted; the dissertation's last 15 s."""
 
@@ -39,8 +47,12 @@ class TrialWarning(UserWarning):
     """Something in a trial's file was passed over; the message says what."""
 
 
-def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -> Trial:
-    """A trial from a CSV, Parquet or XLSX file.
+def read_trial(
+    path: str | os.PathLike[str],
+    columns: ColumnMap | None = None,
+    form: FileFormat | None = None,
+) -> Trial:
+    """A trial from a text, Parquet, XLSX, LabVIEW, MAT, HDF5 or TDMS file.
 
     Columns are matched by name: `time_s`, a command (`motor_voltage_v`, `regulator_voltage_v`,
     `load_command_n`, `pressure_command_kpa`) and any of `contraction_mm`, `rotation_deg`,
@@ -49,27 +61,48 @@ def read_trial(path: str | os.PathLike[str], columns: ColumnMap | None = None) -
     counts from its first value). An empty cell is not measured: NaN.
 
     Args:
-        path: the file; its suffix tells the format.
+        path: the file; its suffix tells the format. `march.xlsx#run2` names one of several sheets,
+            segments, groups or structures.
         columns: the file's own names to ours, with factor and offset (see `ColumnMap`).
+        form: separator, decimal mark, encoding, header, names and marks of missing values, where
+            the file leaves them open.
     Returns:
         The trial; its provenance is what the file carries (a CSV file carries none).
     Raises:
         TrialError: the file cannot be used; names file, row, column, rule and mend.
     Warns:
-        TrialWarning: unknown columns, which are passed over; a time of over ten minutes, which may
-            be no seconds; readings at an end of their sensor's range, which are not measured.
+        TrialWarning: what is passed over or converted: unknown columns, titles, footers, repeated
+            rows, dates; a time of over ten minutes, which may be no seconds; readings at an end of
+            their sensor's range, which are not measured.
     """
-    path = Path(path)
-    table = _load(path)
-    mapping = columns or {}
-    found = _match(table, mapping)
-    arrays = {source.column.quantity: _door_values(source, table) for source in found}
+    form = form or FileFormat()
+    return trial_of(load_table(path, columns, form), columns or {}, form)
+
+
+def trial_of(table: Table, mapping: ColumnMap, form: FileFormat) -> Trial:
+    """The trial in a table; see `read_trial`.
+
+    Args:
+        table: what `load_tables` gave.
+        mapping: the lab's names of columns to ours.
+        form: what the lab says about its files.
+    Returns:
+        The trial.
+    Raises:
+        TrialError: names file, row, column, rule and fix.
+    """
+    known = _match(table, mapping)
+    for remark in table.remarks:
+        _warn(f"{table.file}: {remark}")
+    _check_units(known, table, mapping)
+    mark = form.decimal or decimal_mark(table.cells[source.index] for source in known)
+    arrays = {source.column.quantity: _file_values(source, table, form, mark) for source in known}
     check_time(arrays["time"], table.place)
     _doubt_time(arrays["time"], table)
     check_commanded(arrays, table.file)
     inside = {
         source.column.quantity: source.column.to_si(arrays[source.column.quantity])
-        for source in found
+        for source in known
     }
     kinds: dict[str, dict[str, NDArray[np.float64]]] = {"command": {}, "measurement": {}}
     for column in COLUMNS[1:]:
@@ -91,21 +124,31 @@ def check_writable(path: str | os.PathLike[str]) -> None:
     """
     path = Path(path)
     if not path.is_dir():
-        _suffix(path)
+        _written_suffix(path)
     try:
         check_output(path)
     except OutputError as error:
         raise TrialError(str(error)) from None
 
 
-def place_in_file(path: str | os.PathLike[str], sample: int) -> str:
+def place_in_file(
+    path: str | os.PathLike[str],
+    sample: int,
+    columns: ColumnMap | None = None,
+    form: FileFormat | None = None,
+) -> str:
     """Where a sample of a trial stands in the file that it was read from: `row 3 of ramp.csv`."""
-    return _load(Path(path)).place(sample)
+    table = load_table(path, columns, form)
+    return table.place(min(sample, len(table.rows) - 1))
 
 
-def read_header(path: str | os.PathLike[str]) -> list[str]:
+def read_header(
+    path: str | os.PathLike[str],
+    columns: ColumnMap | None = None,
+    form: FileFormat | None = None,
+) -> list[str]:
     """Names of a file's columns, as they stand there."""
-    return list(_load(Path(path)).header)
+    return list(load_table(path, columns, form).header)
 
 
 def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
@@ -136,31 +179,15 @@ def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
         for column in COLUMNS
         if column.quantity in held
     }
-    return ENCODERS[_suffix(Path(path))](columns, trial.provenance)
+    return ENCODERS[_written_suffix(Path(path))](columns, trial.provenance)
 
 
-def _load(path: Path) -> Table:
-    """The file's table, which has a header and a row."""
-    if path.is_dir():
-        raise TrialError(f"{path} is a folder; name a {' or '.join(DECODERS)} file in it")
-    decode = DECODERS[_suffix(path)]
-    if not path.is_file():
-        raise TrialError(f"there is no file {path}; check the name and the folder")
-    content = path.read_bytes()
-    table = decode(content, path.name) if content else Table(path.name, [], [], [])
-    if not table.header:
-        raise TrialError(f"{path.name} is empty; {_NEEDED}")
-    if not table.rows:
-        raise TrialError(f"{path.name} has a header but no rows; {_NEEDED}")
-    return table
-
-
-def _suffix(path: Path) -> str:
-    """The suffix in lower case, if there is a format for it."""
+def _written_suffix(path: Path) -> str:
+    """The suffix in lower case, if trials are written in that format."""
     suffix = path.suffix.lower()
-    if suffix not in DECODERS:
+    if suffix not in ENCODERS:
         raise TrialError(
-            f"{path.name} must end in {', '.join(DECODERS)}, got {path.suffix or 'no suffix'!r}; "
+            f"{path.name} must end in {', '.join(ENCODERS)}, got {path.suffix or 'no suffix'!r}; "
             "save it in one of these formats"
         )
     return suffix
@@ -169,16 +196,20 @@ def _suffix(path: Path) -> str:
 def _match(table: Table, mapping: ColumnMap) -> list[Source]:
     """The columns that are known; warns of the others."""
     named = [name for name in table.header if name]
-    twice = sorted({name for name in named if named.count(name) > 1})
+    counted = Counter(named)
+    twice = sorted(name for name, count in counted.items() if count > 1)
     if twice:
         raise TrialError(f"{table.file} has the column {twice[0]!r} twice; rename or remove one")
     found, unknown = sources(table.header, mapping, table.file)
-    strange = [f"{name!r}{suggestion(name)}" for name in unknown.values() if name]
-    absent = [f"{name!r}{suggestion(name, named)}" for name in mapping if name not in named]
+    strange = [f"{shown(name)}{suggestion(name)}" for name in unknown.values() if name]
+    strange += [f"column {index + 1}, which has no name" for index, n in unknown.items() if not n]
+    strange = _few(strange)
+    absent = [f"{shown(name)}{suggestion(name, named)}" for name in mapping if name not in counted]
     if not any(source.column.quantity == "time" for source in found):
-        raise TrialError(
+        kind = TrialError if len(named) > 1 else UnreadableError
+        raise kind(
             f"{table.file} has no column time_s; its columns are "
-            f"{', '.join(strange or named)}; rename one, or map it in [columns]"
+            f"{', '.join(strange or _few(named))}; rename one, or map it in [columns]"
         )
     if strange:
         _warn(f"{table.file}: unknown columns are ignored: {', '.join(strange)}")
@@ -203,21 +234,93 @@ def _warn(message: str) -> None:
     warnings.warn(message, TrialWarning, stacklevel=4)
 
 
-def _door_values(source: Source, table: Table) -> NDArray[np.float64]:
-    """A column's values in its unit at the door, mapped and checked; NaN where a cell is empty."""
-    theirs = np.empty(len(table.rows))
-    for index, cell in enumerate(table.cells[source.index]):
-        number = _number(cell)
+def _few(names: list[str], most: int = 40) -> list[str]:
+    """As many names as one reads."""
+    return names if len(names) <= most else [*names[:most], f"{len(names) - most} more"]
+
+
+def _check_units(known: list[Source], table: Table, mapping: ColumnMap) -> None:
+    """Refuse a column whose unit in the file is another than its name's, unless it is mapped so."""
+    for source in known:
+        unit, entry = table.units.get(source.index), mapping.get(source.name)
+        if unit is None or (isinstance(entry, Mapping) and "factor" in entry):
+            continue
+        factor = unit_factor(unit, source.column)
+        if factor == 1.0:
+            continue
+        said = (
+            f"{table.file} gives {source.name!r} the unit {shown(unit)}, but {source.column.name} "
+            f"is in {source.column.unit}"
+        )
+        if factor is None:
+            raise TrialError(
+                f"{said}; correct the unit or the name, or write its factor under [columns] of "
+                f"dataset.toml: {mapping_line(source.name, source.column, 2.0)} with the factor in "
+                "place of 2"
+            )
+        raise TrialError(
+            f"{said}; write under [columns] of dataset.toml: "
+            f"{mapping_line(source.name, source.column, factor)}"
+        )
+
+
+def _file_values(source: Source, table: Table, form: FileFormat, mark: str) -> NDArray[np.float64]:
+    """A column's values in its unit in files, mapped and checked; NaN where a cell is empty."""
+    cells = table.cells[source.index]
+    if source.column.kind == "time":
+        return _times(source, table, cells, mark)
+    theirs = _numbers(source, table, cells, mark, form.decimal is not None)
+    theirs[np.isin(theirs, form.missing)] = np.nan
+    check_sentinels(source, theirs, table)
+    with np.errstate(over="ignore"):
+        values = source.factor * theirs + source.offset
+    check_values(source.column.name, values, source.column, table.place, _COUNTS)
+    return values if source.ends is None else _within(values, source, table)
+
+
+def _times(source: Source, table: Table, cells: Cells, mark: str) -> NDArray[np.float64]:
+    """Seconds of the time column: numbers as they are, dates and epochs from the first row."""
+    clock = None if isinstance(cells, np.ndarray) else clock_seconds(cells)
+    if clock is not None:
+        if (source.factor, source.offset) != (1.0, 0.0):
+            raise TrialError(
+                f"{source.name} of {table.file} holds dates or clock times, so [columns] must give "
+                "it no factor and no offset; remove them"
+            )
+        _warn(
+            f"{table.file}: {source.name} holds {shown(str(cells[0]))} in row {table.rows[0]}; it "
+            "is converted to seconds from the first row"
+        )
+        return clock
+    theirs = _numbers(source, table, cells, mark, grouped=False)
+    values = source.factor * theirs + source.offset
+    counted = epoch_seconds(values)
+    if counted is None:
+        return values
+    values, unit = counted
+    _warn(f"{table.file}: {source.name} counts {unit} of a calendar; it is read from the first row")
+    if source.factor != 1.0 and unit == "seconds":
+        return (theirs - theirs[0]) * source.factor
+    return values
+
+
+def _numbers(
+    source: Source, table: Table, cells: Cells, mark: str, grouped: bool
+) -> NDArray[np.float64]:
+    """A column's numbers; NaN where a cell is empty."""
+    if isinstance(cells, np.ndarray):
+        return np.array(cells, dtype=np.float64)
+    grouped = has_groups(cells, mark, grouped)
+    theirs = np.empty(len(cells))
+    for index, cell in enumerate(cells):
+        number = cell_number(cell, mark, grouped)
         if number is None:
             raise TrialError(
-                f"{source.name} must hold numbers, {table.place(index)} has {cell!r}; "
-                f"{_mend(source, cell)}"
+                f"{source.name} must hold numbers, {table.place(index)} has {shown(cell)}; "
+                f"{_fix(source, cell, mark)}"
             )
         theirs[index] = number
-    values = source.factor * theirs + source.offset
-    if source.column.kind != "time":
-        check_values(source.column.name, values, source.column, table.place, _COUNTS)
-    return values if source.ends is None else _within(values, source, table)
+    return theirs
 
 
 def _within(values: NDArray[np.float64], source: Source, table: Table) -> NDArray[np.float64]:
@@ -239,25 +342,22 @@ def _within(values: NDArray[np.float64], source: Source, table: Table) -> NDArra
     return np.where(beyond, np.nan, values)
 
 
-def _number(cell: object) -> float | None:
-    """The cell's number, NaN for an empty cell, None for anything else."""
-    if cell is None:
-        return np.nan
-    if isinstance(cell, int | float) and not isinstance(cell, bool):
-        return float(cell)
-    # Python's float also takes 1_000, which no log means.
-    if not isinstance(cell, str) or "_" in cell:
-        return None
-    try:
-        return float(cell) if cell.strip() else np.nan
-    except ValueError:
-        return None
-
-
-def _mend(source: Source, cell: object) -> str:
+def _fix(source: Source, cell: object, mark: str) -> str:
     """What to do about a cell that is no number."""
-    if isinstance(cell, str) and re.fullmatch(r"\s*[+-]?\d+,\d+\s*", cell):
+    if looks_ambiguous(cell):
+        assert isinstance(cell, str)
+        comma = "," in cell
+        both = ("a decimal comma", "grouped thousands") if comma else ("a point", "groups")
+        point, group = ('"."', '","') if comma else ('","', '"."')
+        return (
+            f"it may have {both[0]} or {both[1]}; write it without, or, for all files at once, "
+            f"write decimal = {group if comma else point} under [format] of dataset.toml for a "
+            f"decimal comma, decimal = {point if comma else group} for a decimal point"
+        )
+    if isinstance(cell, str) and re.fullmatch(r"\s*[+-]?\d*,\d+\s*", cell):
         return "write it with a decimal point"
+    if isinstance(cell, str) and mark == "," and re.fullmatch(r"\s*[+-]?\d*\.\d+\s*", cell):
+        return "write it with a decimal comma, as the other cells, or all of them with a point"
     if source.column.kind == "time":
         return "give seconds since the start of the trial"
     return "leave the cell empty where nothing was measured"

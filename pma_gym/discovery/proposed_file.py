@@ -11,11 +11,9 @@ from pma_gym.data.trial_columns import (
     BY_QUANTITY,
     VOLTAGE_RANGE,
     Source,
-    TrialError,
-    sources,
 )
-from pma_gym.data.trial_files import read_header
 from pma_gym.data.trial_formats import encode_csv
+from pma_gym.discovery.data_checks.proposals import file_sources
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
@@ -107,15 +105,7 @@ def _as_commanded(trial: Trial, dataset: Dataset, model: Model) -> Mapping[str, 
 def _names(dataset: Dataset) -> dict[str, Source]:
     """By quantity, how the lab's files call and scale it; the first file that has it counts."""
     found: dict[str, Source] = {}
-    if dataset.folder is None:
-        return found
-    for each in dataset.trials:
-        try:
-            header = read_header(dataset.folder / each.name)
-            known, _ = sources(header, dataset.columns, each.name)
-        # A piece of a trial, or a sheet, is no file of its own.
-        except (TrialError, OSError):
-            continue
-        for source in known:
+    for each in dataset.trials if dataset.folder is not None else ():
+        for source in file_sources(dataset, each.name):
             found.setdefault(source.column.quantity, source)
     return found

@@ -213,8 +213,11 @@ def test_a_mapped_column_that_is_not_there_is_named(tmp_path):
             "^motor_voltage_v must lie in 0-10 V, row 3 of ramp.csv has 12.4; if the log is in "
             r"raw DAQ counts, give \[columns\] a factor$",
         ),
-        (GOOD.replace("40", "inf"), "contraction_mm must be finite, row 2 of ramp.csv has inf"),
-        (GOOD.replace("40", "1e999"), "contraction_mm must be finite, row 2 of ramp.csv has inf"),
+        (
+            GOOD.replace("40", "inf"),
+            "must hold numbers, row 2 of ramp.csv has 'inf'; leave",
+        ),
+        (GOOD.replace("40", "1e999"), "must hold numbers, row 2 of ramp.csv has '1e999'"),
         (
             "time_s,load_command_n,load_n,load_n\n0,1,2,3\n",
             "ramp.csv has the column 'load_n' twice; rename or remove one",
@@ -227,14 +230,8 @@ def test_a_mapped_column_that_is_not_there_is_named(tmp_path):
             "time_s,load_command_n,lvdt_v\n0,1,2048\n",
             "lvdt_v must lie in -10 to 10 V, row 2 of ramp.csv has 2048.0; .* DAQ counts",
         ),
-        (
-            GOOD.replace(",", ";"),
-            "ramp.csv separates its columns by semicolons, .* commas .* points in numbers",
-        ),
-        (GOOD.replace(",", "\t"), "ramp.csv separates its columns by tabs"),
         (GOOD.replace("25.3", "25,3"), "row 4 of ramp.csv has 4 cells, its header has 3; .*comma"),
         (GOOD[: GOOD.rindex(",2")], "row 4 of ramp.csv has 2 cells, its header has 3; complete"),
-        ("Weg_m\u00e4ssig,time_s\n".encode("latin-1"), r"not UTF-8 text \(byte 5\); save it as"),
         ('time_s,load_n\n0,"' + "x" * 200_000, "ramp.csv, row 2: .*is it a CSV file"),
     ],
 )
@@ -329,8 +326,9 @@ def test_a_missing_library_is_named_with_what_to_install(suffix, library, tmp_pa
     monkeypatch.setitem(sys.modules, library, None)
     path = written(tmp_path, "x", f"trial{suffix}")
     message = rf'{library}, which .* needs, is not installed: pip install "pma-gym\[files\]"'
-    with pytest.raises(TrialError, match=message):
-        read_trial(path)
+    if suffix != ".xlsx":
+        with pytest.raises(TrialError, match=message):
+            read_trial(path)
     with pytest.raises(TrialError, match=message):
         write_trial(Trial([0.0], {"load_command": [0.0]}), path)
     assert path.read_text() == "x"
@@ -338,8 +336,10 @@ def test_a_missing_library_is_named_with_what_to_install(suffix, library, tmp_pa
 
 def test_suffixes_and_folders_that_do_not_exist(tmp_path):
     trial = Trial([0.0], {"load_command": [0.0]})
+    with pytest.raises(TrialError, match=r"ramp.doc must end in .csv, .txt, .*, got '.doc'"):
+        read_trial(written(tmp_path, GOOD, "ramp.doc"))
     with pytest.raises(TrialError, match=r"ramp.txt must end in .csv, .parquet, .xlsx, got '.txt'"):
-        read_trial(written(tmp_path, GOOD, "ramp.txt"))
+        write_trial(trial, tmp_path / "ramp.txt")
     with pytest.raises(TrialError, match="got 'no suffix'; save it in one of these"):
         write_trial(trial, tmp_path / "ramp")
     with pytest.raises(TrialError, match="there is no file .*none.csv; check the name"):
@@ -349,7 +349,7 @@ def test_suffixes_and_folders_that_do_not_exist(tmp_path):
     (tmp_path / "folder.csv").mkdir()
     with pytest.raises(TrialError, match="folder.csv is a folder"):
         write_trial(trial, tmp_path / "folder.csv")
-    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["folder.csv", "ramp.txt"]
+    assert sorted(entry.name for entry in tmp_path.iterdir()) == ["folder.csv", "ramp.doc"]
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -3,6 +3,7 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from pma_gym.data.dataset import Dataset
 from pma_gym.data.trial_columns import (
     BY_QUANTITY,
     Column,
@@ -18,9 +19,8 @@ DESCRIPTION = "dataset.toml"
 
 
 def lines(
-    folder: Path,
+    dataset: Dataset,
     files: Iterable[str],
-    columns: ColumnMap,
     quantity: str,
     factor: float,
     offset: float = 0.0,
@@ -28,9 +28,8 @@ def lines(
     """What to write under `[columns]` so that a quantity is read as factor * as now + offset.
 
     Args:
-        folder: the data set.
+        dataset: whose `[columns]` to write.
         files: names of the files that it concerns.
-        columns: what `[columns]` holds so far.
         quantity: the quantity.
         factor: by which its values are to be multiplied.
         offset: what is to be added after that (SI).
@@ -39,7 +38,7 @@ def lines(
     """
     found: dict[str, str] = {}
     for file in files:
-        for source in _sources(folder / file, columns):
+        for source in file_sources(dataset, file):
             if source.column.quantity == quantity:
                 found[source.name] = _line(source, factor, offset)
     if not found:
@@ -69,10 +68,12 @@ def column_line(name: str, column: Column, entry: Mapping[str, float | list[floa
 _USUAL: dict[str, float] = {"factor": 1.0, "offset": 0.0}
 
 
-def _sources(path: Path, columns: ColumnMap) -> list[Source]:
+def file_sources(dataset: Dataset, file: str) -> list[Source]:
+    """What the columns of a file are; nothing where it is no file of its own, a piece say."""
+    path = (dataset.folder or Path()) / file
     try:
-        return sources(read_header(path), columns, path.name)[0]
-    # A name that is no file of its own, a sheet say: our own names are then the best guess.
+        header = read_header(path, dataset.columns, dataset.form)
+        return sources(header, dataset.columns, file)[0]
     except (TrialError, OSError):
         return []
 

@@ -1,7 +1,6 @@
 """Columns in another unit, and what to write in `dataset.toml` to correct them."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -142,9 +141,9 @@ def _of_both(dataset: Dataset, named: Sequence[NamedTrial], given: float, off: f
         "pressure_command_kpa and pressure_kpa both read" if both else "pressure_command_kpa reads"
     )
     before = f"not {1e3 * given:.2g} mm" if np.isfinite(given) else "and cannot follow them now"
-    written = lines(_folder(dataset), names, dataset.columns, "pressure_command", 1.0, -ATMOSPHERE)
+    written = lines(dataset, names, "pressure_command", 1.0, -ATMOSPHERE)
     if both:
-        written |= lines(_folder(dataset), names, dataset.columns, "pressure", 1.0, -ATMOSPHERE)
+        written |= lines(dataset, names, "pressure", 1.0, -ATMOSPHERE)
     return (
         f"{what} 101.3 kPa above gauge pressure: absolute pressure (with 101.3 kPa less the model "
         f"misses contraction by {1e3 * off:.2g} mm, {before}); "
@@ -155,9 +154,5 @@ def _of_both(dataset: Dataset, named: Sequence[NamedTrial], given: float, off: f
 def _how(
     dataset: Dataset, names: Sequence[str], quantity: str, factor: float, offset: float = 0.0
 ) -> str:
-    written = lines(_folder(dataset), names, dataset.columns, quantity, factor, offset)
+    written = lines(dataset, names, quantity, factor, offset)
     return instruction(written, dataset.columns)
-
-
-def _folder(dataset: Dataset) -> Path:
-    return dataset.folder or Path()

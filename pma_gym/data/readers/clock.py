@@ -1,0 +1,222 @@
+"""Dates, clock times and counted epochs of a time column to seconds from its first row."""
+
+import datetime
+import re
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.readers.cells import cell_number
+from pma_gym.data.readers.table import Cells
+
+_NS = 1_000_000_000
+_DAY_NS = 86_400 * _NS
+_CLOCK = (
+    r"(?P<h>[0-9]{1,2}):(?P<m>[0-9]{2}):(?P<s>[0-9]{2})(?:[.,](?P<f>[0-9]{1,9}))?"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?: ?(?P<zone>Z|UTC|[+-][0-9]{2}:?[0-9]{2}))?"
+)
+_YEAR_FIRST = re.compile(
+    rf"(?P<y>[0-9]{{4}})[-/.](?P<mo>[0-9]{{1,2}})[-/.](?P<d>[0-9]{{1,2}})(?:T|,? +){_CLOCK}"
+)
+_YEAR_LAST = re.compile(
+    rf"(?P<a>[0-9]{{1,2}})(?P<by>[-/.])(?P<b>[0-9]{{1,2}})(?P=by)"
+    rf"(?P<y>[0-9]{{4}}|[0-9]{{2}})(?:T|,? +){_CLOCK}"
+)
+_MONTH_NAMED = re.compile(
+    rf"(?P<d>[0-9]{{1,2}})[- ](?P<name>[A-Za-z]{{3}})[- ](?P<y>[0-9]{{4}}),? +{_CLOCK}"
+)
+_TIME_ONLY = re.compile(_CLOCK)
+_COUNTED = re.compile(r"([+-]?[0-9.,eE+-]+) ?(sec|s|seconds|ms|min|hr)")
+_UNITS = {"sec": 1.0, "s": 1.0, "seconds": 1.0, "ms": 1e-3, "min": 60.0, "hr": 3600.0}
+_MONTHS: list[str] = list("jan feb mar apr may jun jul aug sep oct nov dec".split())
+_LONGEST = 60
+"""Characters of the longest date."""
+
+EPOCHS = ((1e9, 5e9, 1.0, "seconds"), (1e12, 5e12, 1e-3, "milliseconds"),
+          (1e15, 5e15, 1e-6, "microseconds"), (1e18, 5e18, 1e-9, "nanoseconds"))  # fmt: skip
+"""From, to, seconds a count, its name: counts since 1970 (or 1904) of the years after 2001."""
+
+
+def looks_like_clock(cell: object) -> bool:
+    """Whether a cell holds a date or a time of day."""
+    if isinstance(cell, datetime.datetime | datetime.time | datetime.timedelta):
+        return True
+    return isinstance(cell, str) and any(_match(form, cell) for form in _FORMS)
+
+
+def clock_seconds(cells: Cells) -> NDArray[np.float64] | None:
+    """Seconds from the first row of a column of dates, times of day or counts with their unit.
+
+    Args:
+        cells: of the time column.
+    Returns:
+        Seconds, shape (n,), NaN where a cell is empty. None if the cells are plain numbers, are not
+        all of one form, or leave open what is the day and what the month.
+    """
+    stamps = _objects(cells) if _holds_objects(cells) else _texts(cells)
+    if stamps is None or all(stamp is None for stamp in stamps):
+        return None
+    first = next(stamp for stamp in stamps if stamp is not None)
+    return np.array([np.nan if stamp is None else (stamp - first) / _NS for stamp in stamps])
+
+
+def epoch_seconds(values: NDArray[np.float64]) -> tuple[NDArray[np.float64], str] | None:
+    """Seconds from the first row of a column of counts since an epoch.
+
+    Args:
+        values: the time as numbers, shape (n,).
+    Returns:
+        Seconds and the name of what was counted; None if the first number is no such count.
+    """
+    first = float(values[0]) if values.size else 0.0
+    for low, high, scale, name in EPOCHS:
+        if low <= first < high:
+            return (values - first) * scale, name
+    return None
+
+
+def _holds_objects(cells: Cells) -> bool:
+    kinds = datetime.datetime | datetime.time | datetime.timedelta
+    return any(isinstance(cell, kinds) for cell in cells)
+
+
+def _objects(cells: Cells) -> list[int | None] | None:
+    """Nanoseconds of a spreadsheet's dates, times of day or durations; None if they are mixed."""
+    if len({type(cell) for cell in cells if cell is not None}) != 1:
+        return None
+    stamps: list[int | None] = []
+    for cell in cells:
+        if cell is None:
+            stamps.append(None)
+        elif isinstance(cell, datetime.datetime):
+            stamps.append(_of_delta(cell - datetime.datetime(1970, 1, 1, tzinfo=cell.tzinfo)))
+        elif isinstance(cell, datetime.time):
+            seconds = (cell.hour * 60 + cell.minute) * 60 + cell.second
+            stamps.append(seconds * _NS + cell.microsecond * 1000)
+        elif isinstance(cell, datetime.timedelta):
+            stamps.append(_of_delta(cell))
+    return _past_midnight(stamps) if isinstance(_first(cells), datetime.time) else stamps
+
+
+def _first(cells: Cells) -> object:
+    return next((cell for cell in cells if cell is not None), None)
+
+
+def _of_delta(delta: datetime.timedelta) -> int:
+    return (delta.days * 86_400 + delta.seconds) * _NS + delta.microseconds * 1000
+
+
+def _texts(cells: Cells) -> list[int | None] | None:
+    """Nanoseconds of texts that all have one form."""
+    bare = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
+    filled = [cell for cell in bare if cell not in (None, "")]
+    if not filled or not all(isinstance(cell, str) for cell in filled):
+        return None
+    for form, read in _FORMS.items():
+        matches = [_match(form, cell) if cell else None for cell in bare]
+        if sum(match is not None for match in matches) == len(filled):
+            try:
+                return read(matches)
+            except ValueError:
+                return None
+    return None
+
+
+_Matches = Sequence[re.Match[str] | None]
+
+
+def _match(form: re.Pattern[str], cell: object) -> re.Match[str] | None:
+    if not isinstance(cell, str) or len(cell) > _LONGEST:
+        return None
+    return form.fullmatch(cell.strip())
+
+
+def _clock(match: re.Match[str]) -> int:
+    """Nanoseconds since midnight, in the clock's own zone or in UTC if it is given."""
+    hours, minutes, seconds = (int(match[name]) for name in "hms")
+    if match["half"]:
+        if not 1 <= hours <= 12:
+            raise ValueError("no hour of a half day")
+        hours = hours % 12 + (12 if match["half"] in "pP" else 0)
+    if hours > 23 or minutes > 59 or seconds > 60:
+        raise ValueError("no time of day")
+    zone, shift = match["zone"], 0
+    if zone and zone not in ("Z", "UTC"):
+        shift = (int(zone[1:3]) * 60 + int(zone[-2:])) * (-60 if zone[0] == "-" else 60)
+    fraction = int((match["f"] or "0").ljust(9, "0"))
+    return ((hours * 60 + minutes) * 60 + seconds - shift) * _NS + fraction
+
+
+def _date(year: int, month: int, day: int) -> int:
+    """Nanoseconds of a date since 1970."""
+    return (datetime.date(year, month, day).toordinal() - 719_163) * _DAY_NS
+
+
+def _year_first(matches: _Matches) -> list[int | None]:
+    return [
+        m and _date(int(m["y"]), int(m["mo"]), int(m["d"])) + _clock(m) for m in matches
+    ]  # fmt: skip
+
+
+def _month_named(matches: _Matches) -> list[int | None]:
+    return [
+        m and _date(int(m["y"]), 1 + _MONTHS.index(m["name"].lower()), int(m["d"])) + _clock(m)
+        for m in matches
+    ]
+
+
+def _year_last(matches: _Matches) -> list[int | None]:
+    """Dates with the year last; the order of day and month only matters where the date changes."""
+    dates = {(m["a"], m["b"], m["y"], m["by"]) for m in matches if m}
+    if len(dates) == 1:
+        return [m and _clock(m) for m in matches]
+    day_first = {a for a, _, _, by in dates if int(a) > 12 or by == "."}
+    month_first = {b for _, b, _, by in dates if int(b) > 12}
+    if bool(day_first) == bool(month_first):
+        raise ValueError("day and month may be either")
+    order = ("a", "b") if day_first else ("b", "a")
+    return [
+        m and _date(int(m["y"]) % 100 + 2000, int(m[order[1]]), int(m[order[0]])) + _clock(m)
+        for m in matches
+    ]
+
+
+def _time_only(matches: _Matches) -> list[int | None]:
+    return _past_midnight([m and _clock(m) for m in matches])
+
+
+def _past_midnight(stamps: list[int | None]) -> list[int | None]:
+    """Times of day that go on after midnight: a step back by over half a day is the next day."""
+    days, before, out = 0, None, []
+    for stamp in stamps:
+        if stamp is not None:
+            if before is not None and stamp < before - _DAY_NS // 2:
+                days += 1
+            before = stamp
+            stamp += days * _DAY_NS
+        out.append(stamp)
+    return out
+
+
+def _counted(matches: _Matches) -> list[int | None]:
+    """Numbers with their unit, all of them the same: `0.01 sec`."""
+    if len({m[2] for m in matches if m}) > 1:
+        raise ValueError("units differ")
+    return [m and _nanoseconds(m) for m in matches]
+
+
+def _nanoseconds(match: re.Match[str]) -> int:
+    number = cell_number(match[1])
+    if number is None or abs(number) > 1e9:
+        raise ValueError("no number")
+    return round(number * _UNITS[match[2]] * _NS)
+
+
+_FORMS: dict[re.Pattern[str], Callable[[_Matches], list[int | None]]] = {
+    _YEAR_FIRST: _year_first,
+    _MONTH_NAMED: _month_named,
+    _YEAR_LAST: _year_last,
+    _TIME_ONLY: _time_only,
+    _COUNTED: _counted,
+}

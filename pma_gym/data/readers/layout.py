@@ -1,0 +1,247 @@
+"""Rows of a file to a table: where its header is, what stands around the samples."""
+
+import datetime
+import re
+from collections.abc import Mapping, Sequence
+
+from pma_gym.data.readers.clock import looks_like_clock
+from pma_gym.data.readers.table import NoHeaderError, Request, Table, shown
+from pma_gym.data.readers.units import unit_of
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.limits import check_limit
+
+Row = tuple[int, Sequence[object]]
+"""Number of a row in its file, and its cells."""
+
+COMMENTS = ("#", "%", "//")
+"""What a line begins with that is a remark of the logger."""
+
+_SEARCHED = 200
+"""Rows from the top among which a header is looked for."""
+_NUMBER = re.compile(
+    r"[+-]?(?:[0-9][0-9.,'\u2019\u00a0\u2009\u202f]*|[.,][0-9]+)(?:[eE][+-]?[0-9]+)?"
+)
+_LONGEST = 120
+
+
+def arrange(
+    file: str,
+    rows: Sequence[Row],
+    request: Request,
+    *,
+    provenance: Mapping[str, str] | None = None,
+    part: str = "",
+    padded: bool = False,
+) -> Table:
+    """The table in the rows of a file.
+
+    A row without any number is no sample: above the samples it is a title, the header or the units;
+    below them a footer. What is passed over is remarked.
+
+    Args:
+        file: name, for messages.
+        rows: numbered rows that are not entirely empty.
+        request: known names, and what the lab says about its files.
+        provenance: metadata beside the table.
+        part: name of the sheet or segment.
+        padded: whether a short row lacks nothing but empty cells.
+    Returns:
+        The table; without a header if there are no rows.
+    Raises:
+        TrialError: no header, a row in the midst that is no sample, rows of unequal length.
+    """
+    rows, remarks = _without_comments(file, rows)
+    if not rows:
+        return Table(file, [], [], [], provenance or {}, part)
+    at, header = _header(file, rows, request)
+    top = [row for row in rows[: max(at, 0)]]
+    if top:
+        remarks.append(f"{_span(top)} above the header {_are(top)} passed over")
+    first = next((i for i in range(at + 1, len(rows)) if _is_sample(rows[i][1])), len(rows))
+    units, said = _units(rows[at + 1 : first], len(header))
+    remarks += said
+    time = next((i for i, name in enumerate(header) if request.is_time(name)), 0)
+    last = len(rows)
+    while last > first and not _may_be_sample(rows[last - 1][1], time):
+        last -= 1
+    if rows[last:]:
+        remarks.append(f"{_span(rows[last:])} below the samples {_are(rows[last:])} passed over")
+    samples = rows[first:last]
+    check_limit(file, "cells", len(samples) * len(header))
+    _check_rows(file, samples, header, padded)
+    kept = [
+        i for i, name in enumerate(header) if name or any(_filled(_at(r, i)) for _, r in samples)
+    ]
+    return Table(
+        file,
+        [header[i] for i in kept],
+        [[_at(row, i) for _, row in samples] for i in kept],
+        [number for number, _ in samples],
+        provenance or {},
+        part,
+        {kept.index(i): unit for i, unit in units.items() if i in kept},
+        tuple(remarks),
+    )
+
+
+def _at(row: Sequence[object], index: int) -> object:
+    return row[index] if index < len(row) else None
+
+
+def _filled(cell: object) -> bool:
+    return cell is not None and not (isinstance(cell, str) and not cell.strip())
+
+
+def _is_number(cell: object) -> bool:
+    """Whether a cell is a number, a date, or a text that is meant as one."""
+    if isinstance(cell, str):
+        bare = cell.strip()
+        if len(bare) > _LONGEST:
+            return False
+        return _NUMBER.fullmatch(bare) is not None or looks_like_clock(bare)
+    kinds = int | float | datetime.datetime | datetime.time | datetime.timedelta
+    return isinstance(cell, kinds) and not isinstance(cell, bool)
+
+
+def _is_sample(row: Sequence[object]) -> bool:
+    """Whether a row holds a number at all."""
+    return any(_is_number(cell) for cell in row)
+
+
+def _may_be_sample(row: Sequence[object], time: int) -> bool:
+    """Whether a row at the end may be a sample: not `End of file`, nor `Mean, 3.4`."""
+    stamp = _at(row, time)
+    return _is_sample(row) and (not _filled(stamp) or _is_number(stamp) or len(row) <= time)
+
+
+def _without_comments(file: str, rows: Sequence[Row]) -> tuple[list[Row], list[str]]:
+    """The rows without remarks of the logger; those in the midst are named."""
+    marked = [i for i, row in enumerate(rows) if _comment(row)]
+    if not marked:
+        return list(rows), []
+    kept = [row for i, row in enumerate(rows) if i not in set(marked)]
+    leading = next((i for i in range(len(rows)) if not _comment(rows[i])), len(rows))
+    amid = [rows[i] for i in marked if i > leading]
+    return kept, [f"{_span(amid)} {_are(amid)} passed over as remarks"] if amid else []
+
+
+def _comment(row: Row) -> bool:
+    first = row[1][0] if row[1] else None
+    return isinstance(first, str) and first.lstrip().startswith(COMMENTS)
+
+
+def _header(file: str, rows: Sequence[Row], request: Request) -> tuple[int, list[str]]:
+    """Position of the header among the rows, -1 if there is none, and its names."""
+    form = request.format
+    if form.names:
+        return -1, list(form.names)
+    if form.header_row is not None:
+        at = next((i for i, (number, _) in enumerate(rows) if number == form.header_row), None)
+        if at is None:
+            raise TrialError(
+                f"header_row in [format] is {form.header_row}, but {file} has no such row or it is "
+                f"empty; its first row is {rows[0][0]}"
+            )
+        return at, _names(file, rows[at])
+    searched = rows[:_SEARCHED]
+    for i, (_, row) in enumerate(searched):
+        named = any(request.is_time(_text(cell)) for cell in row)
+        if named and not any(_is_number(cell) for cell in row):
+            return i, _names(file, rows[i])
+    first = next((i for i, (_, row) in enumerate(searched) if _begins_samples(row)), len(searched))
+    above: list[int] = []
+    for i in range(first - 1, -1, -1):
+        if _is_sample(rows[i][1]):
+            break
+        above.append(i)
+    if above:
+        # The topmost of the fullest: a title is shorter, a row of units comes below.
+        at = max(above, key=lambda i: (_count(rows[i][1]), -i))
+        return at, _names(file, rows[at])
+    raise _no_header(file, rows[first] if first < len(rows) else rows[0])
+
+
+def _begins_samples(row: Sequence[object]) -> bool:
+    """Whether a row is of numbers mostly, its first cell too: not `delta t, 0.01`."""
+    numbers = sum(_is_number(cell) for cell in row)
+    first = next((cell for cell in row if _filled(cell)), None)
+    return 2 * numbers > _count(row) and _is_number(first)
+
+
+def _count(row: Sequence[object]) -> int:
+    return sum(_filled(cell) for cell in row)
+
+
+def _text(cell: object) -> str:
+    return "" if cell is None else str(cell).strip()
+
+
+def _names(file: str, row: Row) -> list[str]:
+    """Names of the columns, "" where there is none."""
+    names = [_text(cell) for cell in row[1]]
+    for name in names:
+        check_limit(f"the header of {file}", "cell_characters", len(name))
+    check_limit(file, "columns", len(names))
+    return names
+
+
+def _no_header(file: str, row: Row) -> TrialError:
+    """What to say of a file that begins with its samples."""
+    width = _count(row[1])
+    example = ["time_s", "motor_voltage_v", "contraction_mm", "load_n"]
+    return NoHeaderError(
+        f"{file} has no header: row {row[0]}, its first, holds numbers; insert a row above it with "
+        f"the names of its {width} column{'s' * (width > 1)} ({', '.join(example[:width])}...), or "
+        f"name them for all files at once in dataset.toml: under [format], names = "
+        f"[{', '.join(repr(name) for name in example[:width])}, ...] with {width} "
+        f"name{'s' * (width > 1)}"
+    )
+
+
+def _units(rows: Sequence[Row], width: int) -> tuple[dict[int, str], list[str]]:
+    """Units by column of the rows between header and samples; other rows are remarked."""
+    units: dict[int, str] = {}
+    others: list[Row] = []
+    for row in rows:
+        filled = {i: _text(cell) for i, cell in enumerate(row[1][:width]) if _filled(cell)}
+        known = {i: text for i, text in filled.items() if unit_of(text)}
+        if not units and filled and 2 * len(known) >= len(filled):
+            units = filled
+        else:
+            others.append(row)
+    said = [f"{_span(others)} below the header {_are(others)} passed over"] if others else []
+    return units, said
+
+
+def _check_rows(file: str, samples: Sequence[Row], header: Sequence[str], padded: bool) -> None:
+    """Refuse rows of another length than the header's, and rows that are no samples."""
+    width = len(header)
+    least = max((i + 1 for i, name in enumerate(header) if name), default=0)
+    for number, row in samples:
+        if not _is_sample(row) and any(_filled(cell) for cell in row):
+            again = [_text(cell) for cell in row[:width]] == list(header)
+            raise TrialError(
+                f"row {number} of {file} is no sample, it has {shown(_text(row[0]))}; "
+                + (
+                    "it is the header again: split the file there, or remove the row"
+                    if again
+                    else "remove the row, or let it begin with #"
+                )
+            )
+        if (len(row) < least and not padded) or any(_filled(cell) for cell in row[width:]):
+            raise TrialError(
+                f"row {number} of {file} has {len(row)} cells, its header has {least}; complete "
+                "the row, and write numbers with a decimal point (a decimal comma splits a cell)"
+            )
+
+
+def _span(rows: Sequence[Row]) -> str:
+    """`row 3 ('End of file')` or `rows 3 to 5 (...)`."""
+    said = shown(_text(next((cell for cell in rows[0][1] if _filled(cell)), "")))
+    if len(rows) == 1:
+        return f"row {rows[0][0]} ({said})"
+    return f"rows {rows[0][0]} to {rows[-1][0]} ({said}...)"
+
+
+def _are(rows: Sequence[Row]) -> str:
+    return "is" if len(rows) == 1 else "are"

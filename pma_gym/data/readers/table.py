@@ -1,0 +1,107 @@
+"""A table as it stands in a file, and what a lab says about the form of its files."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial_columns import BY_NAME, ColumnMap, TrialError
+
+Cells = Sequence[object] | NDArray[np.float64]
+"""Cells of one column: numbers, texts, dates; None, NaN or "" where a cell is empty."""
+
+PROVENANCE = "provenance"
+"""Name of the XLSX sheet and, after `pma_gym.`, of the Parquet metadata."""
+
+PART = "#"
+"""Between a file's name and the part of it that is meant: `march.xlsx#run2`."""
+
+
+class UnreadableError(TrialError):
+    """A file that holds no table at all: damaged, of another kind, or its library is missing."""
+
+
+class NoHeaderError(TrialError):
+    """A table that begins with its samples, so that nothing names its columns."""
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """What `[format]` of a `dataset.toml` says where a file's form has two readings.
+
+    Attributes:
+        separator: between the cells of a text file; None: the one that fits.
+        decimal: "." or ","; None: the one that fits.
+        encoding: of a text file; None: the one that fits.
+        header_row: number of the row with the columns' names; None: the one that fits.
+        names: names of the columns, where the files have no row with them; empty if they have one.
+        missing: numbers that stand for "not measured", in the file's units.
+    """
+
+    separator: str | None = None
+    decimal: str | None = None
+    encoding: str | None = None
+    header_row: int | None = None
+    names: tuple[str, ...] = ()
+    missing: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a reader may rely on to recognise a table.
+
+    Attributes:
+        columns: the lab's names of columns to ours.
+        format: what the lab says about its files.
+    """
+
+    columns: ColumnMap = field(default_factory=dict)
+    format: FileFormat = field(default_factory=FileFormat)
+
+    def is_known(self, name: object) -> bool:
+        """Whether a header's name is one of ours, or the lab's for one of ours."""
+        return isinstance(name, str) and (name in BY_NAME or name in self.columns)
+
+    def is_time(self, name: object) -> bool:
+        """Whether a header's name is that of the time."""
+        if not isinstance(name, str):
+            return False
+        entry = self.columns.get(name)
+        ours = entry.get("name", name) if isinstance(entry, Mapping) else entry
+        return (name if entry is None else ours) == "time_s"
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells of a file as they stand there.
+
+    Attributes:
+        file: the file's name, for messages; with the part's where a file holds several.
+        header: names of the columns.
+        cells: one sequence a column.
+        rows: number of each row in the file, as an editor or a spreadsheet counts.
+        provenance: metadata beside the table.
+        part: name of the sheet, segment, group or structure; empty where a file has one table.
+        units: unit of a column by its position, from a row or a property of the file.
+        remarks: what was passed over or converted, for warnings.
+    """
+
+    file: str
+    header: Sequence[str]
+    cells: Sequence[Cells]
+    rows: Sequence[int]
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    part: str = ""
+    units: Mapping[int, str] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    def place(self, index: int) -> str:
+        """Where the sample of an index stands."""
+        return f"row {self.rows[index]} of {self.file}"
+
+
+def shown(cell: object, most: int = 60) -> str:
+    """A cell for a message, cut to a readable length."""
+    text = repr(cell)
+    return text if len(text) <= most else f"{text[: most - 4]}...'"

@@ -1,0 +1,411 @@
+"""Text files as laboratories have them: what is read, and fixes that work when followed."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pma_gym.data.dataset import read_dataset
+from pma_gym.data.readers.table import FileFormat
+from pma_gym.data.trial import TrialError
+from pma_gym.data.trial_files import TrialWarning, place_in_file, read_trial
+
+HEADER = ["time_s", "motor_voltage_v", "contraction_mm", "load_n"]
+ROWS = 40
+TIME = np.arange(ROWS) / 50
+VALUES = np.column_stack(
+    [TIME, 4 * np.sin(TIME) ** 2, 40.25 - 20 * np.sin(TIME) ** 2, 1.5 + 400.5 * np.sin(TIME) ** 2]
+).round(4)
+
+
+def lines(separator=",", decimal=".", header=HEADER):
+    rows = [[str(value).replace(".", decimal) for value in row] for row in VALUES.tolist()]
+    return [separator.join(row) for row in [header, *rows]]
+
+
+def text(*args, **kwargs):
+    return "\n".join(lines(*args, **kwargs)) + "\n"
+
+
+def save(folder, content, name="ramp.csv"):
+    path = folder / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+def check(trial):
+    """All rows, in SI."""
+    assert_allclose(trial.time, VALUES[:, 0] - VALUES[0, 0], atol=1e-9)
+    assert_allclose(trial.commands["motor_voltage"], VALUES[:, 1])
+    assert_allclose(trial.measurements["contraction"], VALUES[:, 2] / 1e3)
+    assert_allclose(trial.measurements["load"], VALUES[:, 3])
+
+
+def refused(folder, content, form=None, columns=None, name="ramp.csv"):
+    with warnings.catch_warnings(), pytest.raises(TrialError) as caught:
+        warnings.simplefilter("ignore", TrialWarning)
+        read_trial(save(folder, content, name), columns, form)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.tsv", "a.dat", "A.CSV"])
+@pytest.mark.parametrize(
+    ("separator", "decimal"),
+    [(",", "."), (";", "."), (";", ","), ("\t", "."), ("\t", ","), ("|", "."), ("   ", ".")],
+)
+def test_any_separator_and_decimal_mark(tmp_path, separator, decimal, name):
+    check(read_trial(save(tmp_path, text(separator, decimal), name)))
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be", "utf-32", "cp1252"]
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
+def test_any_encoding_and_line_end(tmp_path, encoding, end):
+    header = [*HEADER[:3], "Kraft (N) bei 20 °C"]
+    content = text(header=header).replace("\n", end).encode(encoding)
+    check(read_trial(save(tmp_path, content), {header[3]: "load_n"}))
+
+
+def test_an_encoding_is_given_where_none_can_be_told(tmp_path):
+    content = text(header=[*HEADER[:3], "Сила"]).encode("koi8-r")
+    form = FileFormat(encoding="koi8-r")
+    check(read_trial(save(tmp_path, content), {"Сила": "load_n"}, form))
+    assert "is not utf-8 text (byte" in refused(tmp_path, content, FileFormat(encoding="utf-8"))
+    assert "it holds zero bytes" in refused(tmp_path, text().replace("40", "\0") * 9)
+
+
+@pytest.mark.parametrize(
+    "units", ["s,V,mm,N", "[s],[V],[mm],[N]", "(s),(V),(mm),(N)", "seconds,Volt,mm,-"]
+)
+def test_a_row_of_units_that_agrees_is_read_over(tmp_path, units):
+    rows = lines()
+    check(read_trial(save(tmp_path, "\n".join([rows[0], units, *rows[1:]]))))
+    again = "\n".join(["x", rows[0], "Time,Motor,Position,Force", units, *rows[1:]])
+    with pytest.warns(TrialWarning) as said:
+        check(read_trial(save(tmp_path, again)))
+    assert len(said) == 2
+
+
+def test_a_unit_that_differs_is_refused_with_a_line_that_works(tmp_path):
+    rows = lines()
+    content = "\n".join([rows[0], "s,V,cm,N", *rows[1:]])
+    message = refused(tmp_path, content)
+    assert "gives 'contraction_mm' the unit 'cm', but contraction_mm is in mm" in message
+    (tmp_path / "dataset.toml").write_text("[columns]\n" + message.partition("toml: ")[2])
+    (trial,) = read_dataset(tmp_path).trials
+    assert_allclose(trial.trial.measurements["contraction"], VALUES[:, 2] / 1e2)
+    assert "the factor in place of 2" in refused(tmp_path, content.replace(",cm,", ",V,"))
+
+
+def test_titles_footers_and_remarks_are_named(tmp_path):
+    rows = lines()
+    content = ["Test of March", "Operator: N. N., rig 2", "", *rows[:9], "# paused", *rows[9:]]
+    content += ["", "End of file", "Mean,2.0,30.0,200.0"]
+    with pytest.warns(TrialWarning) as said:
+        trial = read_trial(save(tmp_path, "\n".join(content)))
+    check(trial)
+    shown = sorted(str(each.message) for each in said)
+    assert shown == [
+        "ramp.csv: row 13 ('# paused') is passed over as remarks",
+        "ramp.csv: rows 1 to 2 ('Test of March'...) above the header are passed over",
+        f"ramp.csv: rows {ROWS + 7} to {ROWS + 8} ('End of file'...) below the samples are passed "
+        "over",
+    ]  # fmt: skip
+    assert place_in_file(tmp_path / "ramp.csv", 0) == "row 5 of ramp.csv"
+    assert place_in_file(tmp_path / "ramp.csv", ROWS - 1) == f"row {ROWS + 5} of ramp.csv"
+
+
+def test_a_header_behind_a_mark_of_remarks_is_one(tmp_path):
+    np.savetxt(tmp_path / "a.txt", VALUES, header=" ".join(HEADER))
+    check(read_trial(tmp_path / "a.txt"))
+    np.savetxt(tmp_path / "a.csv", VALUES, header=",".join(HEADER), delimiter=",")
+    check(read_trial(tmp_path / "a.csv"))
+
+
+def test_a_row_in_the_midst_that_is_no_sample_is_refused_and_may_be_marked(tmp_path):
+    rows = lines()
+    rows.insert(9, "valve opened")
+    message = refused(tmp_path, "\n".join(rows))
+    assert "row 10 of ramp.csv is no sample, it has 'valve opened'" in message
+    assert message.endswith("remove the row, or let it begin with #")
+    rows[9] = "# valve opened"
+    with pytest.warns(TrialWarning, match="row 10 .* is passed over"):
+        check(read_trial(save(tmp_path, "\n".join(rows))))
+    rows[9] = rows[0]
+    assert "it is the header again: split the file there" in refused(tmp_path, "\n".join(rows))
+
+
+def test_a_file_without_a_header_is_refused_and_both_fixes_work(tmp_path):
+    body = "\n".join(lines()[1:])
+    message = refused(tmp_path, body)
+    assert "ramp.csv has no header: row 1, its first, holds numbers" in message
+    assert "insert a row above it with the names of its 4 columns" in message
+    check(read_trial(save(tmp_path, ",".join(HEADER) + "\n" + body)))
+    save(tmp_path, body)
+    (tmp_path / "dataset.toml").write_text(f"[format]\nnames = {HEADER!r}")
+    check(read_dataset(tmp_path).trials[0].trial)
+
+
+def test_a_header_row_may_be_named(tmp_path):
+    rows = ["a,b,c,d", *lines()]
+    with pytest.warns(TrialWarning, match="row 1 .'a'. above the header"):
+        check(read_trial(save(tmp_path, "\n".join(rows)), form=FileFormat(header_row=2)))
+    assert "has no such row" in refused(tmp_path, "\n".join(rows), FileFormat(header_row=99))
+
+
+def test_repeated_rows_are_left_out_where_time_then_increases(tmp_path):
+    rows = lines()
+    for again in (30, 20, 10):
+        rows.insert(again + 1, rows[again])
+    with pytest.warns(TrialWarning, match="3 rows repeat an earlier one .*: row 12, 23, 34"):
+        check(read_trial(save(tmp_path, "\n".join(rows))))
+    assert place_in_file(tmp_path / "ramp.csv", ROWS - 1) == f"row {ROWS + 4} of ramp.csv"
+    twice = "\n".join(lines() + lines()[1:])
+    with pytest.warns(TrialWarning, match=f"{ROWS} rows repeat an earlier one"):
+        check(read_trial(save(tmp_path, twice)))
+    rows[11] += "1"
+    assert "must increase strictly" in refused(tmp_path, "\n".join(rows))
+    still = "\n".join([",".join(HEADER), *["0,1,2,3"] * 20])
+    assert "must increase strictly" in refused(tmp_path, still)
+
+
+def test_empty_columns_rows_and_separators_at_the_end_do_no_harm(tmp_path):
+    rows = [f"{row},," for row in lines()]
+    content = "\n\n".join([*rows, ",,,,,"])
+    check(read_trial(save(tmp_path, content)))
+    with pytest.warns(TrialWarning, match="unknown columns are ignored: column 5, which has no na"):
+        check(read_trial(save(tmp_path, "\n".join([rows[0], *[f"{r[:-1]}7" for r in rows[1:]]]))))
+
+
+@pytest.mark.parametrize("group", [",", "'", "\u2019", "\u00a0", "\u202f", " "])
+def test_grouped_thousands_are_read_where_they_have_one_meaning(tmp_path, group):
+    rows = lines(";")
+    rows[5] = rows[5].rpartition(";")[0] + f";1{group}234.5"
+    assert read_trial(save(tmp_path, "\n".join(rows))).measurements["load"][4] == 1234.5
+
+
+@pytest.mark.parametrize(("decimal", "value"), [(".", 3785.0), (",", 3.785)])
+def test_a_comma_of_two_meanings_is_refused_and_the_fix_works(tmp_path, decimal, value):
+    rows = ["time_s;motor_voltage_v;load_n", *[f"{k};1;3,{785 + k}" for k in range(9)]]
+    message = refused(tmp_path, "\n".join(rows))
+    assert "row 2 of ramp.csv has '3,785'; it may have a decimal comma or grouped" in message
+    line = {",": "a decimal comma", ".": "a decimal point"}[decimal]
+    fix = re.search(rf"(decimal = \S+?)(?: under .*)? for {line}", message)
+    assert fix
+    (tmp_path / "dataset.toml").write_text("[format]\n" + f'decimal = "{decimal}"')
+    assert f'decimal = "{decimal}"' in fix[0]
+    assert read_dataset(tmp_path).trials[0].trial.measurements["load"][0] == value
+
+
+def test_german_numbers_are_read(tmp_path):
+    rows = ["time_s;motor_voltage_v;load_n", "0,5;1,25;1.234,5", "0,6;1,3;2.000"]
+    assert read_trial(save(tmp_path, "\n".join(rows))).measurements["load"].tolist() == [
+        1234.5,
+        2000.0,
+    ]
+    rows[2] = "0,6;1,3;0.25"
+    assert "has '0,5'; write it with a decimal point" in refused(tmp_path, "\n".join(rows))
+
+
+@pytest.mark.parametrize("word", ["", "NaN", "nan", "NAN", "NA", "na", " nan "])
+def test_exact_words_for_not_measured(tmp_path, word):
+    rows = lines()
+    rows[3] = rows[3].rpartition(",")[0] + f",{word}"
+    assert np.isnan(read_trial(save(tmp_path, "\n".join(rows))).measurements["load"][2])
+
+
+@pytest.mark.parametrize(
+    "word",
+    ["inf", "-inf", "1_000", "１２", "٣", "0x1F", "1e400", "nan(1)", "25.3 mm", "#N/A", "--"],
+)
+def test_what_is_no_number_is_refused(tmp_path, word):
+    rows = lines()
+    rows[3] = rows[3].rpartition(",")[0] + f",{word}"
+    message = refused(tmp_path, "\n".join(rows))
+    assert "load_n must hold numbers, row 4 of ramp.csv has" in message
+    if word.startswith("#"):
+        return
+    rows[3] = f"{word},{rows[3].partition(',')[2]}"
+    assert "time_s must hold numbers, row 4 of" in refused(tmp_path, "\n".join(rows))
+
+
+@pytest.mark.parametrize(
+    "mark",
+    [
+        -999,
+        9999,
+        99999,
+        -999.9,
+        -9999.0,
+        -6999,
+        7999,
+        32767,
+        -32768,
+        65535,
+        2147483647,
+        1e30,
+        -5000,
+    ],
+)
+@pytest.mark.parametrize("count", [1, 3])
+def test_marks_of_nothing_measured_are_named_and_both_fixes_work(tmp_path, mark, count):
+    if mark == -5000 and count == 1:
+        pytest.skip("one odd reading is no mark")
+    rows = [row.rpartition(",")[0] + f",{mark}" if i in (5, 9, 20)[:count] else row
+            for i, row in enumerate(lines())]  # fmt: skip
+    message = refused(tmp_path, "\n".join(rows))
+    assert re.match(r"load_n of ramp.csv is \S+ in row 6", message)
+    assert "empty these cells" in message
+    emptied = [row.rpartition(",")[0] + "," if i in (5, 9, 20)[:count] else row
+               for i, row in enumerate(lines())]  # fmt: skip
+    load = read_trial(save(tmp_path, "\n".join(emptied))).measurements["load"]
+    assert np.isnan(load).sum() == count
+    save(tmp_path, "\n".join(rows))
+    (tmp_path / "dataset.toml").write_text(
+        "[format]\n" + re.findall(r"missing = \[.*?\]", message)[0]
+    )
+    assert np.isnan(read_dataset(tmp_path).trials[0].trial.measurements["load"]).sum() == count
+
+
+def test_a_signal_that_reaches_its_nines_is_no_mark(tmp_path):
+    rows = lines()
+    ramp = [f"{k / 50},1,5,{k * 999 / (ROWS - 1)}" for k in range(ROWS)]
+    trial = read_trial(save(tmp_path, "\n".join([rows[0], *ramp])))
+    assert trial.measurements["load"][-1] == 999.0
+
+
+STAMPS = {
+    "ISO": lambda s: f"2026-03-01T10:59:{59 + s:09.6f}" if s < 1 else "",
+    "blank": lambda s: f"2026-03-01 10:11:{12 + s:06.3f}",
+    "zone": lambda s: f"2026-03-01T10:11:{12 + s:06.3f}+01:00",
+    "comma": lambda s: f"2026-03-01 10:11:{12 + s:06.3f}".replace(".", ","),
+    "German": lambda s: f"01.03.2026 10:11:{12 + s:06.3f}",
+    "same day": lambda s: f"3/1/2026 10:11:{12 + s:06.3f} AM",
+    "MATLAB": lambda s: f"01-Mar-2026 10:11:{12 + s:06.3f}",
+    "clock": lambda s: f"10:11:{12 + s:06.3f}",
+    "midnight": lambda s: f"{'23:59' if s < 0.5 else '00:00'}:{(59.5 + s) % 60:06.3f}",
+    "duration": lambda s: f"{s:.4g} sec",
+    "epoch": lambda s: f"{1772359872 + s:.3f}",
+    "epoch ms": lambda s: f"{1772359872000 + 1000 * s:.0f}",
+    "epoch us": lambda s: f"{1772359872000000 + 1e6 * s:.0f}",
+}
+
+
+@pytest.mark.parametrize("form", [name for name in STAMPS if name != "ISO"])
+def test_dates_and_clock_times_become_seconds_from_the_first_row(tmp_path, form):
+    rows = [f"{STAMPS[form](float(row[0]))};" + ";".join(map(str, row[1:])) for row in VALUES]
+    with pytest.warns(TrialWarning, match="from the first row"):
+        trial = read_trial(save(tmp_path, "\n".join([";".join(HEADER), *rows])))
+    assert_allclose(trial.time, VALUES[:, 0], atol=1e-6)
+
+
+def test_a_date_of_two_meanings_is_refused(tmp_path):
+    rows = ["time_s;load_command_n", "1/2/2026 23:59:59;1", "2/2/2026 00:00:00;1"]
+    assert "give seconds since the start" in refused(tmp_path, "\n".join(rows))
+    rows[2] = rows[2].replace("2/2", "1/3")
+    assert "give seconds since the start" in refused(tmp_path, "\n".join(rows))
+    named = ["time_s;load_command_n", "2026-02-01 23:59:59;1", "2026-02-02 00:00:00;1"]
+    with pytest.warns(TrialWarning, match="holds '2026-02-01 23:59:59' in row 2"):
+        assert read_trial(save(tmp_path, "\n".join(named))).time.tolist() == [0.0, 1.0]
+    mapping = {"time_s": {"name": "time_s", "factor": 2.0}}
+    assert "no factor and no offset" in refused(tmp_path, "\n".join(named), None, mapping)
+
+
+LVM = """LabVIEW Measurement
+Writer_Version\t2
+Separator\tTab
+Decimal_Separator\t{decimal}
+Multi_Headings\t{many}
+X_Columns\t{columns}
+Time_Pref\tRelative
+***End_of_Header***
+\t
+"""
+SEGMENT = """Channels\t3
+Samples\t{n}\t{n}\t{n}
+Y_Unit_Label\tV\tmm\tN
+X_Dimension\tTime\tTime\tTime
+X0\t{start}\t{start}\t{start}
+Delta_X\t0{decimal}02\t0{decimal}02\t0{decimal}02
+***End_of_Header***
+X_Value\tmotor_voltage_v\tcontraction_mm\tload_n\tComment
+"""
+
+
+def labview(parts=1, decimal=".", columns="One", shift=True):
+    out = LVM.format(decimal=decimal, many="Yes" if parts > 1 else "No", columns=columns)
+    for part in np.array_split(np.arange(ROWS), parts):
+        start = str(TIME[part[0]] if shift else 0.0).replace(".", decimal)
+        out += SEGMENT.format(n=len(part), decimal=decimal, start=start)
+        for i in part:
+            stamp = VALUES[i, 0] - (0.0 if shift else TIME[part[0]])
+            cells = [f"{stamp:.3f}" if columns != "No" else "", *map(str, VALUES[i, 1:])]
+            out += "\t".join(cells).replace(".", decimal) + "\n"
+        out += "\n"
+    return out
+
+
+@pytest.mark.parametrize("name", ["a.lvm", "a.txt", "a.csv"])
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize("columns", ["One", "No"])
+def test_labview_files_are_read(tmp_path, name, decimal, columns):
+    check(read_trial(save(tmp_path, labview(1, decimal, columns).replace("\n", "\r\n"), name)))
+
+
+def test_labview_segments_that_go_on_are_one_trial_and_others_several(tmp_path):
+    with pytest.warns(TrialWarning, match="its 4 segments go on in time and are read as one"):
+        check(read_trial(save(tmp_path, labview(4), "a.lvm")))
+    save(tmp_path, labview(2, shift=False), "a.lvm")
+    with pytest.raises(TrialError, match="a.lvm holds 2 trials: 'a.lvm#1', 'a.lvm#2'; name one"):
+        read_trial(tmp_path / "a.lvm")
+    assert len(read_trial(tmp_path / "a.lvm#2")) == ROWS // 2
+    assert [each.name for each in read_dataset(tmp_path).trials] == ["a.lvm#1", "a.lvm#2"]
+
+
+def test_labview_comments_and_units_are_minded(tmp_path):
+    content = labview().split("\n")
+    content[20] += "\tvalve"
+    with pytest.warns(TrialWarning, match="the column Comment is passed over, it is filled in ro"):
+        check(read_trial(save(tmp_path, "\n".join(content), "a.lvm")))
+    other = labview().replace("\tV\tmm\tN", "\tV\tm\tN")
+    assert "gives 'contraction_mm' the unit 'm'" in refused(tmp_path, other, name="a.lvm")
+
+
+def test_a_folder_names_what_it_passes_over(tmp_path):
+    save(tmp_path, text(), "a.csv")
+    save(tmp_path, "hi\n", "notes.txt")
+    save(tmp_path, b"MATLAB 5.0", "old.mat")
+    save(tmp_path, b"TDSm\0", "raw.tdms")
+    save(tmp_path, b"\x89PNG", "photo.png")
+    save(tmp_path, b"x", "~$a.xlsx")
+    save(tmp_path, b"", "empty.csv")
+    with pytest.warns(TrialWarning) as said:
+        dataset = read_dataset(tmp_path)
+    assert [each.name for each in dataset.trials] == ["a.csv"]
+    shown = "\n".join(str(each.message) for each in said)
+    for name in ("notes.txt", "old.mat", "raw.tdms", "photo.png", "~$a.xlsx", "empty.csv"):
+        assert name in shown
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ("separater = ';'", "got 'separater' (did you mean 'separator'?)"),
+        ("separator = 3", "separator in [format] of dataset.toml must be one of"),
+        ("decimal = ';'", "decimal in [format] of dataset.toml must be one of '.', ',', got ';'"),
+        ("separator = ','\ndecimal = ','", "gives ',' as separator and as decimal; change one"),
+        ("encoding = 'zip'", "encoding in [format] of dataset.toml must be the name of a text enc"),
+        ("header_row = 0", "must be a row's number, counted from 1, got 0; write header_row = 3"),
+        ("names = 'a'", "must be a list of texts, got 'a'"),
+        ("missing = 'a'", "must be a list of numbers, got 'a'; write missing = [-999]"),
+        ("missing = nan", "must be a list of finite numbers, got nan"),
+    ],
+)
+def test_a_format_that_cannot_be_used_is_refused(tmp_path, line, message):
+    save(tmp_path, text())
+    (tmp_path / "dataset.toml").write_text(f"[format]\n{line}")
+    with pytest.raises(TrialError, match=re.escape(message)):
+        read_dataset(tmp_path)
