@@ -7,6 +7,7 @@ JOBS ?= 2
 PIP_FLAGS ?= -qq
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
+EXAMPLES ?= 100000
 
 EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
 BIN = $(VENV)/bin
@@ -37,8 +38,8 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
 
-fuzz: $(FULL) ## Feed changed files to every reader, PMA_GYM_FUZZ_EXAMPLES a test (default 10000).
-	PMA_GYM_FUZZ_EXAMPLES=$${PMA_GYM_FUZZ_EXAMPLES:-10000} $(BIN)/python -m pytest tests/fuzz $(PYTEST_ARGS)
+fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
+	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 

@@ -28,6 +28,7 @@ class Limit:
 LIMITS = {
     "file_mib": Limit(1024, "MiB a file"),
     "unpacked_mib": Limit(1024, "MiB that a compressed file unpacks to"),
+    "text_mib": Limit(256, "MiB a text file"),
     "table_mib": Limit(256, "MiB that the tables of a packed file (XLSX, Parquet, MAT) unpack to"),
     "packing": Limit(100, "MiB unpacked for each MiB of a workbook"),
     "document_kib": Limit(4096, "KiB a TOML, JSON or YAML document"),

@@ -163,7 +163,7 @@ def test_a_folder_is_no_command_file(run, ramp):
         code, _, err = run(*command)
         assert (code, err) == (
             2,
-            "error: . is a folder; name a .csv or .parquet or .xlsx file in it\n",
+            "error: . is a folder; name a file in it\n",
         )
 
 

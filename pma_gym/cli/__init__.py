@@ -42,7 +42,9 @@ class Hold(StrEnum):
 
 @app.command()
 def simulate(
-    commands: Annotated[Path, typer.Argument(help="CSV, Parquet or XLSX with time and commands.")],
+    commands: Annotated[
+        Path, typer.Argument(help="A file with time and commands: CSV, XLSX, Parquet...")
+    ],
     out: Annotated[
         Path, typer.Option(help="File to write, in a folder that exists: .csv, .parquet or .xlsx.")
     ],
@@ -74,7 +76,7 @@ def simulate(
 
 @app.command()
 def evaluate(
-    trial: Annotated[Path, typer.Argument(help="A log: CSV, Parquet or XLSX.")],
+    trial: Annotated[Path, typer.Argument(help="A log: CSV, XLSX, Parquet, LVM, MAT, TDMS...")],
     task: Annotated[str, typer.Option(help="displacement or rotation.")],
 ) -> None:
     """Give a logged trial its rows of tables 20-22 or 24-30: regression, variance and RMSE."""

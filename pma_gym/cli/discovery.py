@@ -26,7 +26,8 @@ _FITTED = ("schema", "verdict", "sentence", "parameters", "gap", "not_identifiab
 """What `fit.json` has of a diagnosis."""
 
 DatasetArgument = Annotated[
-    Path, typer.Argument(help="Folder of CSV, Parquet or XLSX files, one a trial.")
+    Path,
+    typer.Argument(help="Folder of logs (CSV, XLSX, Parquet, LVM, MAT, TDMS...), one a trial."),
 ]
 ModelOption = Annotated[
     str | None,

@@ -11,9 +11,11 @@ from pma_gym.data.dataset_files import PROPOSED, list_files, read_files
 from pma_gym.data.dataset_toml import DESCRIPTION, Description, read_description
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_columns import ColumnMap, TrialError
+from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
 from pma_gym.data.trial_files import TrialWarning, trial_of
 from pma_gym.data.trial_hints import strange_columns
+from pma_gym.data.wild_readings import wild_readings
+from pma_gym.units import SI_FACTORS
 
 __all__ = ["PROPOSED", "Dataset", "NamedTrial", "read_dataset"]
 
@@ -118,9 +120,21 @@ def _named(
         )
     check_signals(path, trial, description.columns, description.form)
     words = [strange if each.startswith(_UNKNOWN) else each for each in words]
-    doubts += [(path.name, each) for each in (*words, *empty_runs(path, trial, table))]
+    doubts += [
+        (path.name, each)
+        for each in (*words, *empty_runs(path, trial, table), *_wild(trial, table))
+    ]
     about = description.trials.get(path.name, {})
     return NamedTrial(path.name, trial, **about)
+
+
+def _wild(trial: Trial, table: Table) -> Iterator[str]:
+    """Words on wild readings of a trial."""
+    values = {
+        name: readings / SI_FACTORS[BY_QUANTITY[name].unit]
+        for name, readings in trial.measurements.items()
+    }
+    return wild_readings(values, table.place)
 
 
 def _gathered(doubts: list[tuple[str, str]], count: int) -> Iterator[str]:

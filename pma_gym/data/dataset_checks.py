@@ -13,6 +13,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
 from pma_gym.data.trial_files import place_in_file, read_header
 from pma_gym.data.trial_hints import mapping_line
+from pma_gym.data.wild_readings import check_possible
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
@@ -74,6 +75,11 @@ def check_signals(
         slip = find(door)
         if slip:
             raise TrialError(_slip_words(path, slip, door[slip.quantity], columns, form))
+    place = partial(place_in_file, path, columns=columns, form=form)
+    for quantity in ("contraction", "pressure", "pressure_command"):
+        # A slide without a muscle goes as far as it likes.
+        if quantity != "contraction" or any(name in door for name in _MUSCLE):
+            check_possible(door, quantity, place)
     for quantity in trial.measurements:
         _check_alive(path, quantity, door)
 

@@ -14,8 +14,8 @@ _MARKS = frozenset(
 
 _VOID = 1e29
 """Smallest magnitude of which no sensor speaks."""
-_FEW = 0.2
-"""Largest share of a column that is still a few cells."""
+_FEW, _MOST = 0.2, 0.5
+"""Largest share of a column that any number, and a known mark, takes as one."""
 _FAR = 3.0
 """Spans of the other cells by which a known mark lies outside of them."""
 _VERY_FAR = 10.0
@@ -68,7 +68,8 @@ def sentinel(values: NDArray[np.float64]) -> float | None:
     for extreme in (float(finite.min()), float(finite.max())):
         others = finite[finite != extreme]
         count = finite.size - others.size
-        if not others.size or count > max(1.0, _FEW * finite.size):
+        share = _MOST if _known(extreme) else _FEW
+        if not others.size or count > max(1.0, share * finite.size):
             continue
         low, high = float(others.min()), float(others.max())
         if _known(extreme):

@@ -177,7 +177,8 @@ def sources(
 def suggestion(name: str, known: Iterable[str] = BY_NAME) -> str:
     """` (did you mean 'time_s'?)` for a name close to a known one, else nothing."""
     lowered = {entry.lower(): entry for entry in known}
-    close = difflib.get_close_matches(name.strip().lower(), lowered, n=1, cutoff=0.7)
+    # Ratios of names take time that grows with their lengths.
+    close = difflib.get_close_matches(name.strip().lower()[:80], lowered, n=1, cutoff=0.7)
     return f" (did you mean {lowered[close[0]]!r}?)" if close else ""
 
 

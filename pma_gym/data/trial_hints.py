@@ -29,6 +29,8 @@ _STEMS = {
     "pressure_kpa": ("pressure", "muscle pressure", "gauge pressure"),
     **{column.name: (column.name.removesuffix("_v").replace("_", " "),) for column in RAW_COLUMNS},
 }
+_LONGEST = 80
+"""Characters of a name that are looked at."""
 _ALIKE = 0.8
 """Smallest similarity of two names that are taken for one."""
 
@@ -40,7 +42,9 @@ def looks_like(name: str) -> tuple[Column, float] | None:
     >>> column.name, factor
     ('pressure_kpa', 100.0)
     """
-    words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name).lower())
+    # Ratios of names take time that grows with their lengths.
+    plain = name[:_LONGEST].replace("°", " deg").translate({0xB5: "u", 0x3BC: "u"})
+    words = re.findall(r"[a-z]+", re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", plain).lower())
     ends = {unit for factors in FACTORS.values() for unit in factors}
     unit = words[-1] if len(words) > 1 and words[-1] in ends else ""
     stem = " ".join(words[:-1] if unit else words)

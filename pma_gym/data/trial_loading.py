@@ -71,7 +71,7 @@ def load_tables(
     """
     path = Path(path)
     if path.is_dir():
-        raise TrialError(f"{path} is a folder; name a {' or '.join(DECODERS)} file in it")
+        raise TrialError(f"{path} is a folder; name a file in it")
     read = DECODERS[known_suffix(path)]
     if not path.is_file():
         raise TrialError(f"there is no file {path}; check the name and the folder")

@@ -299,3 +299,42 @@ def test_a_broken_file_is_named(folder):
     assert "time_s must increase strictly, row 3 of b.csv" in refusal(folder)
     write(folder / "b.csv", load_n="n/a")
     assert "load_n must hold numbers, row 2 of b.csv has 'n/a'; leave the cell" in refusal(folder)
+
+
+@pytest.mark.parametrize("wild", [-4321.5, 1e6])
+def test_a_unit_is_not_guessed_from_one_reading(folder, wild):
+    spoiled = NORMAL["contraction_mm"].copy()
+    spoiled[20] = wild
+    write(folder / "ramp.csv", contraction_mm=spoiled)
+    message = refusal(folder)
+    assert re.match(r"contraction_mm is \S+ mm in row 22, beyond the 250 mm that a muscle", message)
+    assert message.endswith("empty these cells if nothing was measured there")
+    spoiled[20] = np.nan
+    write(folder / "ramp.csv", contraction_mm=spoiled)
+    assert len(read_dataset(folder)) == 1
+
+
+def test_a_wild_reading_is_warned_of(folder):
+    spoiled = NORMAL["load_n"].copy()
+    spoiled[20] = 54321.5
+    write(folder / "ramp.csv", load_n=spoiled)
+    with pytest.warns(TrialWarning, match="load_n is 54321.5 N in row 22, far from its other rea"):
+        assert len(read_dataset(folder)) == 1
+
+
+def test_a_mark_of_nothing_measured_is_no_unit(folder):
+    spoiled = NORMAL["contraction_mm"].copy()
+    spoiled[[10, 20, 30]] = -999.0
+    write(folder / "ramp.csv", contraction_mm=spoiled)
+    message = refusal(folder)
+    assert "contraction_mm of ramp.csv is -999 in row 12, 22, 32, while" in message
+    assert "micrometres" not in message
+    describe(folder, "[format]\n" + re.findall(r"missing = \[.*?\]", message)[0])
+    (trial,) = read_dataset(folder).trials
+    assert np.isnan(trial.trial.measurements["contraction"]).sum() == 3
+
+
+def test_a_degree_sign_is_a_unit_of_a_look_alike(folder):
+    write(folder / "ramp.csv", **{"rotation_deg": None, "Angle (°)": NORMAL["rotation_deg"]})
+    with pytest.warns(TrialWarning, match='"Angle .°." = "rotation_deg"$'):
+        read_dataset(folder)

@@ -32,7 +32,8 @@ CELLS = [
     b"", b"0", b"-1", b"1e9", b"1e400", b"nan", b"NA", b"inf", b"1,5", b"1.234,5", b"3,785", b"1_0",
     "٣".encode(), b"-999", b"=1+1", b"time_s", b"#", b'"', b"10:11:12", b"2026-03-01 10:11:12.5",
     b"1/2/2026 10:11:12", b"1772359872", b"\xff", b"\0", b"x" * 300, b"9" * 500,
-    b"***End_of_Header***", b"X_Value", b"Channels", b"12 mm", b"\xef\xbb\xbf", b"s", b"0x10", b"1'234", b"25:61:61",
+    b"***End_of_Header***", b"X_Value", b"Channels", b"12 mm", b"\xef\xbb\xbf", b"s",
+    b"0x10", b"1'234", b"25:61:61",
 ]  # fmt: skip
 """What stands in cells of logs, and what should not."""
 
@@ -198,7 +199,8 @@ def change_cells(rng, content):
 TOKENS = [
     b'r="XFD1"', b'r="A1048576"', b't="s"', b't="b"', b't="e"', b't="d"', b's="1"', b"<f>1</f>",
     b"<v>1</v>", b"<c/>", b"<row/>", b"</row>", b"<v>", b"1e999", b"\xc3", b"&amp;", b"<!--",
-    b"]]>", b"<is><t>time_s</t></is>", b'r="a"', b"<!DOCTYPE x>", b'state="hidden"', b'date1904="1"',
+    b"]]>", b"<is><t>time_s</t></is>", b'r="a"', b"<!DOCTYPE x>", b'state="hidden"',
+    b'date1904="1"',
 ]  # fmt: skip
 
 

@@ -87,14 +87,8 @@ def cell_number(cell: object, mark: str = ".", grouped: bool = False) -> float |
         >>> cell_number("25,3", ","), cell_number("3,785.9", ".", True), cell_number("1_000")
         (25.3, 3785.9, None)
     """
-    if cell is None:
-        return math.nan
-    if isinstance(cell, bool):
-        return None
-    if isinstance(cell, int | float):
-        return _finite(cell)
     if not isinstance(cell, str):
-        return None
+        return _object_number(cell)
     plain = parse_number(cell)
     if plain is not None and (mark == "." or "." not in cell):
         return plain
@@ -117,10 +111,14 @@ def _marked(bare: str, mark: str, grouped: bool) -> float | None:
     return parse_number(bare.replace(",", "."))
 
 
-def _finite(number: float) -> float | None:
-    """The number as a double; None where it is too large for one."""
+def _object_number(cell: object) -> float | None:
+    """The number in a cell that is no text."""
+    if cell is None:
+        return math.nan
+    if isinstance(cell, bool) or not isinstance(cell, int | float):
+        return None
     try:
-        return float(number)
+        return float(cell)
     except OverflowError:
         return None
 

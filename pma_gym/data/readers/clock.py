@@ -114,6 +114,8 @@ def _texts(cells: Cells) -> list[int | None] | None:
     if not filled or not all(isinstance(cell, str) for cell in filled):
         return None
     for form, read in _FORMS.items():
+        if _match(form, filled[0]) is None:
+            continue
         matches = [_match(form, cell) if cell else None for cell in bare]
         if sum(match is not None for match in matches) == len(filled):
             try:

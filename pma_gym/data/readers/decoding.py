@@ -3,6 +3,8 @@
 import codecs
 
 from pma_gym.data.readers.table import UnreadableError
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.limits import check_limit
 
 _MARKS = (
     (codecs.BOM_UTF8, "utf-8"),
@@ -30,16 +32,23 @@ def decode_text(content: bytes, file: str, encoding: str | None = None) -> str:
         The text, without a byte order mark.
     Raises:
         UnreadableError: bytes that are no text, or not of that encoding.
+        TrialError: no such encoding.
+        LimitError: more text than is read.
     """
+    check_limit(file, "text_mib", len(content) / 2**20)
     if encoding is None:
         mark, encoding = next(((m, name) for m, name in _MARKS if content.startswith(m)), (b"", ""))
         content = content[len(mark) :]
         encoding = encoding or _guess(content)
     try:
         text = content.decode(encoding)
-    except UnicodeDecodeError as error:
-        raise UnreadableError(
-            f"{file} is not {encoding} text (byte {error.start}); save it as 'CSV UTF-8'"
+    except UnicodeError as error:
+        at = f" (byte {error.start})" if isinstance(error, UnicodeDecodeError) else ""
+        said = f"{file} is not {encoding} text{at}; save it as 'CSV UTF-8'"
+        raise UnreadableError(said) from None
+    except LookupError:
+        raise TrialError(
+            f"{encoding!r} is no encoding of text; give another, for example 'cp1252'"
         ) from None
     if "\0" in text:
         raise UnreadableError(

@@ -1,7 +1,6 @@
 """Text tables: cells between commas, semicolons, tabs, bars or blanks."""
 
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Sequence
@@ -10,8 +9,9 @@ from pma_gym.data.readers import labview
 from pma_gym.data.readers.decoding import decode_text
 from pma_gym.data.readers.layout import COMMENTS, Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.limits import check_limit
+from pma_gym.limits import check_limit, limit
 
 SEPARATORS = ("\t", ";", "|", ",")
 """In the order of preference: a comma may be a decimal mark where another one separates."""
@@ -51,17 +51,18 @@ def split_rows(text: str, file: str, request: Request) -> list[Row]:
     Raises:
         TrialError: quotes that do not end, or more rows, columns or cells than are read.
     """
-    lines = list(io.StringIO(text, newline=""))
-    check_limit(file, "rows", len(lines))
+    lines = split_lines(text, file)
     separator = request.format.separator or choose_separator(lines, request)
+    check_widths(lines, separator, file)
     rows: list[Row] = []
-    cells = 0
+    cells, most_columns, most_cells = 0, limit("columns"), limit("cells")
     for number, row in _split(lines, separator, file):
         if not any(cell.strip() for cell in row):
             continue
-        check_limit(file, "columns", len(row))
         cells += len(row)
-        check_limit(file, "cells", cells)
+        if len(row) > most_columns or cells > most_cells:
+            check_limit(file, "columns", len(row))
+            check_limit(file, "cells", cells)
         rows.append((number, row))
     return _uncommented_header(rows, request)
 

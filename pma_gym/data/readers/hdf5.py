@@ -39,7 +39,7 @@ def read_hdf5(content: bytes, file: str, request: Request = Request()) -> list[T
     h5py = needed("h5py", file)
     try:
         with h5py.File(io.BytesIO(content), "r") as source:
-            variables = dict(_members(h5py, source, file, 0))
+            variables = dict(_members(h5py, source, file, 0, set()))
     except (TrialError, LimitError):
         raise
     # h5py raises OSError, RuntimeError, KeyError, TypeError... for damaged files.
@@ -49,8 +49,14 @@ def read_hdf5(content: bytes, file: str, request: Request = Request()) -> list[T
     return tables_of(variables, file, request, OPAQUE)
 
 
-def _members(h5py: Any, group: Any, file: str, depth: int) -> Iterator[tuple[str, Variable]]:  # noqa: ANN401
-    """Names and values of what a group holds itself."""
+def _members(
+    h5py: Any,  # noqa: ANN401
+    group: Any,  # noqa: ANN401
+    file: str,
+    depth: int,
+    seen: set[int],
+) -> Iterator[tuple[str, Variable]]:
+    """Names and values of what a group holds itself, each thing once: links may go in circles."""
     check_limit(file, "nesting", depth)
     check_limit(file, "columns", len(group))
     for name in group:
@@ -58,9 +64,17 @@ def _members(h5py: Any, group: Any, file: str, depth: int) -> Iterator[tuple[str
         if name.startswith(_HIDDEN) or not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
         member = group[name]
+        address = h5py.h5o.get_info(member.id).addr
+        if address in seen:
+            continue
+        seen.add(address)
+        check_limit(file, "columns", len(seen))
         if isinstance(member, h5py.Group):
             opaque = _OPAQUE in member.attrs
-            yield name, "opaque" if opaque else [dict(_members(h5py, member, file, depth + 1))]
+            yield (
+                name,
+                "opaque" if opaque else [dict(_members(h5py, member, file, depth + 1, seen))],
+            )
         elif isinstance(member, h5py.Dataset):
             yield name, "opaque" if _OPAQUE in member.attrs else _numbers(member, file)
 

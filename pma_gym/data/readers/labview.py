@@ -5,13 +5,13 @@ A header of the file, then segments, each with a header of its own; every header
 (.lvm)", 2.0.
 """
 
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pma_gym.data.readers.cells import cell_number
 from pma_gym.data.readers.layout import Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
+from pma_gym.data.readers.text_lines import check_widths, split_lines
 from pma_gym.limits import check_limit
 
 END = "***end_of_header***"
@@ -49,8 +49,7 @@ def read_labview(text: str, file: str, request: Request) -> list[Table]:
     Raises:
         TrialError: no segment, or rows that are no table.
     """
-    lines = list(io.StringIO(text, newline=None))
-    check_limit(file, "rows", len(lines))
+    lines = split_lines(text, file)
     header, segments = _segments(lines, file, request)
     request = _with_decimal(request, header)
     tables = [
@@ -77,9 +76,9 @@ def _segments(lines: Sequence[str], file: str, request: Request) -> tuple[Header
     ends = [i for i, line in enumerate(lines) if line.strip("\t ,;\r\n").lower() == END]
     check_limit(file, "sheets", len(ends))
     separator = request.format.separator or _separator(lines[: ends[0] if ends else 20], lines)
+    check_widths(lines, separator, file)
     cells = [[cell.strip() for cell in line.rstrip("\r\n").split(separator)] for line in lines]
-    width = max(map(len, cells), default=0)
-    check_limit(file, "columns", width)
+    check_limit(file, "cells", sum(map(len, cells)))
     if not ends:
         raise UnreadableError(f"{file} begins as a LabVIEW file, but no header ends in it")
     header = _fields(cells[: ends[0]])

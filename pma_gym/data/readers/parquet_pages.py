@@ -15,6 +15,8 @@ _STRUCT, _LIST, _SET = 12, 9, 10
 _DEEPEST = 12
 _LONGEST = 100_000
 """Entries of a list, at most."""
+_SHORTEST = 8
+"""Bytes of the shortest page header."""
 _MAGIC = b"PAR1"
 
 
@@ -48,11 +50,16 @@ def read_pages(content: bytes) -> Iterator[tuple[int, Page]]:
     if start < 4:
         raise ValueError("its description is cut off")
     footer, _ = _struct(content, start, 0)
+    pages = 0
     for group in _listed(footer.get(4)):
         for index, chunk in enumerate(_listed(_fields(group).get(1))):
             meta = _fields(_fields(chunk).get(3))
             begin = min(_places(meta, (9, 11)), default=-1)
             for page in _chunk_pages(content, begin, next(_places(meta, (7,)), -1)):
+                # Columns that share pages could have them read without end.
+                pages += 1
+                if pages > len(content) // _SHORTEST:
+                    raise ValueError("its columns lie upon each other")
                 yield index, page
 
 

@@ -1,6 +1,7 @@
 """National Instruments' TDMS files: channels of a group are columns."""
 
 import io
+import logging
 from typing import Any
 
 import numpy as np
@@ -29,6 +30,7 @@ def read_tdms(content: bytes, file: str, request: Request = Request()) -> list[T
         TrialError: npTDMS is missing or cannot read it, or it is beyond a limit.
     """
     nptdms = needed("nptdms", file)
+    _silence()
     try:
         with nptdms.TdmsFile.open(io.BytesIO(content)) as source:
             tables = _tables(source, file, request, len(content))
@@ -43,6 +45,13 @@ def read_tdms(content: bytes, file: str, request: Request = Request()) -> list[T
             f"{file} is not a readable TDMS file: it holds no channel with values"
         )
     return tables
+
+
+def _silence() -> None:
+    """Keep npTDMS from printing a line for each oddity of each segment: one message is enough."""
+    for name in list(logging.root.manager.loggerDict):
+        if name.partition(".")[0] == "nptdms":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _tables(source: Any, file: str, request: Request, size: int) -> list[Table]:  # noqa: ANN401

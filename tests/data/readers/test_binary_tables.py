@@ -299,3 +299,40 @@ def test_a_large_file_is_not_opened(tmp_path, monkeypatch):
     path.write_text("x" * 2**21)
     monkeypatch.setenv("PMA_GYM_MAX_FILE_MIB", "1")
     assert "a.csv is beyond the limit of 1 MiB a file: it has 2;" in refused(path)
+
+
+def test_hdf5_that_links_in_circles_is_read_once(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as out:
+        group = out.create_group("log")
+        for column, values in COLUMNS.items():
+            group[column] = values
+        for name in "abc":
+            group[name] = group
+            out[name] = out["/"]
+    check(read_trial(path))
+
+
+def test_an_encoding_that_is_none_is_refused(tmp_path):
+    (tmp_path / "a.csv").write_text("time_s,load_command_n\n0,1\n")
+    for name in ("zip", "none"):
+        message = refused(tmp_path / "a.csv", form=FileFormat(encoding=name))
+        assert "is no encoding of text; give another" in message
+
+
+def test_a_text_of_many_short_lines_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "a.csv").write_text("\n" * 3000)
+    monkeypatch.setenv("PMA_GYM_MAX_ROWS", "1000")
+    assert "limit of 1000 rows a table: it has 3000" in refused(tmp_path / "a.csv")
+    monkeypatch.setenv("PMA_GYM_MAX_TEXT_MIB", "1")
+    (tmp_path / "a.txt").write_text("x" * 2**21)
+    assert "limit of 1 MiB a text file" in refused(tmp_path / "a.txt")
+
+
+def test_an_odd_tdms_file_prints_nothing(tmp_path, capfd):
+    path = tmp_path / "a.tdms"
+    tdms(path, {"log": COLUMNS})
+    path.write_bytes(path.read_bytes() + (b"TDSm" + struct.pack("<iIQQ", 0, 4711, 0, 0)) * 9)
+    check(read_trial(path))
+    assert capfd.readouterr() == ("", "")

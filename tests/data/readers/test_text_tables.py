@@ -409,3 +409,39 @@ def test_a_format_that_cannot_be_used_is_refused(tmp_path, line, message):
     (tmp_path / "dataset.toml").write_text(f"[format]\n{line}")
     with pytest.raises(TrialError, match=re.escape(message)):
         read_dataset(tmp_path)
+
+
+def test_a_known_mark_in_many_cells_is_no_unit(tmp_path):
+    rows = lines()
+    rows[9:27] = [row.replace(f",{row.split(',')[2]},", ",-999,") for row in rows[9:27]]
+    assert "contraction_mm of ramp.csv is -999 in row 10, 11" in refused(tmp_path, "\n".join(rows))
+
+
+def test_a_mark_in_a_command_is_no_count_of_a_daq(tmp_path):
+    rows = lines()
+    rows[9] = rows[9].replace(f",{rows[9].split(',')[1]},", ",-999,", 1)
+    message = refused(tmp_path, "\n".join(rows))
+    assert "motor_voltage_v of ramp.csv is -999 in row 10" in message
+    assert "DAQ" not in message
+
+
+def test_a_time_by_another_name_and_unit_gets_its_line(tmp_path):
+    rows = lines(header=["t (ms)", *HEADER[1:]])
+    message = refused(tmp_path, "\n".join(rows))
+    assert "has no column time_s; its columns are 't (ms)'" in message
+    (tmp_path / "dataset.toml").write_text("[columns]\n" + message.partition("example: ")[2])
+    (trial,) = read_dataset(tmp_path).trials
+    assert_allclose(trial.trial.time, TIME / 1e3)
+
+
+def test_labview_files_with_a_time_for_each_channel_are_read(tmp_path):
+    content = labview(columns="Multi").split("\n")
+    at = next(i for i, line in enumerate(content) if line.startswith("X_Value"))
+    for i in range(at, at + ROWS + 1):
+        first, *cells = content[i].removesuffix("\tComment").split("\t")
+        content[i] = "\t".join(part for cell in cells for part in (first, cell))
+    check(read_trial(save(tmp_path, "\n".join(content), "a.lvm")))
+    content[at + 3] = content[at + 3].replace("\t0.040\t", "\t0.050\t", 1)
+    assert "has a time for each channel, and they differ; save the file with X_Columns One" in (
+        refused(tmp_path, "\n".join(content), name="a.lvm")
+    )

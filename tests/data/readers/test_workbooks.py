@@ -123,6 +123,18 @@ def test_formulas_without_stored_values_are_named_and_with_them_are_read(tmp_pat
             xml.replace(b"</f><v></v>", b"</f><v/>"),
         )
 
+    def saved_in_part(xml):
+        return saved_once(xml).replace(b"<v>9</v>", b"")
+
+    plain = path.read_bytes()
+    patched(path, SHEET, saved_in_part)
+    with pytest.raises(TrialError, match="cell C9 of a.xlsx, sheet 'run', hold"):
+        read_trial(path)
+    path.write_bytes(plain)
+    patched(path, SHEET, lambda xml: saved_once(xml).replace(b'"C9"><f', b'"C9" t="str"><f', 1))
+    patched(path, SHEET, lambda xml: xml.replace(b"<v>9</v>", b"<v></v>"))
+    assert np.isnan(read_trial(path).measurements["contraction"]).sum() == 1
+    path.write_bytes(plain)
     patched(path, SHEET, saved_once)
     assert read_trial(path).measurements["contraction"][0] == pytest.approx(2e-3)
 
