@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from pma_gym.data.dataset import Dataset
+from pma_gym.data.drafting import quoted
 from pma_gym.data.trial_columns import (
     BY_QUANTITY,
     Column,
@@ -60,9 +61,9 @@ def column_line(name: str, column: Column, entry: Mapping[str, float | list[floa
     """A line of `[columns]`, its numbers with as few digits as name them."""
     numbers = {key: value for key, value in entry.items() if value != _USUAL.get(key)}
     if not numbers:
-        return f'{_quoted(name)} = "{column.name}"'
+        return f'{quoted(name)} = "{column.name}"'
     said = ", ".join(f"{key} = {_toml(value)}" for key, value in numbers.items())
-    return f'{_quoted(name)} = {{ name = "{column.name}", {said} }}'
+    return f'{quoted(name)} = {{ name = "{column.name}", {said} }}'
 
 
 _USUAL: dict[str, float] = {"factor": 1.0, "offset": 0.0}
@@ -99,10 +100,3 @@ def _toml(value: float | list[float]) -> str:
     if isinstance(value, list):
         return f"[{', '.join(map(_toml, value))}]"
     return f"{value:.7g}"
-
-
-def _quoted(name: str) -> str:
-    """A key in TOML: a log's own names may hold anything."""
-    escaped = name.replace("\\", "\\\\").replace('"', '\\"')
-    escaped = "".join(c if c.isprintable() else f"\\u{ord(c):04X}" for c in escaped)
-    return f'"{escaped}"'
