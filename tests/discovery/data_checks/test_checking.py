@@ -167,3 +167,14 @@ def test_a_slide_begins_where_it_likes(tmp_path):
     from pma_gym.discovery.data_checks import check_dataset
 
     assert check_dataset(folder, model).checked == ()
+
+
+def test_stamps_that_repeat_by_rounding_are_read(tmp_path):
+    """Two decimals at 384 Hz."""
+    written = logs(rate=384.0, seconds=2.0)
+    for each in written:
+        each["time_s"] = np.rint(1e2 * each["time_s"]) / 1e2
+    folder = write(tmp_path / "lab", written)
+    with pytest.warns(UserWarning, match="time_s is rounded to 10 ms by the logger"):
+        (first, *_) = read_dataset(folder).trials
+    assert np.diff(first.trial.time) == pytest.approx(1 / 384, rel=1e-3)
