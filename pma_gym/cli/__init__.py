@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pma_gym.cli.convert import convert
 from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.information import print_installation, print_model
 from pma_gym.cli.options import StrictTyper
@@ -99,6 +100,7 @@ def info(
         print_model(load_model(model), console())
 
 
+app.command()(convert)
 app.command()(diagnose)
 app.command()(fit)
 

@@ -14,7 +14,6 @@ from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
 from pma_gym.cli.terminal import say, warnings_said, warnings_said_at_once
 from pma_gym.data.dataset import Dataset, read_dataset
-from pma_gym.data.trial_files import encode_trial
 from pma_gym.files import OutputError
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -42,6 +41,10 @@ JobsOption = Annotated[int, typer.Option(min=1, help="How many cores to use.")]
 EffectOption = Annotated[
     list[Path] | None, typer.Option(help="Python file with effects of your own; may be repeated.")
 ]
+ChecksOption = Annotated[
+    bool,
+    typer.Option(help="Stop where a column is certainly in another unit; else only say so."),
+]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace an older result.")]
 
 
@@ -52,6 +55,7 @@ def diagnose(
     seed: SeedOption = 0,
     jobs: JobsOption = 1,
     effect: EffectOption = None,
+    checks: ChecksOption = True,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with a run that was interrupted.")
     ] = False,
@@ -64,8 +68,9 @@ def diagnose(
     )
     _check_apart(results, dataset)
     results.check(force, resume)
-    trials, given = _inputs(dataset, model, effect)
+    trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
+    from pma_gym.discovery.proposed_file import proposed_file
     from pma_gym.discovery.report import report_page
 
     with results.opened(resume):
@@ -79,7 +84,7 @@ def diagnose(
             ).encode(),
         }
         if found.next_experiment:
-            files["next.csv"] = encode_trial(found.next_experiment.trial, "next.csv")
+            files["next.csv"] = proposed_file(found.next_experiment.trial, trials, given)
         results.write(files)
     from pma_gym.discovery.summary import diagnosis_summary
 
@@ -94,13 +99,14 @@ def fit(
     seed: SeedOption = 0,
     jobs: JobsOption = 1,
     effect: EffectOption = None,
+    checks: ChecksOption = True,
     force: ForceOption = False,
 ) -> None:
     """Refit a model's parameters to logs, without looking for new effects."""
     results = Results(out or _default(dataset, "fit"), ("model.toml", "fit.json"))
     _check_apart(results, dataset)
     results.check(force)
-    trials, given = _inputs(dataset, model, effect)
+    trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
 
     with results.opened():
@@ -133,15 +139,24 @@ def _check_apart(results: Results, dataset: Path) -> None:
         )
 
 
-def _inputs(folder: Path, model: str | None, effects: list[Path] | None) -> tuple[Dataset, Model]:
-    """The data set and the model, all that can be refused before anything is computed."""
+def _inputs(
+    folder: Path, model: str | None, effects: list[Path] | None, checks: bool
+) -> tuple[Dataset, Model]:
+    """The data set and the model, all that can be refused before anything is fitted."""
     with warnings_said():
         trials = read_dataset(folder)
     for path in effects or ():
         from pma_gym.effects.own import load_effects
 
         load_effects(path)
-    return trials, load_model(model or trials.model or DEFAULT_MODEL)
+    given = load_model(model or trials.model or DEFAULT_MODEL)
+    if given.plant in ("station", "slide"):
+        from pma_gym.discovery.data_checks import check_dataset
+
+        trials = check_dataset(trials, given, stop=checks)
+        for words in trials.checked or ():
+            say(f"warning: {words}")
+    return trials, given
 
 
 def _run(

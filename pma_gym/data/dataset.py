@@ -3,15 +3,15 @@
 import os
 import warnings
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pma_gym.data.dataset_checks import check_signals, empty_runs
 from pma_gym.data.dataset_files import PROPOSED, list_files, read_files
 from pma_gym.data.dataset_toml import DESCRIPTION, Description, read_description
-from pma_gym.data.readers.table import Table
+from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_columns import BY_QUANTITY, TrialError
+from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
 from pma_gym.data.trial_files import TrialWarning, trial_of
 from pma_gym.data.trial_hints import strange_columns
 from pma_gym.data.wild_readings import wild_readings
@@ -51,11 +51,19 @@ class Dataset:
         title: a line for people.
         model: name or path of the model to compare them with; None if none is named.
         trials: in the order of their files' names.
+        folder: where they were read from; None for trials that are no files.
+        columns: the lab's names to ours, as `dataset.toml` has them.
+        form: separator, decimal mark... of its files, as `dataset.toml` has them.
+        checked: what the checks of the data said; None before they ran.
     """
 
     title: str
     model: str | None
     trials: tuple[NamedTrial, ...]
+    folder: Path | None = None
+    columns: ColumnMap = field(default_factory=dict)
+    form: FileFormat = field(default_factory=FileFormat)
+    checked: tuple[str, ...] | None = None
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -89,7 +97,8 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     trials = tuple(_named(path, table, description, doubts) for path, table in tables)
     for message in _gathered(doubts, len(tables)):
         warnings.warn(message, TrialWarning, stacklevel=2)
-    return Dataset(description.title or folder.resolve().name, description.model, trials)
+    title = description.title or folder.resolve().name
+    return Dataset(title, description.model, trials, folder, description.columns, description.form)
 
 
 def _named(

@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.even_clock import even_clock
 from pma_gym.data.readers.cells import decimal_mark
 from pma_gym.data.readers.table import FileFormat, Table, UnreadableError, shown
 from pma_gym.data.trial import Trial
@@ -99,6 +100,10 @@ def trial_of(table: Table, mapping: ColumnMap, form: FileFormat) -> Trial:
     check_units(known, table, mapping)
     mark = form.decimal or decimal_mark(table.cells[source.index] for source in known)
     arrays = {source.column.quantity: file_values(source, table, form, mark) for source in known}
+    if (np.diff(arrays["time"]) == 0.0).any() and (clock := even_clock(arrays["time"])) is not None:
+        # Rounded so coarsely that stamps repeat: the clock behind them still increases.
+        arrays["time"] = clock.time
+        warn(f"{table.file}: {clock.words()}")
     check_time(arrays["time"], table.place)
     _doubt_time(arrays["time"], table)
     check_commanded(arrays, table.file)

@@ -9,6 +9,7 @@ from pma_gym.data.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer import answer
+from pma_gym.discovery.data_checks import check_dataset
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.fewest import Fewest, fewest
 from pma_gym.discovery.findings import Findings
@@ -43,6 +44,7 @@ def diagnose(
     journal: Path | None = None,
     progress: Progress | None = None,
     propose: bool = True,
+    checks: bool = True,
 ) -> Diagnosis:
     """Find what a model misses in measured trials.
 
@@ -57,6 +59,8 @@ def diagnose(
             on; None keeps nothing.
         progress: called with a step's name, what is done of it and its total.
         propose: whether to look for the next experiment too, which takes seconds.
+        checks: whether a column of a data set that is certainly in another unit is refused; else it
+            is only said.
     Returns:
         The diagnosis; its amended model goes into `gym.make(..., model=...)`, into the benchmark,
         and into another diagnosis.
@@ -75,7 +79,7 @@ def diagnose(
         ('undecidable', True)
     """
     with linear_algebra_alone():
-        return _Work(trials, model, seed, jobs, journal, progress, propose).run(search=True)
+        return _Work(trials, model, seed, jobs, journal, progress, propose, checks).run(search=True)
 
 
 def refit(
@@ -86,13 +90,14 @@ def refit(
     jobs: int = 1,
     journal: Path | None = None,
     progress: Progress | None = None,
+    checks: bool = True,
 ) -> Diagnosis:
     """Refit a model's own parameters to measured trials, without looking for what it misses.
 
     Arguments and errors as `diagnose`; the verdict is `parameters` or `agrees`.
     """
     with linear_algebra_alone():
-        return _Work(trials, model, seed, jobs, journal, progress).run(search=False)
+        return _Work(trials, model, seed, jobs, journal, progress, checks=checks).run(search=False)
 
 
 @dataclass
@@ -106,11 +111,13 @@ class _Work:
     folder: Path | None
     watcher: Progress | None
     propose: bool = True
+    checks: bool = True
     seconds: dict[str, float] = field(default_factory=dict)
 
     def run(self, search: bool) -> Diagnosis:
-        named, given = self._input()
+        named, given, said = self._input()
         named, words = prepared(named, given)
+        words = (*said, *words)
         trials = [each.trial for each in named]
         journal = Journal(self.folder, trials, given, f"diagnosis 2 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
@@ -149,22 +156,24 @@ class _Work:
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
-    def _input(self) -> tuple[list[NamedTrial], Model]:
-        if isinstance(self.asked, Dataset):
-            named, source = list(self.asked.trials), self.asked.model
-        else:
-            named = [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(self.asked)]
-            source = None
-        if not named:
+    def _input(self) -> tuple[list[NamedTrial], Model, tuple[str, ...]]:
+        asked = self.asked
+        if not isinstance(asked, Dataset):
+            named = [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(asked)]
+            asked = Dataset("", None, tuple(named))
+        if not asked.trials:
             raise TrialError("a diagnosis needs at least one trial; give measured trials")
-        model = load_model(self.wanted or source or DEFAULT_MODEL)
+        model = load_model(self.wanted or asked.model or DEFAULT_MODEL)
         if model.plant not in ("station", "slide"):
             raise ModelError(
                 f"model {model.name} is a {model.plant}; a diagnosis needs a station or a slide, "
                 "the balance of forces that effects act on; give serres2008, station or one made "
                 "of them"
             )
-        return named, model
+        if asked.folder is not None and asked.checked is None:
+            # Trials that come from files; what a program made needs no such doubts.
+            asked = check_dataset(asked, model, self.checks)
+        return list(asked.trials), model, asked.checked or ()
 
     def _refitted(self, bench: Bench, journal: Journal) -> Fitted:
         found = bench.careful_fit(bench.given)

@@ -1,0 +1,97 @@
+"""`pma-gym convert`: a lab's files looked at, and a first `dataset.toml` for them."""
+
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+from rich.text import Text
+
+from pma_gym.cli.terminal import console, say
+from pma_gym.data.dataset import read_dataset
+from pma_gym.data.dataset_toml import DESCRIPTION, Description
+from pma_gym.data.drafting import SeenColumn, draft, one_line, seen_columns
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.files import OutputError, replace_file
+from pma_gym.plant.model import Model, load_model
+
+
+def convert(
+    folder: Annotated[Path, typer.Argument(help="Folder of a lab's files, one a trial.")],
+    model: Annotated[
+        str, typer.Option(help="Shipped name or TOML file of the model to check them with.")
+    ] = "station",
+    force: Annotated[bool, typer.Option("--force", help=f"Replace a {DESCRIPTION}.")] = False,
+) -> None:
+    """Show the columns of a lab's files and draft dataset.toml, to be read and corrected."""
+    path = folder / DESCRIPTION
+    if path.exists() and not force:
+        raise OutputError(f"{path} is there already; --force replaces it, or rename it")
+    given = load_model(model)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        columns, count = seen_columns(folder, Description())
+    console().print(_table(columns, count))
+    title = folder.resolve().name
+    # The draft itself is what is checked: it is what a diagnosis will read.
+    older = path.read_bytes() if path.exists() else None
+    replace_file(path, draft(title, _named(model, folder), columns, ()).encode())
+    try:
+        said = _checked(folder, given)
+        replace_file(path, draft(title, _named(model, folder), columns, said).encode())
+    except BaseException:
+        if older is not None:
+            replace_file(path, older)
+        else:
+            path.unlink(missing_ok=True)
+        raise
+    for words in said:
+        say(f"check: {words}")
+    print(f"Written {path}: read it, correct it, then: pma-gym diagnose {folder}")
+
+
+def _named(model: str, folder: Path) -> str:
+    """A model as dataset.toml names it: a path counts from the data set's folder."""
+    is_path = model.endswith(".toml") or "/" in model or "\\" in model
+    return str(Path(model).resolve()) if is_path else model
+
+
+def _checked(folder: Path, model: Model) -> list[str]:
+    """What reading the drafted data set and checking it says."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            dataset = read_dataset(folder)
+        except TrialError as error:
+            return [str(error)]
+    said = [
+        str(warning.message)
+        for warning in caught
+        if "unknown columns are ignored" not in str(warning.message)
+    ]
+    if model.plant not in ("station", "slide"):
+        return said
+    from pma_gym.discovery.data_checks import check_dataset
+
+    try:
+        return said + list(check_dataset(dataset, model, stop=False).checked or ())
+    except TrialError as error:
+        return [*said, str(error)]
+
+
+def _table(columns: list[SeenColumn], count: int) -> Table:
+    shown = Table(title=f"{count} tables")
+    for name in ("column", "unit", "from", "to", "files", "taken for", "factor", "because of"):
+        shown.add_column(name)
+    for each in columns:
+        cells = [one_line(each.name), one_line(each.unit), f"{each.low:.6g}", f"{each.high:.6g}"]
+        cells.append(str(each.files))
+        if each.guess is None:
+            cells += ["", "", "nothing like ours"]
+        else:
+            other = "" if each.chosen else "left out: as "
+            cells += [f"{other}{each.guess.column.name}", f"{each.guess.factor:.7g}"]
+            cells.append(one_line(each.guess.why))
+        shown.add_row(*(Text(cell) for cell in cells))
+    return shown

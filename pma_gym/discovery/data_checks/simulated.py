@@ -1,0 +1,67 @@
+"""Trials beside the given model's simulation of their commands, as the checks compare them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import Plant
+
+Array = NDArray[np.float64]
+
+ATMOSPHERE = 101.325e3
+"""Standard pressure of the air (Pa)."""
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A measured trial beside its simulation.
+
+    Attributes:
+        number: which trial it is.
+        trial: as measured.
+        simulated: what the given model's sensors would read, without noise.
+    """
+
+    number: int
+    trial: Trial
+    simulated: Trial
+
+    def signal(self, quantity: str) -> tuple[Array, Array, Array]:
+        """Times, simulated and measured values of a signal where it was measured; may be empty."""
+        measured = self.trial.measurements.get(quantity)
+        if measured is None or quantity not in self.simulated.measurements:
+            return np.empty(0), np.empty(0), np.empty(0)
+        there = np.isfinite(measured)
+        return self.trial.time[there], self.simulated.measurements[quantity][there], measured[there]
+
+
+def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[Pair]:
+    """The trials that the model can simulate, beside its simulations.
+
+    Args:
+        model: the given model, a station.
+        trials: the trials.
+        pressure: what is added to commanded pressures (Pa).
+    """
+    plant = Plant(model)
+    found = []
+    for number, trial in enumerate(trials):
+        try:
+            simulated = plant.simulate(_with_pressure(trial, pressure), noise=False)
+        # Commands that the model cannot follow: its own fit says so, in its own words.
+        except ValueError:
+            continue
+        if all(np.isfinite(values).all() for values in simulated.measurements.values()):
+            found.append(Pair(number, trial, simulated))
+    return found
+
+
+def _with_pressure(trial: Trial, pressure: float) -> Trial:
+    if not pressure or "pressure_command" not in trial.commands:
+        return trial
+    moved = trial.commands["pressure_command"] + pressure
+    return replace(trial, commands={**trial.commands, "pressure_command": moved})

@@ -1,0 +1,83 @@
+"""`pma-gym convert`: a lab's files become a data set whose draft reads as the right trials."""
+
+import tomllib
+
+import numpy as np
+import pytest
+
+from pma_gym.cli import main
+from pma_gym.data.dataset import read_dataset
+from tests.discovery.data_checks.logs import logs, write
+
+NAMES = {
+    "time_s": ("Zeit [ms]", 1e3),
+    "motor_voltage_v": ("U_Motor", 1.0),
+    "pressure_command_kpa": ("Druck_soll [bar]", 1e-2),
+    "contraction_mm": ("Weg [cm]", 0.1),
+    "rotation_deg": ("Winkel", 1.0),
+    "load_n": ("Kraft_kN", 1e-3),
+    "pressure_kpa": ("Druck", 1e-2),
+}
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as caught:
+        main([str(argument) for argument in arguments])
+    printed = capsys.readouterr()
+    return caught.value.code or 0, printed.out, printed.err
+
+
+def lab(folder):
+    renamed = []
+    for each in logs(seconds=3.0):
+        columns = {NAMES[name][0]: NAMES[name][1] * values for name, values in each.items()}
+        renamed.append(columns)
+    return write(folder, renamed)
+
+
+def test_a_draft_reads_the_labs_files_as_they_were_meant(tmp_path, capsys):
+    folder = lab(tmp_path / "lab")
+    code, out, err = run(capsys, "convert", folder, "--model", "serres2008")
+    assert (code, err) == (0, "")
+    assert "Druck_soll [bar]" in out
+    assert "values up to" in out
+    right = read_dataset(write(tmp_path / "right", logs(seconds=3.0)))
+    drafted = read_dataset(folder)
+    assert drafted.model == "serres2008"
+    for one, other in zip(drafted.trials, right.trials, strict=True):
+        for group in ("commands", "measurements"):
+            for name, values in getattr(other.trial, group).items():
+                assert getattr(one.trial, group)[name] == pytest.approx(values, rel=1e-6, abs=1e-6)
+        assert np.allclose(one.trial.time, other.trial.time)
+
+
+def test_an_older_description_is_kept_unless_forced(tmp_path, capsys):
+    folder = lab(tmp_path / "lab")
+    (folder / "dataset.toml").write_text('title = "mine"\n')
+    code, _, err = run(capsys, "convert", folder)
+    assert code == 2
+    assert "--force replaces it" in err
+    assert (folder / "dataset.toml").read_text() == 'title = "mine"\n'
+    assert run(capsys, "convert", folder, "--force", "--model", "serres2008")[0] == 0
+    assert tomllib.loads((folder / "dataset.toml").read_text())["title"] == "lab"
+
+
+def test_what_the_checks_propose_stands_in_comments(tmp_path, capsys):
+    turned = [{**e, "contraction_mm": -e["contraction_mm"]} for e in logs(seconds=3.0)]
+    folder = write(tmp_path / "lab", turned)
+    code, _, err = run(capsys, "convert", folder, "--model", "serres2008")
+    assert code == 0
+    line = '"contraction_mm" = { name = "contraction_mm", factor = -1 }'
+    assert line in err
+    assert line in (folder / "dataset.toml").read_text()
+
+
+def test_names_are_data(tmp_path, capsys):
+    """Quotes, backslashes and control characters of a header neither end a text nor a comment."""
+    odd = 'Weg "x" \\ \x1b[2J'
+    folder = write(tmp_path / "lab", [{**each, odd: each["load_n"]} for each in logs(seconds=2.0)])
+    code, out, _ = run(capsys, "convert", folder, "--model", "serres2008")
+    assert code == 0
+    text = (folder / "dataset.toml").read_text()
+    tomllib.loads(text)
+    assert "\x1b" not in text + out
