@@ -4,8 +4,8 @@ import os
 import re
 import warnings
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pma_gym.data.dataset_checks import check_signals, empty_runs
@@ -34,6 +34,7 @@ class NamedTrial:
         order: when it was measured, as any number that grows; None if that is not told.
         repeat_of: name of the trial whose commands it repeats, or None.
         note: the lab's own words.
+        file: name of the file that it is a piece of; None if it is a whole one.
     """
 
     name: str
@@ -41,6 +42,7 @@ class NamedTrial:
     order: float | None = None
     repeat_of: str | None = None
     note: str = ""
+    file: str | None = None
 
 
 @dataclass(frozen=True)
@@ -51,11 +53,15 @@ class Dataset:
         title: a line for people.
         model: name or path of the model to compare them with; None if none is named.
         trials: in the order of their files' names.
+        tolerance: misfit that is good enough, by measurement (SI): `contraction`.
+        standard_error: of readings that are rows of a table, by measurement (SI).
     """
 
     title: str
     model: str | None
     trials: tuple[NamedTrial, ...]
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    standard_error: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -66,8 +72,8 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     """The trials in a folder: its CSV, Parquet and XLSX files, not those of folders in it.
 
     `dataset.toml` may give `title`, `model`, `[columns]` (the lab's names to ours, with factor and
-    offset) and `[trials."ramp.csv"]` with `order`, `repeat_of` and `note`. Hidden files and
-    `next.csv` are passed over.
+    offset), `[trials."ramp.csv"]` with `order`, `repeat_of` and `note`, `[tolerance]` and
+    `[standard_error]` (by measurement, in its unit). Hidden files and `next.csv` are passed over.
 
     Args:
         folder: the data set.
@@ -85,7 +91,13 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     trials = tuple(_named(path, description, doubts) for path in files)
     for message in _gathered(doubts, len(files)):
         warnings.warn(message, TrialWarning, stacklevel=2)
-    return Dataset(description.title or folder.resolve().name, description.model, trials)
+    return Dataset(
+        description.title or folder.resolve().name,
+        description.model,
+        trials,
+        description.tolerance,
+        description.standard_error,
+    )
 
 
 def _files(folder: Path) -> list[Path]:

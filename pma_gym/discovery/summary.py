@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from pma_gym.discovery.adequacy_words import floors_left
 from pma_gym.discovery.diagnosis import Diagnosis, Gap
 from pma_gym.discovery.words import (
     VERDICTS,
@@ -28,8 +29,6 @@ from pma_gym.discovery.words import (
 )
 
 _MOST_PLACES, _MOST_PARAMETERS = 3, 5
-_LEFT_OVER = 1.5
-"""Misfit over noise after a fit from which parameters alone do not explain the trials."""
 
 
 def diagnosis_summary(diagnosis: Diagnosis) -> str:
@@ -41,6 +40,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Effect", _effects(diagnosis)),
         ("Parameters", _parameters(diagnosis)),
         ("Misfit", _gaps(diagnosis)),
+        ("Left", filter(None, [floors_left(diagnosis)])),
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
         labels = itertools.chain([f"{name}:"], itertools.repeat(""))
@@ -120,17 +120,6 @@ def print_fit(diagnosis: Diagnosis) -> None:
         figures = map(figure, (gap.before, gap.after, gap.floor))
         gaps.add_row(f"{signal_name(signal)} ({signal_unit(signal)})", *figures)
     console.print(gaps)
-    left = {
-        signal: gap.after / gap.floor
-        for signal, gap in diagnosis.gap.items()
-        if gap.floor and gap.after > _LEFT_OVER * gap.floor
-    }
+    left = floors_left(diagnosis)
     if left:
-        worst = max(left, key=lambda signal: left[signal])
-        times = figure(left[worst], 2)
-        console.print(
-            f"More is left than noise: {times} times as much in {signal_name(worst)}. Parameters "
-            "alone do not explain these trials; pma-gym diagnose looks for what is missing.",
-            highlight=False,
-            markup=False,
-        )
+        console.print(left, highlight=False, markup=False)

@@ -141,7 +141,11 @@ def test_two_files_of_one_name_are_refused(folder, twin):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("titel = 'x'", "takes title, model, columns, trials, got 'titel' (did you mean 'title'?)"),
+        (
+            "titel = 'x'",
+            "takes title, model, columns, trials, tolerance, standard_error, got 'titel' (did you "
+            "mean 'title'?)",
+        ),
         ("title = 3", 'title in dataset.toml must be a text, title = "...", got 3'),
         ("title 3", "dataset.toml is not valid TOML: .*line 1"),
         ("columns = 3", "columns in dataset.toml must be a table, [columns], got 3"),
