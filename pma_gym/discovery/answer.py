@@ -18,8 +18,9 @@ from pma_gym.discovery.diagnosis import (
     Verdict,
 )
 from pma_gym.discovery.experiment import next_experiment
+from pma_gym.discovery.fewest import as_given
 from pma_gym.discovery.findings import Findings
-from pma_gym.discovery.fits import Fitted
+from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.leftovers import residuals
 from pma_gym.discovery.parameters import unit, values
 from pma_gym.discovery.quantisation import coarse_sensors
@@ -28,6 +29,8 @@ from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
 from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover, tones
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.discovery.trial_states import misfits, trial_states
 from pma_gym.discovery.unknown import shapeless_laws, telling, why_unknown
 from pma_gym.discovery.verdict import suspicious, verdict_of
 from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
@@ -79,6 +82,7 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         found.seed,
     )
     records = trial_records(found)
+    states = trial_states(*_proposal(found, verdict), [each.name for each in found.named])
     tell("putting the answer together", 2, 3)
     diagnosis = Diagnosis(
         verdict=verdict,
@@ -102,6 +106,8 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         floors=floors_at_the_door(found),
         adequacy=judgements(found),
         trials=records,
+        states=states,
+        written=misfits(found.named, model, states),
         maps=maps,
         warnings=_warnings(found),
         converged=found.proposed[1].converged,
@@ -283,14 +289,23 @@ def _held_out_gains(found: Findings) -> Mapping[str, float]:
     return {suspect.name: float(0.5 * gain / count) for suspect in found.selection.chosen}
 
 
+def _proposal(found: Findings, verdict: Verdict) -> tuple[Bench, Fitted, tuple[Suspect, ...]]:
+    """The fit of the model that is proposed, on which bench, with which effects."""
+    if verdict == "agrees":
+        given = as_given(found.bench)
+        return given.bench, given.fit, ()
+    if found.fewest is not None:
+        return found.fewest.bench, found.fewest.fit, ()
+    if verdict in ("effect", "unknown"):
+        return found.selection.bench, found.selection.fit, found.selection.chosen
+    return found.bench, found.refitted, ()
+
+
 def _amended(found: Findings, verdict: Verdict) -> Model:
     """The model with what was found, its intervals in its notes."""
-    if verdict == "agrees" or (found.fewest is not None and not found.fewest.fit.paths):
+    fit = _proposal(found, verdict)[1]
+    if not fit.paths:
         return found.given
-    keep = verdict in ("effect", "unknown")
-    fit = found.selection.fit if keep else found.refitted
-    if found.fewest is not None:
-        fit = found.fewest.fit
     notes = dict(fit.model.notes)
     for path in fit.paths:
         value, error = _known(found, fit, path)

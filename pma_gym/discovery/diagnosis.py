@@ -16,6 +16,20 @@ SCHEMA = 1
 
 Array = NDArray[np.float64]
 
+
+@dataclass(frozen=True)
+class TrialState:
+    """What belongs to one trial and not to the model.
+
+    Attributes:
+        zeros: what each signal reads where the model says 0, by column, in its unit.
+        parameters: of the model in this trial alone, by path, in their units.
+    """
+
+    zeros: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
 Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
 """`effect`: the catalogue has what is missing. `parameters`: known parameters were off. `agrees`:
 nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
@@ -306,6 +320,9 @@ class Diagnosis:
             rings, for those that do.
         floors: noise by signal at the door.
         adequacy: what is left of each signal, by its column.
+        states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
+        written: misfit of the amended model with these, over all trials, by column in its unit:
+            what `model.toml` and `trials.toml` give when both are read back.
         trials: curves of each trial.
         maps: residuals over conditions.
         steps: what was done, in order, a sentence each, with its figures.
@@ -332,6 +349,8 @@ class Diagnosis:
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
     adequacy: Mapping[str, Judgement] = field(default_factory=dict)
+    states: Mapping[str, TrialState] = field(default_factory=dict)
+    written: Mapping[str, float] = field(default_factory=dict)
     trials: tuple[TrialRecord, ...] = ()
     maps: tuple[Map, ...] = ()
     steps: tuple[str, ...] = ()
@@ -384,6 +403,7 @@ class Diagnosis:
             },
             "not_identifiable": dict(self.not_identifiable),
             "blind": list(self.blind),
+            "written": dict(self.written),
             "converged": self.converged,
             "worsened": {"signals": list(self.worsened[0]), "trials": list(self.worsened[1])},
             "adequacy": {signal: vars(judged) for signal, judged in self.adequacy.items()},

@@ -40,6 +40,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Effect", _effects(diagnosis)),
         ("Parameters", _parameters(diagnosis)),
         ("Misfit", _gaps(diagnosis)),
+        ("Written", filter(None, [_written(diagnosis)])),
         ("Left", filter(None, [floors_left(diagnosis)])),
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
@@ -82,6 +83,15 @@ def _gaps(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{signal_name(signal)} {_gap(gap, signal_unit(signal))}"
 
 
+def _written(diagnosis: Diagnosis) -> str:
+    """Misfit of the files that are written, on the trials that they were fitted to."""
+    parts = [
+        f"{signal_name(signal)} {figure(size)} {signal_unit(signal)}"
+        for signal, size in diagnosis.written.items()
+    ]
+    return f"model.toml with trials.toml leaves {', '.join(parts)}" if parts else ""
+
+
 def _gap(gap: Gap, unit: str) -> str:
     held = " (held out)" if gap.held_out else ""
     closed = "" if gap_closed(gap) is None else f"; {percent(gap_closed(gap))} of the gap closed"
@@ -120,6 +130,5 @@ def print_fit(diagnosis: Diagnosis) -> None:
         figures = map(figure, (gap.before, gap.after, gap.floor))
         gaps.add_row(f"{signal_name(signal)} ({signal_unit(signal)})", *figures)
     console.print(gaps)
-    left = floors_left(diagnosis)
-    if left:
-        console.print(left, highlight=False, markup=False)
+    for line in filter(None, (_written(diagnosis), floors_left(diagnosis))):
+        console.print(line, highlight=False, markup=False)
