@@ -11,7 +11,15 @@ import pytest
 from pma_gym.cli import main
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_files import read_trial, write_trial
-from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Moved, NextExperiment, Place
+from pma_gym.discovery.diagnosis import (
+    Diagnosis,
+    Estimate,
+    Gap,
+    Judgement,
+    Moved,
+    NextExperiment,
+    Place,
+)
 from pma_gym.plant.model import load_model
 
 TIME = np.arange(20) / 10
@@ -212,12 +220,13 @@ def test_fit_prints_and_writes_the_parameters(run, engine, tmp_path):
 
 
 def test_fit_says_when_parameters_do_not_explain_it_all(run, engine):
-    engine.answer = replace(FOUND, gap={"load_n": Gap(5.0, 4.0, 4.0, 0.5, True)})
+    left = Judgement(0.5, "rest segments", 8.0, 6.0, 6.5, 7.0, "misfit")
+    engine.answer = replace(FOUND, adequacy={"load_n": left})
     code, out, _ = run("fit", "lab")
     assert code == 0
-    assert "More is left than noise: 8 times as much in load." in out
+    assert "in noise floors: 8 in load (the noise at rest, 0.5 N)." in out
     engine.answer = FOUND
-    assert "More is left" not in run("fit", "lab", "--force")[1]
+    assert "noise floors" not in run("fit", "lab", "--force")[1]
 
 
 def test_warnings_of_the_data_set_are_said(run, engine, tmp_path):

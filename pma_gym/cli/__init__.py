@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pma_gym.cli.comparison import compare
 from pma_gym.cli.convert import convert
 from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.information import print_installation, print_model
@@ -103,6 +104,7 @@ def info(
 app.command()(convert)
 app.command()(diagnose)
 app.command()(fit)
+app.command()(compare)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

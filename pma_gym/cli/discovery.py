@@ -22,7 +22,17 @@ if TYPE_CHECKING:
 
 INTERRUPTED = 130
 DEFAULT_MODEL = "station"
-_FITTED = ("schema", "verdict", "sentence", "parameters", "gap", "not_identifiable", "warnings")
+_FITTED = (
+    "schema",
+    "verdict",
+    "sentence",
+    "parameters",
+    "gap",
+    "adequacy",
+    "written",
+    "not_identifiable",
+    "warnings",
+)
 """What `fit.json` has of a diagnosis."""
 
 DatasetArgument = Annotated[
@@ -64,7 +74,7 @@ def diagnose(
     """Say where logs and model disagree, which effect is missing and how large it is."""
     results = Results(
         out or _default(dataset, "diagnosis"),
-        ("model.toml", "next.csv", "report.html", "diagnosis.json"),
+        ("model.toml", "trials.toml", "next.csv", "report.html", "diagnosis.json"),
     )
     _check_apart(results, dataset)
     results.check(force, resume)
@@ -72,6 +82,7 @@ def diagnose(
     from pma_gym import discovery
     from pma_gym.discovery.proposed_file import proposed_file
     from pma_gym.discovery.report import report_page
+    from pma_gym.discovery.trial_states import dump_states
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
@@ -79,6 +90,7 @@ def diagnose(
         files = {
             "diagnosis.json": found.text().encode(),
             "model.toml": dump_model(found.model).encode(),
+            "trials.toml": dump_states(found.states).encode(),
             "report.html": report_page(
                 found, trials.title, _origin(dataset, trials, seed)
             ).encode(),
@@ -103,11 +115,12 @@ def fit(
     force: ForceOption = False,
 ) -> None:
     """Refit a model's parameters to logs, without looking for new effects."""
-    results = Results(out or _default(dataset, "fit"), ("model.toml", "fit.json"))
+    results = Results(out or _default(dataset, "fit"), ("model.toml", "trials.toml", "fit.json"))
     _check_apart(results, dataset)
     results.check(force)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
+    from pma_gym.discovery.trial_states import dump_states
 
     with results.opened():
         found = _run(discovery.refit, trials, given, results, {"seed": seed, "jobs": jobs})
@@ -117,6 +130,7 @@ def fit(
             {
                 "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
                 "model.toml": dump_model(found.model).encode(),
+                "trials.toml": dump_states(found.states).encode(),
             }
         )
     from pma_gym.discovery.summary import print_fit

@@ -2,7 +2,7 @@
 
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -34,6 +34,7 @@ class NamedTrial:
         order: when it was measured, as any number that grows; None if that is not told.
         repeat_of: name of the trial whose commands it repeats, or None.
         note: the lab's own words.
+        file: name of the file that it is a piece of; None if it is a whole one.
     """
 
     name: str
@@ -41,6 +42,7 @@ class NamedTrial:
     order: float | None = None
     repeat_of: str | None = None
     note: str = ""
+    file: str | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Dataset:
         columns: the lab's names to ours, as `dataset.toml` has them.
         form: separator, decimal mark... of its files, as `dataset.toml` has them.
         checked: what the checks of the data said; None before they ran.
+        tolerance: misfit that is good enough, by measurement (SI): `contraction`.
+        standard_error: of readings that are rows of a table, by measurement (SI).
     """
 
     title: str
@@ -64,6 +68,8 @@ class Dataset:
     columns: ColumnMap = field(default_factory=dict)
     form: FileFormat = field(default_factory=FileFormat)
     checked: tuple[str, ...] | None = None
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    standard_error: Mapping[str, float] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -75,8 +81,9 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
 
     A file with several sheets, segments, groups or structures holds as many trials, with names like
     `march.xlsx#run2`. `dataset.toml` may give `title`, `model`, `[columns]` (the lab's names to
-    ours, with factor and offset), `[format]` and `[trials."ramp.csv"]` with `order`, `repeat_of`
-    and `note`. Hidden files and TOML files are passed over silently, all others with a warning.
+    ours, with factor and offset), `[format]`, `[trials."ramp.csv"]` with `order`, `repeat_of` and
+    `note`, `[tolerance]` and `[standard_error]` (by measurement, in its unit). Hidden files and
+    TOML files are passed over silently, all others with a warning.
 
     Args:
         folder: the data set.
@@ -97,8 +104,16 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     trials = tuple(_named(path, table, description, doubts) for path, table in tables)
     for message in _gathered(doubts, len(tables)):
         warnings.warn(message, TrialWarning, stacklevel=2)
-    title = description.title or folder.resolve().name
-    return Dataset(title, description.model, trials, folder, description.columns, description.form)
+    return Dataset(
+        description.title or folder.resolve().name,
+        description.model,
+        trials,
+        folder,
+        description.columns,
+        description.form,
+        tolerance=description.tolerance,
+        standard_error=description.standard_error,
+    )
 
 
 def _named(

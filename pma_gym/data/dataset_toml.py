@@ -9,11 +9,15 @@ from typing import Any
 
 from pma_gym.data.format_toml import file_format
 from pma_gym.data.readers.table import PART, FileFormat
-from pma_gym.data.trial_columns import ColumnMap, TrialError, sources, suggestion
+from pma_gym.data.trial_columns import COLUMNS, ColumnMap, TrialError, sources, suggestion
 from pma_gym.documents import is_file, read_toml
+from pma_gym.units import SI_FACTORS
 
 DESCRIPTION = "dataset.toml"
-_KEYS = ("title", "model", "columns", "format", "trials")
+_KEYS = ("title", "model", "columns", "format", "trials", "tolerance", "standard_error")
+MOST_SIZE = 1e9
+"""Sizes of signals are smaller, in any unit of the columns."""
+
 _TRIAL_KEYS = ("order", "repeat_of", "note")
 _LINE_FORM = (
     'a line is a table, [columns], or name = value, a text in quotes: "Weg" = "contraction_mm"'
@@ -31,6 +35,8 @@ class Description:
         columns: the lab's column names to ours.
         form: what the files leave open: separator, decimal mark, encoding...
         trials: `order`, `repeat_of` and `note` by file name.
+        tolerance: misfit that is good enough, by measurement (SI): `contraction`.
+        standard_error: of readings that are rows of a table, by measurement (SI).
     """
 
     title: str = ""
@@ -38,6 +44,8 @@ class Description:
     columns: ColumnMap = field(default_factory=dict)
     form: FileFormat = field(default_factory=FileFormat)
     trials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    standard_error: Mapping[str, float] = field(default_factory=dict)
 
 
 def read_description(folder: Path, files: Sequence[str]) -> Description:
@@ -70,6 +78,8 @@ def read_description(folder: Path, files: Sequence[str]) -> Description:
         columns=columns,
         form=file_format(_table(document, "format")),
         trials=_trials(_table(document, "trials"), files),
+        tolerance=_sizes(document, "tolerance", "contraction_mm = 0.2"),
+        standard_error=_sizes(document, "standard_error", "contraction_mm = 0.05"),
     )
 
 
@@ -101,6 +111,23 @@ def _text(table: Mapping[str, Any], key: str, place: str) -> str | None:
     if value is not None and (not isinstance(value, str) or not value.strip()):
         raise TrialError(f'{key} in {place} must be a text, {key} = "...", got {_shown(value)}')
     return value
+
+
+def _sizes(document: Mapping[str, Any], key: str, example: str) -> dict[str, float]:
+    """A table of sizes by measurement's column, in SI by quantity."""
+    known = {column.name: column for column in COLUMNS if column.kind == "measurement"}
+    table, sizes = _table(document, key), {}
+    _check_keys(f"[{key}] in {DESCRIPTION}", table, list(known))
+    for name, size in table.items():
+        number = size if isinstance(size, int | float) and not isinstance(size, bool) else math.nan
+        unit = known[name].unit
+        if not 0.0 < number < MOST_SIZE:
+            raise TrialError(
+                f"{name} in [{key}] of {DESCRIPTION} must be a number in {unit}, above 0 and below "
+                f"{MOST_SIZE:g}, got {size!r}; write {example}"
+            )
+        sizes[known[name].quantity] = float(number) * SI_FACTORS[unit]
+    return sizes
 
 
 def _model(folder: Path, given: str | None) -> str | None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.diagnosis import (
     ADDED,
@@ -13,23 +14,33 @@ from pma_gym.discovery.diagnosis import (
     Estimate,
     Moved,
     NamedEffect,
+    TrialRecord,
     Verdict,
 )
 from pma_gym.discovery.experiment import next_experiment
+from pma_gym.discovery.fewest import as_given
 from pma_gym.discovery.findings import Findings
-from pma_gym.discovery.fits import Fitted
+from pma_gym.discovery.fits import Bench, Fitted
+from pma_gym.discovery.leftovers import residuals
 from pma_gym.discovery.parameters import unit, values
 from pma_gym.discovery.quantisation import coarse_sensors
-from pma_gym.discovery.records import floors_at_the_door, gaps, trial_records
+from pma_gym.discovery.records import floors_at_the_door, gaps, judgements, trial_records
 from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
 from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover, tones
+from pma_gym.discovery.suspects import Suspect
+from pma_gym.discovery.trial_states import misfits, trial_states
 from pma_gym.discovery.unknown import shapeless_laws, telling, why_unknown
 from pma_gym.discovery.verdict import suspicious, verdict_of
 from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.where import localise
+from pma_gym.discovery.worsened import worsened
 from pma_gym.plant.model import Model, Note
+from pma_gym.plant.plant import OUTPUTS
+
+AT_LIMIT = 1e-6
+"""Distance from an end of a range, as a share of the range, within which a value is at that end."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -48,7 +59,7 @@ is proposed although nothing seems to be missing."""
 def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
     """The diagnosis, with the next experiment if one is to be proposed."""
     tell("putting the answer together", 0, 3)
-    coarse = coarse_sensors(found.floors)
+    coarse = coarse_sensors(found.floors, _misfits(found))
     left = leftover(found)
     laws = shapeless_laws(found, left)
     blind = tuple(
@@ -71,6 +82,7 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         found.seed,
     )
     records = trial_records(found)
+    states = trial_states(*_proposal(found, verdict), [each.name for each in found.named])
     tell("putting the answer together", 2, 3)
     diagnosis = Diagnosis(
         verdict=verdict,
@@ -92,9 +104,14 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         law=residual_law(laws[0]) if verdict == "unknown" and telling(found, laws) else None,
         tones=tones(found) if verdict == "unknown" else {},
         floors=floors_at_the_door(found),
+        adequacy=judgements(found),
         trials=records,
+        states=states,
+        written=misfits(found.named, model, states),
         maps=maps,
         warnings=_warnings(found),
+        converged=found.proposed[1].converged,
+        worsened=_worsened(found, verdict, records),
     )
     return replace(
         diagnosis, sentence=sentence(diagnosis, unknown), steps=steps(found, diagnosis, left)
@@ -125,9 +142,39 @@ def _effects(found: Findings) -> tuple[NamedEffect, ...]:
 def _estimate(found: Findings, fit: Fitted, path: str) -> Estimate:
     """A parameter's value and 95 % interval, within its bounds."""
     value, error = _known(found, fit, path)
+    lower, upper = _bounds(found, fit)[path]
+    limit = at_limit(value, lower, upper)
     if not np.isfinite(error):
-        return Estimate(value, None, None, unit(path))
-    return Estimate(value, value - 1.96 * error, value + 1.96 * error, unit(path))
+        return Estimate(value, None, None, unit(path), limit)
+    low, high = max(value - 1.96 * error, lower), min(value + 1.96 * error, upper)
+    return Estimate(value, low, high, unit(path), limit)
+
+
+def at_limit(value: float, lower: float, upper: float) -> str:
+    """Which end of its range a value is at: `lower`, `upper`, or none: empty."""
+    reach = AT_LIMIT * (upper - lower)
+    if value >= upper - reach:
+        return "upper"
+    return "lower" if value <= lower + reach else ""
+
+
+def _bounds(found: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:
+    """What the fit allows each of its parameters."""
+    bench = found.selection.bench
+    if found.fewest is not None and fit is found.fewest.fit:
+        bench = found.fewest.bench
+    chosen = found.selection.chosen if fit is found.selection.fit else ()
+    evidence = bench.evidence(fit.model, chosen)
+    pairs = zip(evidence.lower.tolist(), evidence.upper.tolist(), strict=True)
+    return dict(zip((free.path for free in evidence.free), pairs, strict=True))
+
+
+def _misfits(found: Findings) -> list[float]:
+    """What the refitted model leaves of each output (root mean square, SI), NaN if not measured."""
+    left = residuals(found.bench.evidence(found.refitted.model), found.refitted)
+    joined = [np.concatenate([part[channel] for part in left]) for channel in range(len(OUTPUTS))]
+    known = [values[np.isfinite(values)] for values in joined]
+    return [float(np.sqrt(np.mean(each**2))) if each.size else np.nan for each in known]
 
 
 def _known(found: Findings, fit: Fitted, path: str) -> tuple[float, float]:
@@ -242,14 +289,23 @@ def _held_out_gains(found: Findings) -> Mapping[str, float]:
     return {suspect.name: float(0.5 * gain / count) for suspect in found.selection.chosen}
 
 
+def _proposal(found: Findings, verdict: Verdict) -> tuple[Bench, Fitted, tuple[Suspect, ...]]:
+    """The fit of the model that is proposed, on which bench, with which effects."""
+    if verdict == "agrees":
+        given = as_given(found.bench)
+        return given.bench, given.fit, ()
+    if found.fewest is not None:
+        return found.fewest.bench, found.fewest.fit, ()
+    if verdict in ("effect", "unknown"):
+        return found.selection.bench, found.selection.fit, found.selection.chosen
+    return found.bench, found.refitted, ()
+
+
 def _amended(found: Findings, verdict: Verdict) -> Model:
     """The model with what was found, its intervals in its notes."""
-    if verdict == "agrees" or (found.fewest is not None and not found.fewest.fit.paths):
+    fit = _proposal(found, verdict)[1]
+    if not fit.paths:
         return found.given
-    keep = verdict in ("effect", "unknown")
-    fit = found.selection.fit if keep else found.refitted
-    if found.fewest is not None:
-        fit = found.fewest.fit
     notes = dict(fit.model.notes)
     for path in fit.paths:
         value, error = _known(found, fit, path)
@@ -298,6 +354,24 @@ def _following(found: Findings, verdict: Verdict, blind: Sequence[str]):  # noqa
     return None
 
 
+def _worsened(
+    found: Findings, verdict: Verdict, records: Sequence[TrialRecord]
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What the proposed model fits worse than the given one; nothing where none is proposed."""
+    if verdict not in ("effect", "parameters"):
+        return (), ()
+    levels = {
+        BY_QUANTITY[name].name: found.adequacy.signals[name].floor
+        for name in found.adequacy.signals
+    }
+    floors = {
+        BY_QUANTITY[name].name: floor.level
+        for name, floor in zip(OUTPUTS, found.floors, strict=True)
+    }
+    floors |= {signal: floor.level for signal, floor in levels.items() if floor is not None}
+    return worsened(records, floors, found.seed)
+
+
 def _doubts(found: Findings) -> list[str]:
     """Of named parameters, those that another could stand for, or that the trials hardly hold."""
     if found.fewest is None:
@@ -314,6 +388,12 @@ def _doubts(found: Findings) -> list[str]:
 
 def _warnings(found: Findings) -> tuple[str, ...]:
     words = _doubts(found)
+    if found.discarded is not None:
+        given, refitted = found.discarded
+        words.append(
+            f"a refit was discarded: it raises the whitened sum of squares of the readings that it "
+            f"was fitted to, from {given:.5g} to {refitted:.5g}"
+        )
     if not found.proposed[1].converged:
         words.append("the last fit stopped before it had converged; its intervals are rough")
     if found.unseen is None:

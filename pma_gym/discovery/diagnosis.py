@@ -16,6 +16,20 @@ SCHEMA = 1
 
 Array = NDArray[np.float64]
 
+
+@dataclass(frozen=True)
+class TrialState:
+    """What belongs to one trial and not to the model.
+
+    Attributes:
+        zeros: what each signal reads where the model says 0, by column, in its unit.
+        parameters: of the model in this trial alone, by path, in their units.
+    """
+
+    zeros: Mapping[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+
+
 Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
 """`effect`: the catalogue has what is missing. `parameters`: known parameters were off. `agrees`:
 nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
@@ -34,12 +48,14 @@ class Estimate:
         low: lower end of the interval; None where the data do not bound it.
         high: upper end.
         unit: the unit.
+        limit: `lower` or `upper` where the value is at that end of what the fit allows, else empty.
     """
 
     value: float
     low: float | None
     high: float | None
     unit: str
+    limit: str = ""
 
 
 @dataclass(frozen=True)
@@ -203,6 +219,7 @@ class TrialRecord:
         after: by the amended model; from a fit that had not seen the trial where `held_out`.
         gaps: by signal at the door.
         held_out: see `after`.
+        file: the log that it is a piece of, or its own name.
     """
 
     name: str
@@ -213,6 +230,7 @@ class TrialRecord:
     after: Array
     gaps: Mapping[str, Gap]
     held_out: bool
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -257,6 +275,29 @@ class Floor:
 
 
 @dataclass(frozen=True)
+class Judgement:
+    """What the proposed model leaves of one signal, in floors (`adequacy`).
+
+    Attributes:
+        floor: what it is judged against, in the column's unit; None where nothing tells.
+        source: `repeats`, `tolerance`, `rest segments` or `standard errors`; empty without a floor.
+        misfit: root mean square on readings that the fits had not seen; None where unknown.
+        explained: of it by a flexible regression on state, command and its history.
+        bound: upper 95 % bound of that.
+        fitted: root mean square on the readings that the model was fitted to.
+        fault: why the signal does not speak for the model; None where it does.
+    """
+
+    floor: float | None
+    source: str
+    misfit: float | None
+    explained: float | None
+    bound: float | None
+    fitted: float | None
+    fault: str | None
+
+
+@dataclass(frozen=True)
 class Diagnosis:
     """The answer, with all its evidence.
 
@@ -278,11 +319,18 @@ class Diagnosis:
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
             rings, for those that do.
         floors: noise by signal at the door.
+        adequacy: what is left of each signal, by its column.
+        states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
+        written: misfit of the amended model with these, over all trials, by column in its unit:
+            what `model.toml` and `trials.toml` give when both are read back.
         trials: curves of each trial.
         maps: residuals over conditions.
         steps: what was done, in order, a sentence each, with its figures.
         seconds: how long each step took, by its name; not written to the JSON.
         warnings: what the reader must know first.
+        converged: whether the fit of the proposed model converged.
+        worsened: signals (by column) and trials (by name) that the proposed model fits worse than
+            the given one, by more than their intervals.
     """
 
     verdict: Verdict
@@ -300,11 +348,16 @@ class Diagnosis:
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
+    adequacy: Mapping[str, Judgement] = field(default_factory=dict)
+    states: Mapping[str, TrialState] = field(default_factory=dict)
+    written: Mapping[str, float] = field(default_factory=dict)
     trials: tuple[TrialRecord, ...] = ()
     maps: tuple[Map, ...] = ()
     steps: tuple[str, ...] = ()
     seconds: Mapping[str, float] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    converged: bool = True
+    worsened: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
 
     def document(self) -> dict[str, Any]:
         """The content of `diagnosis.json`."""
@@ -350,6 +403,10 @@ class Diagnosis:
             },
             "not_identifiable": dict(self.not_identifiable),
             "blind": list(self.blind),
+            "written": dict(self.written),
+            "converged": self.converged,
+            "worsened": {"signals": list(self.worsened[0]), "trials": list(self.worsened[1])},
+            "adequacy": {signal: vars(judged) for signal, judged in self.adequacy.items()},
             "law": self.law
             and {
                 "quantity": self.law.quantity,

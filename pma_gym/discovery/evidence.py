@@ -174,6 +174,14 @@ class Evidence(Residuals):
         found = self._each(values[None], work)
         return found if self._settled else None
 
+    def first_states(self, values: Array) -> list[Array]:
+        """States (SI) in which each trial begins at parameters, shape (states,) for each trial."""
+
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            return states[0, 0].copy()
+
+        return self._each(values[None], work)
+
     def whitened(self, logged: Logged, differences: Array) -> Array:
         """Differences (SI), shape (columns, 4, rows), made white and free of free zeros."""
         white = np.zeros_like(differences)

@@ -75,15 +75,21 @@ def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
     paths = tuple(fit.paths[i] for i in kept)
     narrow = replace(bench, own=Own(paths, evidence.prior[kept]))
     if not paths:
-        none = np.empty(0)
-        left = narrow.evidence(bench.given).sums(none, none).chi_square
-        given = Fitted(bench.given, (), (), none, np.empty((0, 0)), left, none, True)
-        return Fewest(narrow, given) if left <= most else None
+        given = as_given(bench)
+        return given if given.fit.chi_square <= most else None
     begun = np.clip(evidence.centre[kept] + moves, evidence.lower[kept], evidence.upper[kept])
     found = narrow.fit(bench.given.replace(dict(zip(paths, map(float, begun), strict=True))))
     if found is None or not found.chi_square <= most:
         return None
     return Fewest(narrow, replace(found, covariance=covariance(narrow, found, ())))
+
+
+def as_given(bench: Bench) -> Fewest:
+    """The model as it was given, with nothing free."""
+    none = np.empty(0)
+    narrow = replace(bench, own=Own((), none))
+    left = narrow.evidence(bench.given).sums(none, none).chi_square
+    return Fewest(narrow, Fitted(bench.given, (), (), none, np.empty((0, 0)), left, none, True))
 
 
 def _without_others(

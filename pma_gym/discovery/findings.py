@@ -1,9 +1,10 @@
 """What the steps of a diagnosis found, for those that make an answer of it."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from pma_gym.data.dataset import NamedTrial
+from pma_gym.discovery.adequacy import Adequacy
 from pma_gym.discovery.fewest import Fewest
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import Level
@@ -33,6 +34,9 @@ class Findings:
         rivals: of each effect.
         unseen: what the amended model says of trials that it was not fitted to.
         unseen_without: the same without the effects.
+        discarded: whitened sums of squares of the model as given and of a refit that was discarded
+            because its is larger; None where none was.
+        adequacy: whether what the amended model leaves of readings left out is noise.
     """
 
     named: tuple[NamedTrial, ...]
@@ -48,6 +52,8 @@ class Findings:
     rivals: tuple[tuple[Rival, ...], ...] = ()
     unseen: Unseen | None = None
     unseen_without: Unseen | None = None
+    discarded: tuple[float, float] | None = None
+    adequacy: Adequacy = field(default_factory=lambda: Adequacy({}))
 
     @property
     def looks(self) -> tuple[Look, ...]:

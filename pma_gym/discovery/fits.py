@@ -78,6 +78,7 @@ class Bench:
         noise: whitening of each output.
         threads: how many threads simulate.
         coarse: whether a sensor keeps to coarser steps than its DAQ gives.
+        files: the file that each trial comes from; empty where each is a file of its own.
     """
 
     trials: Sequence[Trial]
@@ -86,6 +87,7 @@ class Bench:
     noise: tuple[Whitening, ...]
     threads: int = 1
     coarse: bool = False
+    files: tuple[str, ...] = ()
 
     def evidence(
         self, model: Model, extra: Sequence[Suspect] = (), trials: Sequence[int] | None = None
@@ -129,6 +131,16 @@ class Bench:
     def count(self) -> int:
         """How many readings there are."""
         return self.evidence(self.given).count
+
+    def sum_of_squares(self, model: Model, extra: Sequence[Suspect] = ()) -> float:
+        """Whitened sum of squares of all readings, without what the prior adds.
+
+        Infinite where the model cannot be simulated.
+        """
+        evidence = self.evidence(model, extra)
+        at = values(model, [free.path for free in evidence.free])
+        pieces = evidence.pieces(at, np.empty(0))
+        return np.inf if pieces is None else float(pieces.total()[0, 0])
 
     def left(self, fit: Fitted) -> float:
         """Rms of what a fit leaves, the prior counted, in standard deviations of the noise."""

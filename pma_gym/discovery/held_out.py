@@ -43,9 +43,38 @@ class Unseen:
     surprise: Array
 
 
-def folds(count: int) -> list[list[int]]:
-    """Trials by fold, so that neighbours in order fall into different ones."""
-    return [list(range(k, count, FOLDS)) for k in range(min(FOLDS, count))]
+def folds(count: int, files: Sequence[str] = ()) -> list[list[int]]:
+    """Trials by fold, so that neighbours in order fall into different ones.
+
+    Pieces of one file tell of each other, so whole files are left out, or contiguous blocks where
+    there is one file only.
+
+    Args:
+        count: of trials.
+        files: the file that each is a piece of; empty where each is a file of its own.
+    """
+    names = list(dict.fromkeys(files))
+    if not names or len(names) == count:
+        return [list(range(k, count, FOLDS)) for k in range(min(FOLDS, count))]
+    if len(names) == 1:
+        parts = np.array_split(np.arange(count), min(FOLDS, count))
+        return [part.tolist() for part in parts]
+    place = {name: k % FOLDS for k, name in enumerate(names)}
+    return [
+        [i for i, file in enumerate(files) if place[file] == fold]
+        for fold in range(min(FOLDS, len(names)))
+    ]
+
+
+def fold_of_rows(trials: Sequence[Trial], files: Sequence[str] = ()) -> list[NDArray[np.int64]]:
+    """The fold that each row of each trial is left out with, shape (rows,) for each trial."""
+    if len(trials) == 1:
+        number = np.zeros(len(trials[0]), np.int64)
+        for fold, rows in enumerate(stretches(trials)):
+            number[rows] = fold
+        return [number]
+    fold_of = {i: k for k, part in enumerate(folds(len(trials), files)) for i in part}
+    return [np.full(len(trial), fold_of[i]) for i, trial in enumerate(trials)]
 
 
 def stretches(trials: Sequence[Trial]) -> list[NDArray[np.bool_]]:
@@ -83,7 +112,7 @@ def unseen(
     count = len(bench.trials)
     readings: list[Array] = [np.empty(0)] * count
     chi_square, surprised = np.zeros(count), list[float]()
-    parts, begun = folds(count), fit.model if whole is None else whole.fit.model
+    parts, begun = folds(count, bench.files), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))

@@ -15,6 +15,10 @@ from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 
+FAR = 10.0
+"""Residual (root mean square), in standard deviations of a signal's noise, from which on it is no
+noise whatever its form."""
+
 
 def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:
     """Whitening of what a fit leaves, never of less than is seen at rest."""
@@ -54,6 +58,20 @@ def left_over(evidence: Evidence, readings: Sequence[Array]) -> list[Array]:
 def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
     """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden."""
     return any(each.sure for each in memories(bench, fit, chosen).values())
+
+
+def far_off(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
+    """Whether what a fit leaves of some signal is many times its noise.
+
+    Where everything is wrong, turning signs of the residual's pieces tells chance from nothing.
+    """
+    left = residuals(bench.evidence(fit.model, chosen), fit)
+    for channel, noise in enumerate(bench.noise):
+        known = np.concatenate([part[channel] for part in left])
+        known = known[np.isfinite(known)]
+        if known.size and np.sqrt(np.mean(known**2)) > FAR * noise.level:
+            return True
+    return False
 
 
 def memories(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> dict[str, Memory]:

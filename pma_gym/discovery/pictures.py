@@ -36,7 +36,9 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
         for panel, (signal, gap) in zip(panels, gaps.items(), strict=True):
             values = [gap.before, gap.parameters, gap.after]
             bars = panel.bar(names, values, color=[BEFORE, PARAMETERS, AFTER], width=0.65)
-            panel.bar_label(bars, [figure(value) for value in values], padding=2)
+            # Misfit in its unit, and below it in noises.
+            labels = [f"{figure(v)}\n{figure(v / gap.floor, 2)} x noise" for v in values]
+            panel.bar_label(bars, labels, padding=2, fontsize="small")
             panel.axhline(gap.floor, **FLOOR)
             panel.set_title(signal_name(signal))
             panel.set_ylabel(f"misfit, rms ({signal_unit(signal)})")

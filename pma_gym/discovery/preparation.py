@@ -86,9 +86,15 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
             {name: values[rows] for name, values in trial.measurements.items()},
             provenance=trial.provenance,
         )
-        name = f"{named.name} from {trial.time[start]:.4g} s"
+        since = f"from {trial.time[start]:.4g} s"
+        repeats = named.repeat_of and f"{named.repeat_of} {since}"
         if any(np.isfinite(values).any() for values in piece.measurements.values()):
-            found.append(replace(named, name=name, trial=piece, repeat_of=None))
+            name = f"{named.name} {since}"
+            found.append(
+                replace(
+                    named, name=name, trial=piece, repeat_of=repeats, file=named.file or named.name
+                )
+            )
     return found
 
 

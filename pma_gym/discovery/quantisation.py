@@ -30,11 +30,21 @@ def is_coarse(floor: Level) -> bool:
     return floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN)
 
 
-def coarse_sensors(floors: Sequence[Level]) -> tuple[NamedEffect, ...]:
-    """One effect with the steps of all coarse sensors; none where there are none."""
+def coarse_sensors(
+    floors: Sequence[Level], misfits: Sequence[float] | None = None
+) -> tuple[NamedEffect, ...]:
+    """One effect with the steps of all coarse sensors; none where there are none.
+
+    Args:
+        floors: noise of the four outputs.
+        misfits: what the refitted model leaves of them (root mean square, SI), NaN where nothing
+            is measured. Rounding makes no misfit of more than a step, so a sensor with more is not
+            named: that would explain the misfit by what is too small for it.
+    """
     steps, others = {}, 0
     for name, floor in zip(OUTPUTS, floors, strict=True):
-        if is_coarse(floor):
+        explains = misfits is None or not misfits[OUTPUTS.index(name)] > floor.step
+        if is_coarse(floor) and explains:
             column = BY_QUANTITY[name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.diagnosis import Floor, Gap, TrialRecord
+from pma_gym.discovery.diagnosis import Floor, Gap, Judgement, TrialRecord
 from pma_gym.discovery.evidence import FREE_ZEROS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.parameters import values
@@ -58,6 +58,7 @@ def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
                 third.T,
                 gaps,
                 unseen is not None,
+                each.file or each.name,
             )
         )
     return tuple(records)
@@ -102,6 +103,27 @@ def floors_at_the_door(found: Findings) -> dict[str, Floor]:
             learnt.coefficients,
         )
     return floors
+
+
+def judgements(found: Findings) -> dict[str, Judgement]:
+    """What is left of each signal, by its column."""
+    judged = {}
+    for name, each in found.adequacy.signals.items():
+        column = BY_QUANTITY[name]
+        figures = (each.misfit, each.explained, each.bound, each.fitted)
+        misfit, explained, bound, fitted = (
+            value if np.isfinite(value) else None for value in figures
+        )
+        judged[column.name] = Judgement(
+            None if each.floor is None else each.floor.level / SI_FACTORS[column.unit],
+            "" if each.floor is None else each.floor.source,
+            misfit,
+            explained,
+            bound,
+            fitted,
+            each.fault,
+        )
+    return judged
 
 
 def _there(logged: Logged) -> NDArray[np.bool_]:

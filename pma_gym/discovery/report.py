@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from pma_gym.discovery.adequacy_words import floors_left
 from pma_gym.discovery.curves import curves_picture, worst_trial
 from pma_gym.discovery.diagnosis import Diagnosis, NamedEffect
 from pma_gym.discovery.pictures import (
@@ -14,6 +15,7 @@ from pma_gym.discovery.pictures import (
 )
 from pma_gym.discovery.report_decision import decision_blocks
 from pma_gym.discovery.report_tables import (
+    adequacy_table,
     confusion_table,
     effect_table,
     gap_table,
@@ -71,6 +73,8 @@ def report_blocks(diagnosis: Diagnosis, title: str, origin: Mapping[str, str]) -
         Heading(heading, 1),
         Callout(readable(diagnosis.sentence, diagnosis), tone=tone),
     ]
+    left = floors_left(diagnosis)
+    blocks += [Paragraph(left)] if left else []
     blocks += [Paragraph(f"**Note:** {warning}") for warning in diagnosis.warnings]
     blocks += [Heading("What to do now"), Steps(what_to_do(diagnosis))]
     blocks += _where_blocks(diagnosis)
@@ -140,6 +144,7 @@ def _gap_blocks(diagnosis: Diagnosis) -> list[Block]:
         Heading("Before and after"),
         Picture("gap", caption),
         gap_table(diagnosis.gap),
+        *([adequacy_table(diagnosis.adequacy)] if diagnosis.adequacy else []),
         Picture("trials", "Misfit of every trial in units of the noise, the worst on top."),
         Heading("The worst trial", 3),
         Picture(

@@ -2,7 +2,17 @@
 
 from collections.abc import Mapping
 
-from pma_gym.discovery.diagnosis import Diagnosis, Floor, Gap, Moved, NamedEffect, Place
+from pma_gym.discovery.adequacy import MOST_EXPLAINED, MOST_FLOORS
+from pma_gym.discovery.adequacy_words import FLOORS
+from pma_gym.discovery.diagnosis import (
+    Diagnosis,
+    Floor,
+    Gap,
+    Judgement,
+    Moved,
+    NamedEffect,
+    Place,
+)
 from pma_gym.discovery.words import (
     chance,
     effect_name,
@@ -46,6 +56,30 @@ def gap_table(gaps: Mapping[str, Gap]) -> TextTable:
     ]
     header = ["Signal", "Model as given", "Parameters refitted", "Model proposed", "Noise"]
     return TextTable("Misfit (rms)", [*header, "Gap closed", "Held out"], rows)
+
+
+def adequacy_table(judgements: Mapping[str, Judgement]) -> TextTable:
+    """What the proposed model leaves of each signal, in floors, and what it is judged against."""
+    rows = []
+    for signal, each in judgements.items():
+        size = "–" if each.floor is None else f"{figure(each.floor)} {signal_unit(signal)}"
+        most = f"{figure(each.explained, 2)} (at most {figure(each.bound, 2)})"
+        rows.append(
+            [
+                signal_name(signal),
+                f"{FLOORS.get(each.source, 'none')}, {size}",
+                figure(each.fitted, 2),
+                figure(each.misfit, 2),
+                "–" if each.explained is None else most,
+                each.fault or "noise",
+            ]
+        )
+    header = ["Signal", "Floor", "Left of fitted readings", "Left of readings left out"]
+    title = (
+        f"What is left, in floors; at most {MOST_FLOORS:g} may be, of which a regression on state "
+        f"and command may explain {MOST_EXPLAINED:g}"
+    )
+    return TextTable(title, [*header, "Explained by a regression", "Verdict"], rows, words=2)
 
 
 def effect_table(effect: NamedEffect) -> TextTable:

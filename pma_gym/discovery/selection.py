@@ -1,11 +1,12 @@
 """Selection: which suspects are added to the model, one after the other.
 
 The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
-two hundred data sets. It opens too where the residual itself is no noise: where it remembers itself
-(`excess`), or bursts (`bursts`) and an effect explains the bursts. What passes is fitted together
-with the model's parameters; the likeliest is taken; then the same again beside it. Each effect is
-then left out once: one that is not missed goes. Noise is learnt anew only when all effects are
-found: before, an autoregression would take the next effect for noise.
+two hundred data sets. It opens too where the residual itself is no noise: where it is many times as
+large (`far_off`), where it remembers itself (`excess`), or bursts (`bursts`) and an effect explains
+the bursts. What passes is fitted together with the model's parameters; the likeliest is taken; then
+the same again beside it. Each effect is then left out once: one that is not missed goes. Noise is
+learnt anew only when all effects are found: before, an autoregression would take the next effect
+for noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -15,7 +16,7 @@ from pma_gym.discovery.bursts import NO_BURSTS, Bursts
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
-from pma_gym.discovery.leftovers import burst_of, relearnt, remembers
+from pma_gym.discovery.leftovers import burst_of, far_off, relearnt, remembers
 from pma_gym.discovery.screening import Baseline, Look, closer, look
 from pma_gym.discovery.suspect_fits import (
     better,
@@ -172,8 +173,9 @@ def _stage(
     )
     looks.sort(key=lambda each: -each.gain)
     # Where the residual itself rules chance out, a look need not.
-    missing = remembers(bench, before, chosen)
-    gate = tuple(each for each in looks if passes(bench, each, missing and not chosen))
+    far = far_off(bench, before, chosen)
+    missing = far or remembers(bench, before, chosen)
+    gate = tuple(each for each in looks if passes(bench, each, far or (missing and not chosen)))
     burst = NO_BURSTS if gate or chosen else burst_of(bench, before)
     least, plainly = 0.0, looks
     if burst.excess:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from rich.table import Table
 
+from pma_gym.discovery.adequacy_words import floors_left
 from pma_gym.discovery.diagnosis import Diagnosis, Gap
 from pma_gym.discovery.words import (
     VERDICTS,
@@ -27,8 +28,6 @@ from pma_gym.discovery.words import (
 from pma_gym.terminal import table_console
 
 _MOST_PLACES, _MOST_PARAMETERS = 3, 5
-_LEFT_OVER = 1.5
-"""Misfit over noise after a fit from which parameters alone do not explain the trials."""
 
 
 def diagnosis_summary(diagnosis: Diagnosis) -> str:
@@ -40,6 +39,8 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Effect", _effects(diagnosis)),
         ("Parameters", _parameters(diagnosis)),
         ("Misfit", _gaps(diagnosis)),
+        ("Written", filter(None, [_written(diagnosis)])),
+        ("Left", filter(None, [floors_left(diagnosis)])),
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
         labels = itertools.chain([f"{name}:"], itertools.repeat(""))
@@ -81,6 +82,15 @@ def _gaps(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{signal_name(signal)} {_gap(gap, signal_unit(signal))}"
 
 
+def _written(diagnosis: Diagnosis) -> str:
+    """Misfit of the files that are written, on the trials that they were fitted to."""
+    parts = [
+        f"{signal_name(signal)} {figure(size)} {signal_unit(signal)}"
+        for signal, size in diagnosis.written.items()
+    ]
+    return f"model.toml with trials.toml leaves {', '.join(parts)}" if parts else ""
+
+
 def _gap(gap: Gap, unit: str) -> str:
     held = " (held out)" if gap.held_out else ""
     closed = "" if gap_closed(gap) is None else f"; {percent(gap_closed(gap))} of the gap closed"
@@ -118,17 +128,5 @@ def print_fit(diagnosis: Diagnosis) -> None:
         figures = map(figure, (gap.before, gap.after, gap.floor))
         gaps.add_row(f"{signal_name(signal)} ({signal_unit(signal)})", *figures)
     console.print(gaps)
-    left = {
-        signal: gap.after / gap.floor
-        for signal, gap in diagnosis.gap.items()
-        if gap.floor and gap.after > _LEFT_OVER * gap.floor
-    }
-    if left:
-        worst = max(left, key=lambda signal: left[signal])
-        times = figure(left[worst], 2)
-        console.print(
-            f"More is left than noise: {times} times as much in {signal_name(worst)}. Parameters "
-            "alone do not explain these trials; pma-gym diagnose looks for what is missing.",
-            highlight=False,
-            markup=False,
-        )
+    for line in filter(None, (_written(diagnosis), floors_left(diagnosis))):
+        console.print(line, highlight=False, markup=False)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.adequacy import MOST_EXPLAINED, MOST_FLOORS
 from pma_gym.discovery.constancy import spreads
 from pma_gym.discovery.excess import SURE
 from pma_gym.discovery.findings import Findings
@@ -33,10 +34,12 @@ MOST_REMEMBERED = 0.1
 MOST_SPREAD = 0.12
 """Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
 
-Why = Literal["unexplained", "slow", "remembered", "scatters", "outdone"]
-"""`unexplained`: the residual is no noise, and no effect was added. `slow`: too much of what was
-slow in it is left. `remembered`: of what it remembered of itself. `scatters`: an effect has another
-size by trial or condition. `outdone`: a law without a shape of its own explains more."""
+Why = Literal["unexplained", "misfit", "explained", "slow", "remembered", "scatters", "outdone"]
+"""`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
+the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
+too much of what was slow in it is left. `remembered`: of what it remembered of itself. `scatters`:
+an effect has another size by trial or condition. `outdone`: a law without a shape of its own
+explains more."""
 
 
 @dataclass(frozen=True)
@@ -45,14 +48,15 @@ class Reason:
 
     Attributes:
         why: see `Why`.
-        figure: what was found: standard errors (`unexplained`), a share (`slow`, `remembered`,
-            `scatters`), or the fall of chi-square by the law (`outdone`).
+        figure: what was found: standard errors (`unexplained`), floors (`misfit`, `explained`), a
+            share (`slow`, `remembered`, `scatters`), or the fall of chi-square by the law
+            (`outdone`).
         limit: the most that it may be, in the same unit.
         effects: what was added; empty if nothing was.
         nearest: the likeliest effect, where nothing was added; empty if none was looked at.
         leaves: share that the effects leave of what was slow in the residual, or that the nearest
             leaves of chi-square.
-        of: signal at the door that remembers itself (`unexplained`), effect whose size scatters
+        of: signal, by its column (`unexplained`, `misfit`, `explained`), effect whose size scatters
             (`scatters`), or name of the law (`outdone`).
         by: what the size scatters with: `trial` or an output.
         gain: fall of chi-square by the effects (`outdone`).
@@ -78,11 +82,15 @@ def why_unknown(found: Findings, left: Left, laws: Sequence[Drawn]) -> Reason | 
         laws: laws without a shape of their own, the one that explains most first.
     """
     reason = _beyond(found, left, laws)
+    if reason is None and not found.selection.chosen:
+        reason = _inadequate(found)
     if reason is None:
         return None
     chosen = tuple(suspect.name for suspect in found.selection.chosen)
     if chosen:
         return replace(reason, effects=chosen, leaves=left.slow)
+    if not found.selection.stages:
+        return reason
     nearest, leaves = _nearest(found)
     return replace(reason, nearest=nearest, leaves=leaves)
 
@@ -110,10 +118,23 @@ def _missing(found: Findings) -> bool:
     return bool(found.selection.stages and found.selection.stages[0].missing)
 
 
-def _unexplained(found: Findings) -> Reason:
+def _inadequate(found: Findings) -> Reason | None:
+    """The residual is no noise: by its size, or by what a flexible regression explains of it."""
+    if found.adequacy.structure is None:
+        return None
+    name, signal = found.adequacy.structure
+    column = BY_QUANTITY[name].name
+    if signal.fault == "explained":
+        return Reason("explained", signal.explained, MOST_EXPLAINED, of=column)
+    return Reason("misfit", signal.fitted, MOST_FLOORS, of=column)
+
+
+def _unexplained(found: Findings) -> Reason | None:
     """The residual is no noise: by the signal that remembers itself most surely."""
     stage = found.selection.stages[0]
     sure = {name: each for name, each in memories(stage.bench, stage.before).items() if each.sure}
+    if not sure:
+        return _inadequate(found)
     signal = max(sure, key=lambda name: sure[name].score)
     return Reason("unexplained", sure[signal].score, SURE, of=BY_QUANTITY[signal].name)
 

@@ -20,8 +20,12 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
         trials: its trials in words, `these 6 trials`.
     """
     residual = f"the residual of {trials}"
+    if not diagnosis.candidates:
+        return _refitted(diagnosis, reason, trials)
     beyond = {
         "unexplained": _unexplained,
+        "misfit": _misfit,
+        "explained": _explained,
         "slow": _slow,
         "remembered": _remembered,
         "scatters": _scatters,
@@ -51,6 +55,36 @@ def _unexplained(reason: Reason, residual: str) -> str:
     return (
         f"and {residual} remembers itself in {signal_name(reason.of)}: by "
         f"{_past(figure(reason.figure), limit)} standard errors, where chance stays below {limit}"
+    )
+
+
+def _misfit(reason: Reason, _: str) -> str:
+    return f"and {signal_name(reason.of)} stays {_floors(reason)} off"
+
+
+def _explained(reason: Reason, residual: str) -> str:
+    return (
+        f"and a flexible regression on state and command explains {_floors(reason)} of {residual} "
+        f"in {signal_name(reason.of)}"
+    )
+
+
+def _floors(reason: Reason) -> str:
+    """A figure in floors, beside its limit: `26 noise floors (at most 1.5 may be left)`."""
+    limit = figure(reason.limit)
+    return f"{_past(figure(reason.figure, 2), limit)} noise floors (at most {limit} may be left)"
+
+
+def _refitted(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
+    """What parameters leave, where effects were not looked for."""
+    off = (
+        f"{signal_name(reason.of)} stays {_floors(reason)} off"
+        if reason.why == "misfit"
+        else f"a flexible regression still explains {_floors(reason)} of {signal_name(reason.of)}"
+    )
+    return (
+        f"Refitted to {trials}, model {diagnosis.given.name} misses something: {off}, and "
+        "parameters alone do not explain that; pma-gym diagnose looks for what is missing."
     )
 
 

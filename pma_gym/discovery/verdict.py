@@ -61,6 +61,8 @@ def verdict_of(
         return "undecidable"
     if found.searched and len(blind) > BLIND_SHARE * max(len(found.suspects), 1):
         return "undecidable"
+    if found.adequacy.undecided is not None:
+        return "undecidable"
     return "parameters" if moved and _change(found) > MOVED_CHANGE else "agrees"
 
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from pma_gym.discovery.adequacy import OPEN
+from pma_gym.discovery.adequacy_words import agreement, remainder, undecided
 from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
@@ -12,18 +14,17 @@ from pma_gym.discovery.unknown import Reason
 from pma_gym.discovery.unknown_words import unknown_words
 from pma_gym.discovery.verdict import BLIND_SHARE, MOST_RIVALS, MOVED_CHANGE
 from pma_gym.discovery.words import (
+    at_its_limit,
     chance,
     effect_name,
     effect_names,
     figure,
+    listed,
     percent,
     signal_name,
     signal_unit,
 )
 from pma_gym.units import suffix, with_unit
-
-MUCH = 1.3
-"""Misfit over the noise that is more than parameters leave where the structure is right."""
 
 ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""
@@ -36,29 +37,26 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         diagnosis: the diagnosis.
         unknown: why its verdict is `unknown`; None where it is another.
     """
-    count = len(diagnosis.trials)
-    trials = f"these {count} trials" if count != 1 else "this trial"
+    trials = trials_words(diagnosis)
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
-        return f"In {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}."
-    rest = _unexplained(diagnosis)
+        return (
+            f"In {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}"
+            f"{_unsure(diagnosis)}."
+        )
     if diagnosis.verdict == "parameters":
         off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
         shown = ", ".join(map(_change_of(diagnosis), off[:3]))
         more = f" and {len(off) - 3} more" if len(off) > 3 else ""
-        if rest:
-            return (
-                f"Refitted to {trials}, the parameters of model {name} change ({shown}{more})"
-                f", but {rest}."
-            )
         return (
-            f"Model {name} has the right structure for {trials}, but its parameters are off: "
-            f"{shown}{more}{_closed(diagnosis)}."
+            f"Model {name} has the right structure for {trials}{agreement(diagnosis)}, but its "
+            f"parameters are off: {shown}{more}{_closed(diagnosis)}{_unsure(diagnosis)}."
         )
     if diagnosis.verdict == "agrees":
-        if rest:
-            return f"No parameter of model {name} is off by much in {trials}, but {rest}."
-        return f"Model {name} agrees with {trials}: what is left is the noise of the sensors."
+        return (
+            f"Model {name} agrees with {trials}{agreement(diagnosis)}: what is left is "
+            f"{remainder(diagnosis)}."
+        )
     if unknown is not None:
         return unknown_words(diagnosis, unknown, trials)
     if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
@@ -74,8 +72,14 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         return (
             f"Model {name} misses something, but {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
+    few_blind = len(diagnosis.blind) <= BLIND_SHARE * max(len(diagnosis.candidates), 1)
+    if few_blind and any(each.fault in OPEN for each in diagnosis.adequacy.values()):
+        return (
+            f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
+            f"{undecided(diagnosis)}."
+        )
     best = diagnosis.candidates[0] if diagnosis.candidates else None
-    if best is not None and len(diagnosis.blind) <= BLIND_SHARE * len(diagnosis.candidates):
+    if best is not None and few_blind:
         return (
             f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
             f"in too little of {trials} to rule chance out"
@@ -86,24 +90,18 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
     ) + _propose(diagnosis)
 
 
+def trials_words(diagnosis: Diagnosis) -> str:
+    """The trials in words: pieces of one log are not taken for trials."""
+    count = len(diagnosis.trials)
+    files = len({record.file for record in diagnosis.trials})
+    if files == count:
+        return f"these {count} trials" if count != 1 else "this trial"
+    return f"{f'these {files} trials' if files != 1 else 'this trial'} (in {count} pieces)"
+
+
 def _propose(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     return f"; measure next: {following.protocol}." if following else "."
-
-
-def _unexplained(diagnosis: Diagnosis) -> str:
-    """What refitted parameters leave, where effects were not looked for; nothing where little."""
-    if diagnosis.candidates:
-        return ""
-    over = {signal: gap.after / gap.floor for signal, gap in diagnosis.gap.items() if gap.floor}
-    worst = max(over, key=lambda signal: over[signal], default="")
-    if not worst or over[worst] < MUCH:
-        return ""
-    gap = diagnosis.gap[worst]
-    return (
-        f"{signal_name(worst)} stays {figure(gap.after)} {signal_unit(worst)} off where the noise "
-        f"is {figure(gap.floor)} {signal_unit(worst)}: parameters alone do not explain that"
-    )
 
 
 def _effects(diagnosis: Diagnosis) -> str:
@@ -111,12 +109,29 @@ def _effects(diagnosis: Diagnosis) -> str:
     for effect in diagnosis.effects:
         sizes = ", ".join(
             f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
+            f"{at_its_limit(each)}"
             for parameter, each in effect.parameters.items()
         )
         others = effect_names(list(effect.confused_with), "or")
         doubt = f", or {others}" if others else ""
         named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
     return " and ".join(named)
+
+
+def _unsure(diagnosis: Diagnosis) -> str:
+    """What the headline adds: a fit that did not converge, signals and trials that got worse."""
+    words = "" if diagnosis.converged else "; the fit did not converge, so its values are rough"
+    signals, trials = diagnosis.worsened
+    worse = []
+    for signal in signals:
+        gap = diagnosis.gap[signal]
+        worse.append(
+            f"{signal_name(signal)} ({figure(gap.before)} to {figure(gap.after)} "
+            f"{signal_unit(signal)})"
+        )
+    more = f" and {len(trials) - 3} more" if len(trials) > 3 else ""
+    worse += [f"{', '.join(trials[:3])}{more}"] if trials else []
+    return words + (f"; but it fits {listed(worse)} worse than the model as given" if worse else "")
 
 
 def _stem(parameter: str, unit_: str) -> str:
@@ -155,7 +170,8 @@ def _closed(diagnosis: Diagnosis) -> str:
 def _change_of(diagnosis: Diagnosis):  # noqa: ANN202
     def words(path: str) -> str:
         moved = diagnosis.parameters[path]
-        return f"{path} {moved.now.value:.4g} instead of {moved.start:.4g}"
+        limit = at_its_limit(moved.now)
+        return f"{path} {moved.now.value:.4g}{limit} instead of {moved.start:.4g}"
 
     return words
 

@@ -157,7 +157,12 @@ def interval(known: Estimate) -> str:
 def estimate_words(known: Estimate) -> str:
     """`14.2 N (95 %: 13.1 to 15.4)`."""
     value = with_unit(estimate(known.value, known.low, known.high), known.unit)
-    return f"{value} (95 %: {interval(known)})"
+    return f"{value}{at_its_limit(known)} (95 %: {interval(known)})"
+
+
+def at_its_limit(known: Estimate) -> str:
+    """That a value is at an end of what the fit allows; empty where it is not."""
+    return f" (at its {known.limit} limit)" if known.limit else ""
 
 
 def chance(p_value: float) -> str:

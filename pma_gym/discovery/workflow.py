@@ -8,16 +8,18 @@ from pathlib import Path
 from pma_gym.data.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
+from pma_gym.discovery.acceptance_floors import Stated, acceptance_floors
+from pma_gym.discovery.adequacy import Residual, adequacy
 from pma_gym.discovery.answer import answer
 from pma_gym.discovery.data_checks import check_dataset
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.fewest import Fewest, fewest
+from pma_gym.discovery.fewest import Fewest, as_given, fewest
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.floors import initial_floors
-from pma_gym.discovery.held_out import unseen
+from pma_gym.discovery.held_out import fold_of_rows, unseen
 from pma_gym.discovery.journal import Journal
-from pma_gym.discovery.leftovers import relearnt
+from pma_gym.discovery.leftovers import left_over, relearnt
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
 from pma_gym.discovery.preparation import prepared
@@ -125,7 +127,15 @@ class _Work:
         own = own_parameters(given)
         _check_size(logged, own.free)
         noise = tuple(white_noise(floor.level) for floor in floors)
-        bench = Bench(trials, given, own, noise, max(1, self.jobs), bool(coarse_sensors(floors)))
+        bench = Bench(
+            trials,
+            given,
+            own,
+            noise,
+            max(1, self.jobs),
+            bool(coarse_sensors(floors)),
+            tuple(each.file or each.name for each in named),
+        )
         self._tell("refitting parameters", 0, 1)
         refitted = self._timed("parameters", lambda: self._refitted(bench, journal))
         orders = [each.order for each in named]
@@ -151,7 +161,9 @@ class _Work:
             seed=self.seed,
         )
         found = replace(found, fewest=self._timed("fewest", lambda: _fewest(found)))
+        found = _without_worse(found)
         found = self._timed("confirmation", lambda: self._confirmed(found))
+        found = self._timed("adequacy", lambda: self._judged(found, logged))
         diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
@@ -214,6 +226,24 @@ class _Work:
         )
         return replace(found, rivals=tuple(nearest), unseen=left_out, unseen_without=without)
 
+    def _judged(self, found: Findings, logged: Sequence[Logged]) -> Findings:
+        """With whether what the proposed model leaves of readings left out is noise."""
+        bench, fit = found.proposed
+        stated = Stated()
+        if isinstance(self.asked, Dataset):
+            stated = Stated(self.asked.tolerance, self.asked.standard_error)
+        floors = acceptance_floors(logged, found.named, stated)
+        evidence = bench.evidence(fit.model, found.selection.chosen)
+        held = evidence.readings(fit.values)
+        assert held is not None
+        fitted = Residual(held, left_over(evidence, held))
+        unseen_ = None
+        if found.unseen is not None:
+            unseen_ = Residual(found.unseen.readings, left_over(evidence, found.unseen.readings))
+        folds = fold_of_rows(bench.trials, bench.files)
+        judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed)
+        return replace(found, adequacy=judged)
+
     def _timed(self, step: str, work: Callable):  # noqa: ANN202
         begun = time.perf_counter()
         done = work()
@@ -229,6 +259,18 @@ def _nothing(bench: Bench, refitted: Fitted) -> Selection:
     """A selection from no suspects."""
     noise = relearnt(bench, refitted, ())
     return Selection((), (), refitted, replace(bench, noise=noise), refitted)
+
+
+def _without_worse(found: Findings) -> Findings:
+    """With the model as it was given in place of a refit that fits its own readings worse."""
+    if found.selection.chosen:
+        return found
+    fit = found.proposed[1]
+    given = found.bench.sum_of_squares(found.given)
+    refitted = found.bench.sum_of_squares(fit.model)
+    if not refitted > given * (1.0 + 1e-9):
+        return found
+    return replace(found, fewest=as_given(found.selection.bench), discarded=(given, refitted))
 
 
 def _fewest(found: Findings) -> Fewest | None:

@@ -144,7 +144,7 @@ def test_two_files_of_one_name_are_refused(folder, twin):
     [
         (
             "titel = 'x'",
-            "columns, format, trials, got 'titel' (did you mean 'title'?)",
+            "format, trials, tolerance, standard_error, got 'titel' (did you mean 'title'?)",
         ),
         ("title = 3", 'title in dataset.toml must be a text, title = "...", got 3'),
         ("title 3", "dataset.toml is not valid TOML: .*line 1"),

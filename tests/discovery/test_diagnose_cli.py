@@ -14,8 +14,10 @@ from pma_gym.plant.plant import Plant
 
 
 def pull(period, pressure):
-    time = np.arange(0.0, 4.0, 1 / 64)
-    volts = 2.5 * (1.0 - np.cos(2 * np.pi * time / period))
+    """Whole waves for some 4 s, then a rest, in which the sensors show their noise."""
+    time = np.arange(0.0, 5.5, 1 / 64)
+    waves = np.minimum(time, round(4.0 / period) * period)
+    volts = 2.5 * (1.0 - np.cos(2 * np.pi * waves / period))
     return Trial(time, {"motor_voltage": volts, "pressure_command": np.full(time.size, pressure)})
 
 

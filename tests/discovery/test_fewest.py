@@ -107,7 +107,7 @@ def test_the_given_model_is_proposed_where_no_parameter_is_off():
 
 def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
     monkeypatch.setattr(verdict, "MOVED_CHANGE", np.inf)
-    found = diagnose(laboratory("parameters")[0], STATION, propose=False)
+    found = diagnose(laboratory("parameters", 6)[0], STATION, propose=False)
     assert found.verdict == "agrees" and found.model == STATION
     (words,) = said(found)
     assert words.endswith("of the noise: the model stays as it was given.")

@@ -9,6 +9,7 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import unknown, verdict
+from pma_gym.discovery.adequacy import Adequacy
 from pma_gym.discovery.excess import SURE, Memory
 from pma_gym.discovery.slowness import Left
 from pma_gym.discovery.unknown import Reason
@@ -53,7 +54,8 @@ def test_the_true_model_agrees_whatever_the_noise(seed):
 
 
 def test_parameters_that_are_off_are_named():
-    found = diagnosed("parameters")
+    # Of three trials, one of each kind, two do not hold the parameters for the third.
+    found = diagnosed("parameters", 6)
     assert found.verdict == "parameters"
     assert found.effects == ()
     for path, truth in OFF.items():
@@ -272,6 +274,7 @@ def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
         bench=before,
     )
     return SimpleNamespace(
+        adequacy=Adequacy({}),
         selection=selection,
         refitted=SimpleNamespace(model=None, values=None),
         rivals=(),

@@ -1,6 +1,7 @@
 """From trials to answer: the same bytes, in every circumstance that a laboratory offers."""
 
 import json
+from dataclasses import replace
 
 import gymnasium as gym
 import numpy as np
@@ -10,6 +11,8 @@ import pma_gym.envs  # noqa: F401
 from pma_gym.data.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
+from pma_gym.discovery import workflow
+from pma_gym.discovery.selection import Selection
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.plant.model import dump_model, load_model
 from pma_gym.plant.plant import Plant
@@ -138,9 +141,31 @@ def test_names_of_a_data_set_are_kept():
 
 def test_a_refit_looks_for_nothing():
     found = refit(laboratory("hysteresis")[0], STATION)
-    assert found.verdict in ("parameters", "agrees")
+    assert found.verdict == "unknown"
     assert found.candidates == () and found.effects == ()
     assert found.parameters["drive.gain_n_per_v"].significant
+
+
+def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
+    worse = STATION.replace({"drive.gain_n_per_v": 99.0})
+    own = workflow._Work._refitted
+
+    def caught(self, bench, journal):
+        fit = own(self, bench, journal)
+        moved = np.array(
+            [
+                99.0 if path == "drive.gain_n_per_v" else value
+                for path, value in zip(fit.paths, fit.values, strict=True)
+            ]
+        )
+        return replace(fit, model=worse, values=moved)
+
+    monkeypatch.setattr(workflow._Work, "_refitted", caught)
+    monkeypatch.setattr(workflow, "_nothing", lambda bench, fit: Selection((), (), fit, bench, fit))
+    found = refit(laboratory("nothing")[0], STATION)
+    assert found.model == STATION and found.parameters == {}
+    assert any("a refit was discarded: it raises" in words for words in found.warnings)
+    assert found.verdict == "agrees"
 
 
 def test_progress_is_told():

@@ -138,9 +138,11 @@ def _cut(
 
 def _piece(each: NamedTrial, piece: Trial) -> NamedTrial:
     begin = float(piece.time[0])
+    file = each.file or each.name
     if begin == float(each.trial.time[0]):
-        return replace(each, trial=piece)
-    return replace(each, name=f"{each.name} from {begin:.4g} s", trial=piece, repeat_of=None)
+        return replace(each, trial=piece, file=file)
+    name = f"{each.name} from {begin:.4g} s"
+    return replace(each, name=name, trial=piece, repeat_of=None, file=file)
 
 
 def _started(

@@ -1,0 +1,54 @@
+"""`pma-gym compare`: how far a model is from a lab's logs, without fitting anything."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from pma_gym.cli.terminal import console, say, warnings_said
+from pma_gym.data.dataset import read_dataset
+from pma_gym.plant.model import load_model
+
+DEFAULT_MODEL = "station"
+
+
+def compare(
+    dataset: Annotated[
+        Path, typer.Argument(help="Folder of CSV, Parquet or XLSX files, one a trial.")
+    ],
+    model: Annotated[
+        str | None,
+        typer.Option(help="Shipped name or TOML file; else the data set's own, else station."),
+    ] = None,
+    trials: Annotated[
+        Path | None,
+        typer.Option(help="trials.toml of a diagnosis or a fit: zeros and starts of the trials."),
+    ] = None,
+) -> None:
+    """Simulate a lab's trials with a model and print the misfit of every signal."""
+    from pma_gym.discovery.data_checks.checking import check_dataset
+    from pma_gym.discovery.preparation import prepared
+    from pma_gym.discovery.trial_states import misfits, read_states
+    from pma_gym.discovery.words import figure, signal_name, signal_unit
+
+    with warnings_said():
+        data = read_dataset(dataset)
+    compared = load_model(model or data.model or DEFAULT_MODEL)
+    states = read_states(trials) if trials else {}
+    checked = check_dataset(data, compared, stop=False)
+    named, words = prepared(checked.trials, compared)
+    for line in (*(checked.checked or ()), *words):
+        say(f"warning: {line}")
+    absent = [each.name for each in named if trials and each.name not in states]
+    if absent:
+        say(
+            f"warning: {trials} has no state of {', '.join(absent[:3])}"
+            f"{' and others' if len(absent) > 3 else ''}; they begin as the model says"
+        )
+    table = Table("signal", title=f"Misfit of {compared.name} (rms)", title_justify="left")
+    table.add_column("misfit", justify="right")
+    table.add_column("unit")
+    for signal, size in misfits(named, compared, states).items():
+        table.add_row(signal_name(signal), figure(size), signal_unit(signal))
+    console().print(table)
