@@ -5,7 +5,6 @@ So a folder that others own or may write is not used, and every entry carries a 
 of this user; what is damaged, or signed by nobody here, is compiled anew instead of run.
 """
 
-import atexit
 import hashlib
 import os
 import tempfile
@@ -17,9 +16,9 @@ from functools import cache
 from pathlib import Path
 
 from pma_gym.files import replace_file
+from pma_gym.home import home_folder, temporary_folder
 from pma_gym.kernels.signing import SIGNATURE_BYTES, is_signed, signature, user_key
 from pma_gym.kernels.trust import UntrustedError, private_folder, read_trusted
-from pma_gym.partials import begin_partial, end_partial
 
 _MAGIC = b"pma_gym kernels 2\n"
 
@@ -49,16 +48,11 @@ def _store() -> _Store | None:
     asked = os.environ.get("PMA_GYM_CACHE")
     if asked:
         return _opened(Path(os.path.expanduser(asked)).absolute())
-    caches = os.environ.get("XDG_CACHE_HOME") or _home_caches()
-    return _opened(Path(caches).absolute() / "pma_gym" if caches else None)
-
-
-def _home_caches() -> Path | None:
-    try:
-        return Path.home() / ".cache"
-    except RuntimeError:
-        # Neither a variable HOME nor an entry of this user, as in a container.
-        return None
+    caches = os.environ.get("XDG_CACHE_HOME")
+    if caches:
+        return _opened(Path(caches).absolute() / "pma_gym")
+    home = home_folder()
+    return _opened(None if home is None else home.absolute() / ".cache" / "pma_gym")
 
 
 @cache
@@ -89,20 +83,9 @@ def _open(wanted: Path) -> _Store:
 
 def _temporary() -> _Store | None:
     try:
-        # Named as partial files are, so that the next process removes what a killed one leaves.
-        folder = begin_partial(Path(tempfile.gettempdir()) / "pma_gym")
-        folder.mkdir(mode=0o700)
-        atexit.register(_remove, folder, os.getpid())
-        return _open(folder)
+        return _open(temporary_folder())
     except OSError:
         return None
-
-
-def _remove(folder: Path, process: int) -> None:
-    # A fork of the process that made it does not own it.
-    if os.getpid() == process:
-        with suppress(OSError):
-            end_partial(folder)
 
 
 def digest(parts: Iterable[str]) -> str:
