@@ -21,11 +21,11 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test lint style types layers pages docs clean distclean
+.PHONY: help bench peers test test-lower-bounds kills lint style types layers pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
-	@sed -n 's/^\([a-z]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-18s%s\n", $$1, $$2 }'
+	@sed -n 's/^\([a-z-]*\):[^#]*## \(.*\)/  make \1|\2/p' Makefile | awk -F'|' '{ printf "%-26s%s\n", $$1, $$2 }'
 	@echo "Variables: PYTHON=python3.12, BENCH_ARGS='...', PYTEST_ARGS='-k name', JOBS=2 (tests at once)"
 
 bench: $(CORE) ## Run the benchmark (python -m benchmarks); its report goes to results/.
@@ -36,6 +36,29 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+
+# The extras of what the project runs with, each requirement at its lower bound, all of them together.
+# Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
+LOWER = .lower-bounds
+LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
+LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
+    tests/controllers tests/envs
+
+test-lower-bounds: ## Install every lower bound of pyproject.toml into .lower-bounds/ and run tests.
+	"$(PYTHON)" -m venv "$(LOWER)"
+	"$(PYTHON)" tests/lower_bounds.py constraints > $(LOWER)/constraints.txt
+	$(LOWER)/bin/python -m pip install --disable-pip-version-check $(PIP_FLAGS) \
+	    -c $(LOWER)/constraints.txt -e '.[$(LOWER_EXTRAS)]' pytest pytest-xdist hypothesis
+	$(LOWER)/bin/python tests/lower_bounds.py check
+	for command in "pma_gym.cli simulate" "pma_gym.cli diagnose" "benchmarks run"; do \
+	    $(LOWER)/bin/python -m $$command --help > /dev/null || exit 1; done
+	$(LOWER)/bin/python -m pytest -n $(JOBS) --dist worksteal -W ignore::DeprecationWarning \
+	    -W ignore::PendingDeprecationWarning $(LOWER_TESTS) $(PYTEST_ARGS)
+
+KILLS ?= 200
+
+kills: $(FULL) ## Kill long commands at random moments, resume them, count losses (KILLS=200).
+	$(BIN)/python -m tests.kills.kill_and_resume --kills $(KILLS)
 
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 
@@ -55,12 +78,12 @@ pages: $(FULL)
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
-clean: ## Remove what the tools generated, but neither .venv, .peers nor results/.
+clean: ## Remove what the tools generated, but neither .venv, .peers, .lower-bounds nor results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## Remove .venv and .peers too.
-	rm -rf $(VENV) .peers
+distclean: clean ## Remove .venv, .peers and .lower-bounds too.
+	rm -rf $(VENV) .peers $(LOWER)
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
 $(BIN)/pip:
