@@ -5,11 +5,10 @@ A container may run as a user without the variable HOME and without an entry in 
 
 import atexit
 import os
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from pma_gym.partials import begin_partial, end_partial
+from pma_gym.partials import begin_temporary_folder, end_partial
 
 
 def home_folder() -> Path | None:
@@ -23,13 +22,10 @@ def home_folder() -> Path | None:
 def temporary_folder() -> Path:
     """A new folder for this process alone, removed at its end.
 
-    Named as partial files are, so that the next process removes what a killed one leaves.
-
     Raises:
         OSError: there is no folder for temporary files.
     """
-    folder = begin_partial(Path(tempfile.gettempdir()) / "pma_gym")
-    folder.mkdir(mode=0o700)
+    folder = begin_temporary_folder("pma_gym")
     atexit.register(_remove, folder, os.getpid())
     return folder
 

@@ -10,6 +10,7 @@ import re
 import secrets
 import shutil
 import sys
+import tempfile
 import time
 from contextlib import suppress
 from functools import cache
@@ -52,6 +53,22 @@ def end_partial(partial: Path) -> None:
         remove(partial)
     finally:
         _in_progress.discard(partial.name)
+
+
+def begin_temporary_folder(name: str) -> Path:
+    """A new folder for this user alone among the temporary ones; give it to `end_partial`.
+
+    It is named as partial files are, so that the next one of any name removes what a killed process
+    left.
+
+    Args:
+        name: what it is for.
+    Raises:
+        OSError: there is no place for temporary folders.
+    """
+    folder = begin_partial(Path(tempfile.gettempdir()) / name)
+    folder.mkdir(mode=0o700)
+    return folder
 
 
 def clean_folder(folder: Path) -> None:
