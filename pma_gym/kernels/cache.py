@@ -22,7 +22,7 @@ from pma_gym.kernels.trust import UntrustedError, private_folder, read_trusted
 
 _MAGIC = b"pma_gym kernels 2\n"
 
-_FIX = "set PMA_GYM_CACHE to a folder that you own and only you may write, to keep them"
+_FIX = "set PMA_GYM_CACHE to a writable folder that only you may write, to keep them"
 
 
 @dataclass(frozen=True)
