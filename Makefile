@@ -23,7 +23,8 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test fuzz test-integrations lint style types layers pages docs clean distclean
+.PHONY: help bench peers test fuzz test-integrations test-lower-bounds kills lint style types layers
+.PHONY: pages docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -45,6 +46,31 @@ fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 1
 test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrations/, NAMES='skrl zoo'; 10 GB).
 	$(BIN)/python tests/integrations/run.py $(NAMES)
 
+# The extras of what the project runs with, each requirement at its lower bound, all of them together.
+# Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
+LOWER = .lower-bounds
+LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
+LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
+    tests/controllers tests/envs
+# It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
+LOWER_TESTS += --ignore=tests/envs/test_sb3_threads.py
+
+test-lower-bounds: ## Install every lower bound of pyproject.toml into .lower-bounds/ and run tests.
+	"$(PYTHON)" -m venv "$(LOWER)"
+	"$(PYTHON)" tests/lower_bounds.py constraints > $(LOWER)/constraints.txt
+	$(LOWER)/bin/python -m pip install --disable-pip-version-check $(PIP_FLAGS) \
+	    -c $(LOWER)/constraints.txt -e '.[$(LOWER_EXTRAS)]' pytest pytest-xdist hypothesis
+	$(LOWER)/bin/python tests/lower_bounds.py check
+	for command in "pma_gym.cli simulate" "pma_gym.cli diagnose" "benchmarks run"; do \
+	    $(LOWER)/bin/python -m $$command --help > /dev/null || exit 1; done
+	$(LOWER)/bin/python -m pytest -n $(JOBS) --dist worksteal -W ignore::DeprecationWarning \
+	    -W ignore::PendingDeprecationWarning $(LOWER_TESTS) $(PYTEST_ARGS)
+
+KILLS ?= 200
+
+kills: $(FULL) ## Kill long commands at random moments, resume them, count losses (KILLS=200).
+	$(BIN)/python -m tests.kills.kill_and_resume --kills $(KILLS)
+
 lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
 
 style: $(FULL)
@@ -63,12 +89,12 @@ pages: $(FULL)
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
-clean: ## Remove what the tools generated, but none of .venv, .peers, .integrations or results/.
+clean: ## Remove what the tools generated, but no environment (.venv, .peers...) and not results/.
 	rm -rf build dist site *.egg-info .pytest_cache .ruff_cache .hypothesis .import_linter_cache
 	find pma_gym controllers benchmarks tests -type d -name __pycache__ -prune -exec rm -rf {} +
 
-distclean: clean ## Remove .venv, .peers and .integrations too.
-	rm -rf $(VENV) .peers .integrations
+distclean: clean ## Remove .venv, .peers, .integrations and .lower-bounds too.
+	rm -rf $(VENV) .peers .integrations $(LOWER)
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
 $(BIN)/pip:

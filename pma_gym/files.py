@@ -1,10 +1,11 @@
 """Files that are written whole or not at all, and the rule on where one may be written."""
 
 import os
-import secrets
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
+
+from pma_gym.partials import begin_partial, end_partial
 
 
 class OutputError(ValueError):
@@ -50,34 +51,35 @@ def _fault(path: Path) -> str:
         )
 
 
-def replace_file(path: Path, content: bytes) -> None:
+def replace_file(path: Path, content: bytes, private: bool = False) -> None:
     """Write a file so that a reader sees the old one or the new one, never a part.
 
     Args:
         path: the file; its folder exists.
         content: all of it.
+        private: only its owner may read and write it (mode 0600), whatever the umask.
     """
-    replace_files({path: content})
+    replace_files({path: content}, private)
 
 
-def replace_files(contents: Mapping[Path, bytes]) -> None:
+def replace_files(contents: Mapping[Path, bytes], private: bool = False) -> None:
     """Write files that belong together: a disk that fails or fills up leaves all the old ones.
 
     Only between the final steps, which write nothing, could new and old ones stand side by side.
+    What killed processes left half-written in these folders is removed.
 
     Args:
         contents: all of each file, the last one to be replaced last; their folders exist.
+        private: only their owner may read and write them (mode 0600), whatever the umask.
     """
-    # In the same folder, for only there is the final step a rename.
-    partials = {
-        path.with_name(f".{path.name}.{secrets.token_hex(4)}.partial"): path for path in contents
-    }
+    partials = {begin_partial(path): path for path in contents}
     try:
         for partial, path in partials.items():
+            if private:
+                os.close(os.open(partial, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600))
             partial.write_bytes(contents[path])
         for partial, path in partials.items():
             os.replace(partial, path)
-    except BaseException:
+    finally:
         for partial in partials:
-            partial.unlink(missing_ok=True)
-        raise
+            end_partial(partial)

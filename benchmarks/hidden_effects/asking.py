@@ -1,8 +1,7 @@
 """Asking for a diagnosis of a case: files are written, and read back as a user's would be."""
 
-import shutil
-import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from benchmarks.hidden_effects.cases import Case
 from benchmarks.hidden_effects.files import case_name, write_case
 from benchmarks.hidden_effects.physics.rig import Array
+from pma_gym.partials import begin_temporary_folder, end_partial
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ def asked(case: Case, number: int, judge: Judge, keep: Path | None = None) -> An
         judge: makes the answer.
         keep: folder in which the files stay; none do if not given.
     """
-    place = Path(tempfile.mkdtemp(prefix="hidden_")) if keep is None else keep
+    place = begin_temporary_folder("hidden_effects") if keep is None else keep
     try:
         write_case(case, place, number)
         return judge(place / "cases" / case_name(number))
@@ -73,4 +73,5 @@ def asked(case: Case, number: int, judge: Judge, keep: Path | None = None) -> An
         return Answer(None, f"{type(error).__name__}: {error}")
     finally:
         if keep is None:
-            shutil.rmtree(place, ignore_errors=True)
+            with suppress(OSError):
+                end_partial(place)

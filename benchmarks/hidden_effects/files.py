@@ -1,13 +1,14 @@
 """Cases in folders: what a diagnosis may read in one, the truth in another."""
 
 import json
-import os
 import re
 import shutil
 from pathlib import Path
 
 import pma_gym
 from benchmarks.hidden_effects.cases import Case
+from pma_gym.files import replace_file
+from pma_gym.partials import begin_partial, end_partial
 
 HEADER = (
     "time_s,motor_voltage_v,regulator_voltage_v,contraction_mm,rotation_deg,load_n,pressure_kpa"
@@ -38,17 +39,20 @@ def write_case(case: Case, folder: Path, number: int) -> None:
     name = case_name(number)
     for part in ("cases", "truth"):
         (folder / part).mkdir(parents=True, exist_ok=True)
-    truth = folder / "truth" / f"{name}.json"
-    _replace(truth, json.dumps(case.truth, indent=1) + "\n")
-    draft, target = folder / "cases" / f".{name}.{os.getpid()}", folder / "cases" / name
-    shutil.rmtree(draft, ignore_errors=True)
-    draft.mkdir()
-    for i in range(len(case.time)):
-        (draft / trial_name(i)).write_text(_csv(case, i), "utf-8")
-    (draft / "dataset.toml").write_text(_dataset(case), "utf-8")
-    (draft / "model.toml").write_text(lab_model(), "utf-8")
-    shutil.rmtree(target, ignore_errors=True)
-    draft.rename(target)
+    truth = json.dumps(case.truth, indent=1) + "\n"
+    replace_file(folder / "truth" / f"{name}.json", truth.encode())
+    target = folder / "cases" / name
+    draft = begin_partial(target)
+    try:
+        draft.mkdir()
+        for i in range(len(case.time)):
+            (draft / trial_name(i)).write_text(_csv(case, i), "utf-8")
+        (draft / "dataset.toml").write_text(_dataset(case), "utf-8")
+        (draft / "model.toml").write_text(lab_model(), "utf-8")
+        shutil.rmtree(target, ignore_errors=True)
+        draft.rename(target)
+    finally:
+        end_partial(draft)
 
 
 def trial_name(i: int) -> str:
@@ -73,9 +77,3 @@ def _dataset(case: Case) -> str:
         if i in case.repeat_of:
             lines.append(f'repeat_of = "{trial_name(case.repeat_of[i])}"')
     return "\n".join(lines) + "\n"
-
-
-def _replace(path: Path, text: str) -> None:
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
-    draft.write_text(text, "utf-8")
-    draft.replace(path)

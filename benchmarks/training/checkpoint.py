@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 from collections.abc import Collection, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,7 @@ from controllers.tensor_header import LARGEST_HEADER, check_header
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.limits import check_limit
+from pma_gym.partials import begin_partial, clean_folder, end_partial
 
 COUNTERS = ("num_timesteps", "_n_updates", "_episode_num")
 """What a model counts."""
@@ -51,9 +53,10 @@ def save_checkpoint(
         CheckpointError: it could not be written; the one before is still there.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    partial, final = folder / ".partial", folder / f"{number:06d}"
+    final = folder / f"{number:06d}"
+    # What a killed training left half-written goes too.
+    partial, replaced = begin_partial(final), begin_partial(final)
     try:
-        shutil.rmtree(partial, ignore_errors=True)
         partial.mkdir()
         tensors, numbers = _state(model)
         if average is not None:
@@ -66,11 +69,12 @@ def save_checkpoint(
         )
         content = json.dumps({"numbers": numbers, "told": dict(told)}, indent=1)
         (partial / "state.json").write_text(content, encoding="utf-8")
-        shutil.rmtree(final, ignore_errors=True)
+        if final.exists():
+            # Whole under another name until the new one is there: a kill may come between.
+            final.rename(replaced)
         partial.rename(final)
     # What fails while tensors are written is no OSError.
     except (OSError, SafetensorError) as error:
-        shutil.rmtree(partial, ignore_errors=True)
         kept = latest(folder)
         why = getattr(error, "strerror", None) or error
         stays = f"the one of leg {kept[0]} stays in {kept[1]}" if kept else "there is none before"
@@ -78,12 +82,20 @@ def save_checkpoint(
             f"checkpoint {number} cannot be saved in {folder}: {why}; {stays}; "
             "make room or allow writing, then run the same command again: it goes on from there"
         ) from error
+    finally:
+        for name in (partial, replaced):
+            with suppress(OSError):
+                end_partial(name)
     for old in _numbered(folder)[:-2]:
         shutil.rmtree(old, ignore_errors=True)
 
 
 def latest(folder: Path) -> tuple[int, Path] | None:
-    """Number and folder of the newest checkpoint, if there is one."""
+    """Number and folder of the newest checkpoint, if there is one.
+
+    What a killed training left half-written beside them is removed.
+    """
+    clean_folder(folder)
     found = [path for path in _numbered(folder) if (path / "state.json").is_file()]
     return (int(found[-1].name), found[-1]) if found else None
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from pma_gym.files import OutputError, check_output, replace_file
+from pma_gym.partials import clean_folder
 
 JOURNAL = "unfinished"
 """Folder of what an interrupted run has finished."""
@@ -45,7 +46,10 @@ class Results:
                 "another"
             )
         old = [name for name in self.names if (self.folder / name).exists()]
-        if old and not force:
+        # A run that was killed while it wrote its results has both, some of the results and the
+        # journal.
+        going_on = resume and self.journal.is_dir()
+        if old and not force and not going_on:
             raise OutputError(
                 f"{self.folder} holds an older result ({', '.join(old)}); --force replaces it, "
                 "--out FOLDER writes to another place"
@@ -92,6 +96,7 @@ class Results:
     def _drop_journal(self) -> None:
         """Remove the journal's files, and its folder if it holds nothing else."""
         if self.journal.is_dir():
+            clean_folder(self.journal)
             for path in self.journal.glob("*.json"):
                 path.unlink()
             if not any(self.journal.iterdir()):

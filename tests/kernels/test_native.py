@@ -100,7 +100,7 @@ def test_a_damaged_file_is_compiled_anew(folder, damage):
 
 
 def test_a_full_disk_costs_only_the_keeping(folder, monkeypatch):
-    def refuse(*_):
+    def refuse(*_, **__):
         raise OSError("no space left")
 
     monkeypatch.setattr(cache, "replace_file", refuse)
