@@ -253,12 +253,13 @@ def _read(path: Path) -> dict[str, Any]:
         return {"schema": SCHEMA, "provenance": {}, "models": {}}
     try:
         document = read_json(path)
-        check_shape(document, {"schema": Whole(), "provenance": dict, "models": {"*": dict}})
+        check_shape(document, {"schema": Whole()})
         if document["schema"] == SCHEMA:
+            check_shape(document, {"provenance": dict, "models": {"*": dict}})
             return document
     except (ValueError, KeyError, TypeError) as error:
         raise ValueError(
-            f"{path} is no file of gains ({error!r}); delete it or name another"
+            f"{path} is no file of gains ({error}); delete it or name another"
         ) from error
     raise ValueError(f"{path} must have schema {SCHEMA}; delete it or name another")
 

@@ -93,7 +93,8 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
     ((trials, model, rest),) = engine.calls
     assert (len(trials), model.name, rest) == (1, "serres2008", {"seed": 3, "jobs": 2})
     folder = tmp_path / "lab-diagnosis"
-    assert names(folder) == ["diagnosis.json", "model.toml", "next.csv", "report.html"]
+    results = ["diagnosis.json", "model.toml", "next.csv", "report.html", "trials.toml"]
+    assert names(folder) == results
     assert json.loads((folder / "diagnosis.json").read_text())["verdict"] == "parameters"
     amended = load_model(folder / "model.toml")
     assert amended.at_the_door("drive")["gain_n_per_v"] == pytest.approx(95.02)
@@ -113,7 +114,7 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
         "            These trials would not have shown creep. To rule that out, run next.csv on "
         "the rig (staircase; 90 s), save its log into the data set under a name of its own, and "
         "diagnose again.",
-        "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, model.toml",
+        "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, trials.toml, model.toml",
     ]
 
 
@@ -206,7 +207,7 @@ def test_what_the_engine_refuses_leaves_nothing(run, engine, tmp_path):
 def test_fit_prints_and_writes_the_parameters(run, engine, tmp_path):
     code, out, err = run("fit", "lab", "--model", "serres2008")
     assert (code, err) == (0, "Noise ...\n")
-    assert names(tmp_path / "lab-fit") == ["fit.json", "model.toml"]
+    assert names(tmp_path / "lab-fit") == ["fit.json", "model.toml", "trials.toml"]
     document = json.loads((tmp_path / "lab-fit" / "fit.json").read_text())
     assert document["parameters"]["drive.gain_n_per_v"]["to"] == 95.02
     assert document["not_identifiable"] == {"rotor.inertia_kg_m2": "no trial is fast enough"}

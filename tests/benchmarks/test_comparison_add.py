@@ -238,7 +238,8 @@ def test_a_controller_is_taken_out_of_a_journal_and_the_others_keep_their_bytes(
     mine = b'{"controller": "Mine", "failure": "it broke"}\n'
     journal = folder / "journal.jsonl"
     journal.write_bytes(mine + others[:36] + mine + others[36:])
-    (folder / "run.json").write_text('{"contenders": {"Mine": {}, "pid": {"key": "a"}}}')
+    entry = {"title": "a", "source": "a.py:A", "key": "a"}
+    (folder / "run.json").write_text(json.dumps({"contenders": {"Mine": entry, "pid": entry}}))
     suite = str(tmp_path / "small.toml")
     options = ["--suite", suite, "--results", str(tmp_path / "results")]
     wrong = CliRunner().invoke(app, ["remove", "Mien", *options])
@@ -254,5 +255,5 @@ def test_a_controller_is_taken_out_of_a_journal_and_the_others_keep_their_bytes(
     assert done.exit_code == 0 and f"{journal}: 2 rows of Mine removed" in done.stdout
     assert journal.read_bytes() == before.replace(mine, b"")
     assert journal.read_bytes().startswith(others)
-    assert json.loads((folder / "run.json").read_text())["contenders"] == {"pid": {"key": "a"}}
+    assert json.loads((folder / "run.json").read_text())["contenders"] == {"pid": entry}
     assert not list(folder.glob(".*partial"))

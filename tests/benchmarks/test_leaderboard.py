@@ -39,7 +39,8 @@ RUN_AT = {"started": "today", "command": "python -m benchmarks run"}
 
 INFO = {
     "contenders": {
-        name: {"title": name.upper(), "key": f"key-{name}", **RUN_AT} for name in LEVELS
+        name: {"title": name.upper(), "source": name, "key": f"key-{name}", **RUN_AT}
+        for name in LEVELS
     },
     "git": {"commit": "0123", "dirty": False},
     "versions": {"python": "3"},

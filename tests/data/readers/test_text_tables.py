@@ -401,7 +401,7 @@ def test_a_folder_names_what_it_passes_over(tmp_path):
         ("header_row = 0", "must be a row's number, counted from 1, got 0; write header_row = 3"),
         ("names = 'a'", "must be a list of texts, got 'a'"),
         ("missing = 'a'", "must be a list of numbers, got 'a'; write missing = [-999]"),
-        ("missing = nan", "must be a list of finite numbers, got nan"),
+        ("missing = nan", "format.missing must be a finite number, below 1e308 in size, got nan"),
     ],
 )
 def test_a_format_that_cannot_be_used_is_refused(tmp_path, line, message):
