@@ -130,7 +130,7 @@ def _inadequate(found: Findings) -> Reason | None:
 
 
 def _unexplained(found: Findings) -> Reason | None:
-    """The residual is no noise: by the signal that remembers itself most surely."""
+    """The residual is no noise: by the signal whose autocorrelation is surest."""
     stage = found.selection.stages[0]
     sure = {name: each for name, each in memories(stage.bench, stage.before).items() if each.sure}
     if not sure:

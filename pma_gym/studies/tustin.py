@@ -1,11 +1,13 @@
 """The cascade's transfer function as a recursion in time, and its inverse."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.signal import lfilter
+
+if TYPE_CHECKING:
+    import control
 
 
 class Recursion(NamedTuple):
@@ -26,7 +28,7 @@ class Recursion(NamedTuple):
 
 def cascade_transfer(
     muscle_rate: float, motor_rate: float, gain: float = 1.0
-) -> control.TransferFunction:
+) -> "control.TransferFunction":
     """Motor and muscle in cascade, from wanted input to position.
 
         Y / X = gain A B / ((s + A) (s + B))
@@ -39,6 +41,9 @@ def cascade_transfer(
     Source:
         Serres 2008, Eq. 22; the motor's inertia is left out there.
     """
+    # Here: it brings matplotlib along, which takes half a second.
+    import control
+
     numerator = [gain * muscle_rate * motor_rate]
     denominator = np.polymul([1.0, muscle_rate], [1.0, motor_rate])
     return control.TransferFunction(
@@ -46,7 +51,7 @@ def cascade_transfer(
     )
 
 
-def tustin_recursion(transfer: control.TransferFunction, sample_time: float) -> Recursion:
+def tustin_recursion(transfer: "control.TransferFunction", sample_time: float) -> Recursion:
     """The recursion of a second-order transfer function by Tustin's method.
 
     Args:
@@ -117,7 +122,7 @@ def forward_recursion(x_input: ArrayLike, recursion: Recursion) -> NDArray[np.fl
         recursion: coefficients for the sample time.
     """
     numerator = [recursion.e, recursion.d, recursion.c]
-    return np.asarray(lfilter(numerator, [1.0, recursion.b, recursion.a], np.asarray(x_input)))
+    return _filtered(numerator, [1.0, recursion.b, recursion.a], x_input)
 
 
 def inverse_recursion(reference: ArrayLike, recursion: Recursion) -> NDArray[np.float64]:
@@ -138,4 +143,13 @@ def inverse_recursion(reference: ArrayLike, recursion: Recursion) -> NDArray[np.
         Serres 2008, section 5.2.1 and tables I4-I20.
     """
     denominator = [recursion.e, recursion.d, recursion.c]
-    return np.asarray(lfilter([1.0, recursion.b, recursion.a], denominator, np.asarray(reference)))
+    return _filtered([1.0, recursion.b, recursion.a], denominator, reference)
+
+
+def _filtered(
+    numerator: Sequence[float], denominator: Sequence[float], signal: ArrayLike
+) -> NDArray[np.float64]:
+    """A signal behind a digital filter that begins with zeros."""
+    from scipy.signal import lfilter
+
+    return np.asarray(lfilter(numerator, denominator, np.asarray(signal)))
