@@ -107,15 +107,19 @@ def remove(
         Path, typer.Option(help="Folder with a folder of results for each suite.")
     ] = RESULTS,
 ) -> None:
-    """Take a controller's rows out of the journals; the rows of all others stay as they are."""
+    """Take a controller's rows out of the journals; the rows of all others stay unchanged."""
+    from benchmarks.comparison.command_lines import report_command
     from benchmarks.comparison.remove import remove_controller
     from benchmarks.comparison.suite import frozen_suite, suite_names
     from benchmarks.suite import SuiteError
 
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
-        for path, count in remove_controller(controller, frozen, results).items():
-            print(f"{path}: {count} rows of {controller} removed; write its page anew by `report`")
+        removed = remove_controller(controller, frozen, results)
+        by_folder = {results / each.name: each for each in frozen}
+        for path, count in removed.items():
+            again = report_command(by_folder[path.parent], path.parent)
+            print(f"{path}: {count} rows of {controller} removed; update its page: {again}")
     except SuiteError as error:
         refuse(error)
 

@@ -15,7 +15,8 @@ DEFAULT_MODEL = "station"
 
 def compare(
     dataset: Annotated[
-        Path, typer.Argument(help="Folder of CSV, Parquet or XLSX files, one a trial.")
+        Path,
+        typer.Argument(help="Folder of logs (CSV, XLSX, Parquet, LVM, MAT, TDMS...), one a trial."),
     ],
     model: Annotated[
         str | None,

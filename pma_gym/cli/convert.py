@@ -1,4 +1,4 @@
-"""`pma-gym convert`: a lab's files looked at, and a first `dataset.toml` for them."""
+"""`pma-gym convert`: show the columns of a lab's files and draft a `dataset.toml` for them."""
 
 import warnings
 from pathlib import Path
@@ -82,15 +82,15 @@ def _checked(folder: Path, model: Model) -> list[str]:
 
 def _table(columns: list[SeenColumn], count: int) -> Table:
     shown = Table(title=f"{count} tables")
-    for name in ("column", "unit", "from", "to", "files", "taken for", "factor", "because of"):
+    for name in ("column", "unit", "from", "to", "files", "taken for", "factor", "reason"):
         shown.add_column(name)
     for each in columns:
         cells = [one_line(each.name), one_line(each.unit), f"{each.low:.6g}", f"{each.high:.6g}"]
         cells.append(str(each.files))
         if each.guess is None:
-            cells += ["", "", "nothing like ours"]
+            cells += ["", "", "no known column"]
         else:
-            other = "" if each.chosen else "left out: as "
+            other = "" if each.chosen else "left out, also like "
             cells += [f"{other}{each.guess.column.name}", f"{each.guess.factor:.7g}"]
             cells.append(one_line(each.guess.why))
         shown.add_row(*(Text(cell) for cell in cells))

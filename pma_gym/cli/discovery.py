@@ -53,7 +53,9 @@ EffectOption = Annotated[
 ]
 ChecksOption = Annotated[
     bool,
-    typer.Option(help="Stop where a column is certainly in another unit; else only say so."),
+    typer.Option(
+        help="Stop where a column, or time_s, is certainly in another unit; else only warn."
+    ),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace an older result.")]
 

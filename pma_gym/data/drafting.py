@@ -91,7 +91,7 @@ def draft(title: str, model: str, columns: Sequence[SeenColumn], proposals: Sequ
         seen = f"{each.low:.6g} to {each.high:.6g}"
         if each.guess is None or not each.chosen:
             why = (
-                "nothing like ours"
+                "no known column"
                 if each.guess is None
                 else (f"also looks like {each.guess.column.name}")
             )
@@ -99,14 +99,14 @@ def draft(title: str, model: str, columns: Sequence[SeenColumn], proposals: Sequ
             continue
         column, factor = each.guess.column, each.guess.factor
         if each.name == column.name and factor == 1.0:
-            lines.append(f"# {quoted(each.name)} is ours by name ({seen})")
+            lines.append(f"# {quoted(each.name)} is a known name ({seen})")
             continue
         entry = f'"{column.name}"'
         if factor != 1.0:
             entry = f"{{ name = {entry}, factor = {factor:.7g} }}"
         lines.append(f"{quoted(each.name)} = {entry}  # {seen}; {one_line(each.guess.why)}")
     if proposals:
-        lines += ["", "# What the checks say of it as it stands:"]
+        lines += ["", "# What the checks say of this draft:"]
         lines += [f"# - {one_line(words)}" for words in proposals]
     return "\n".join(lines) + "\n"
 

@@ -50,7 +50,7 @@ def floors_left(diagnosis: Diagnosis) -> str:
     if not parts:
         return ""
     seen = "readings that it was not fitted to" if held else "the readings that it was fitted to"
-    return f"What the proposed model leaves of {seen}, in noise floors: {', '.join(parts)}."
+    return f"Misfit of the proposed model on {seen}, in noise floors: {', '.join(parts)}."
 
 
 def undecided(diagnosis: Diagnosis) -> str:
@@ -71,19 +71,20 @@ def undecided(diagnosis: Diagnosis) -> str:
         )
     if judged.fault == "wide":
         return (
-            f"a law that follows the state or the command could make up to "
-            f"{figure(judged.bound, 2)} noise floors of {name}, where less than "
-            f"{MOST_EXPLAINED:g} must be sure; {_longer(judged)}"
+            f"a missing law of state or command may still cause up to "
+            f"{figure(judged.bound, 2)} noise floors of {name}, and only a bound below "
+            f"{MOST_EXPLAINED:g} rules one out; {_longer(judged)}"
         )
     what = (
-        f"{name} of trials left out is predicted {figure(judged.misfit, 2)} noise floors off"
+        f"the misfit of {name} in trials left out of the fit is {figure(judged.misfit, 2)} noise "
+        "floors"
         if judged.fault == "not predicted"
-        else f"what is left of {name} in trials left out follows the state "
+        else f"the residual of {name} in trials left out of the fit follows the state "
         f"({figure(judged.explained, 2)} noise floors)"
     )
     return (
-        f"{what} although the fit of all leaves {figure(judged.fitted, 2)} (at most "
-        f"{MOST_FLOORS:g} may be left): the other trials do not hold the parameters; log more "
+        f"{what}, although a fit to all trials leaves {figure(judged.fitted, 2)} (at most "
+        f"{MOST_FLOORS:g} may be left): the other trials do not determine the parameters; log more "
         "trials with commands like these"
     )
 

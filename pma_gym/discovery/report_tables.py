@@ -58,8 +58,20 @@ def gap_table(gaps: Mapping[str, Gap]) -> TextTable:
     return TextTable("Misfit (rms)", [*header, "Gap closed", "Held out"], rows)
 
 
+FAULTS = {
+    "misfit": "misfit too large",
+    "explained": "regression explains too much",
+    "not predicted": "misfit too large on readings left out",
+    "follows": "regression explains too much of readings left out",
+    "wide": "bound too wide",
+    "no floor": "no floor",
+    "not left out": "no readings left out",
+}
+"""What is wrong with a signal, in words."""
+
+
 def adequacy_table(judgements: Mapping[str, Judgement]) -> TextTable:
-    """What the proposed model leaves of each signal, in floors, and what it is judged against."""
+    """Misfit of each signal by the proposed model in noise floors, and the verdict on it."""
     rows = []
     for signal, each in judgements.items():
         size = "–" if each.floor is None else f"{figure(each.floor)} {signal_unit(signal)}"
@@ -71,13 +83,13 @@ def adequacy_table(judgements: Mapping[str, Judgement]) -> TextTable:
                 figure(each.fitted, 2),
                 figure(each.misfit, 2),
                 "–" if each.explained is None else most,
-                each.fault or "noise",
+                FAULTS.get(each.fault, each.fault) if each.fault else "noise",
             ]
         )
-    header = ["Signal", "Floor", "Left of fitted readings", "Left of readings left out"]
+    header = ["Signal", "Noise floor", "Misfit, fitted readings", "Misfit, readings left out"]
     title = (
-        f"What is left, in floors; at most {MOST_FLOORS:g} may be, of which a regression on state "
-        f"and command may explain {MOST_EXPLAINED:g}"
+        f"Misfit of the proposed model in noise floors: at most {MOST_FLOORS:g}, of which a "
+        f"regression on state and command explains less than {MOST_EXPLAINED:g}"
     )
     return TextTable(title, [*header, "Explained by a regression", "Verdict"], rows, words=2)
 

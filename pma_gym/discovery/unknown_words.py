@@ -6,13 +6,13 @@ from pma_gym.discovery.unknown import Reason
 from pma_gym.discovery.words import effect_name, effect_names, figure, percent, signal_name
 
 MANY = 10.0
-"""Times itself from which on the scatter of a size is no longer told in numbers."""
+"""Times itself from which on the scatter of a size is no longer given in numbers."""
 
 _WHAT = "what is slow in"
 
 
 def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
-    """That no effect carries what is missing and why, in a sentence; another where something rings.
+    """That no effect carries what is missing and why; one more sentence for an oscillation.
 
     Args:
         diagnosis: the diagnosis.
@@ -53,13 +53,13 @@ def _best(reason: Reason, residual: str) -> str:
 def _unexplained(reason: Reason, residual: str) -> str:
     limit = figure(reason.limit)
     return (
-        f"and {residual} remembers itself in {signal_name(reason.of)}: by "
+        f"and {residual} is autocorrelated in {signal_name(reason.of)} for longer than noise: by "
         f"{_past(figure(reason.figure), limit)} standard errors, where chance stays below {limit}"
     )
 
 
 def _misfit(reason: Reason, _: str) -> str:
-    return f"and {signal_name(reason.of)} stays {_floors(reason)} off"
+    return f"and the misfit of {signal_name(reason.of)} is {_floors(reason)}"
 
 
 def _explained(reason: Reason, residual: str) -> str:
@@ -78,7 +78,7 @@ def _floors(reason: Reason) -> str:
 def _refitted(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
     """What parameters leave, where effects were not looked for."""
     off = (
-        f"{signal_name(reason.of)} stays {_floors(reason)} off"
+        f"the misfit of {signal_name(reason.of)} is {_floors(reason)}"
         if reason.why == "misfit"
         else f"a flexible regression still explains {_floors(reason)} of {signal_name(reason.of)}"
     )
@@ -99,8 +99,8 @@ def _slow(reason: Reason, residual: str) -> str:
 def _remembered(reason: Reason, residual: str) -> str:
     limit = percent(reason.limit)
     share = _past(percent(min(reason.figure, 1.0)), limit)
-    it = "it" if reason.effects else residual
-    return f"but {share} of what {it} remembers of itself is left, where at most {limit} may be"
+    its = "its autocorrelation" if reason.effects else f"the autocorrelation of {residual}"
+    return f"but {share} of {its} is left, where at most {limit} may be"
 
 
 def _scatters(reason: Reason, _: str) -> str:
@@ -130,8 +130,8 @@ def _past(said: str, limit: str) -> str:
 
 
 def _tones(diagnosis: Diagnosis) -> str:
-    rings = [
-        f"{signal_name(signal)} rings at {figure(hertz)} Hz"
+    tones = [
+        f"{signal_name(signal)} oscillates at {figure(hertz)} Hz"
         for signal, hertz in diagnosis.tones.items()
     ]
-    return f" What is left of {' and that of '.join(rings)}." if rings else ""
+    return f" What is left of {' and that of '.join(tones)}." if tones else ""

@@ -239,8 +239,8 @@ def steps(found: Findings, diagnosis: Diagnosis, left: Left) -> tuple[str, ...]:
     if selection.chosen:
         said.append(
             f"Of what was slow in the residual, {percent(left.slow)} is left by "
-            f"{effect_names([suspect.name for suspect in selection.chosen])}; of what it "
-            f"remembered of itself, {percent(left.remembered)}."
+            f"{effect_names([suspect.name for suspect in selection.chosen])}; of its "
+            f"autocorrelation, {percent(left.remembered)}."
         )
     if found.fewest is not None:
         said.append(_named(len(found.fewest.fit.paths), len(bench.own.free), diagnosis.verdict))

@@ -282,7 +282,7 @@ def test_a_refit_alone_does_not_call_a_wrong_structure_right(case):
 def test_trials_that_do_not_hold_the_parameters_cannot_tell():
     found = diagnose(measured(STATION.replace(OFF), 3), STATION, propose=False)
     assert found.verdict == "undecidable"
-    assert "do not hold the parameters" in found.sentence
+    assert "do not determine the parameters" in found.sentence
     assert diagnose(measured(STATION.replace(OFF), 6), STATION, propose=False).verdict == (
         "parameters"
     )

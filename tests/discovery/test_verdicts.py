@@ -204,7 +204,7 @@ UNKNOWN = {
     "remembered": (
         Reason("remembered", 0.21, 0.1, ("hysteresis",), leaves=0.06),
         "the best, hysteresis, leaves 6 % of what is slow in the residual of these 3 trials, but "
-        "21 % of what it remembers of itself is left, where at most 10 % may be.",
+        "21 % of its autocorrelation is left, where at most 10 % may be.",
     ),
     "scatters between trials": (
         Reason("scatters", 0.34, 0.12, ("hysteresis",), leaves=0.01, of="hysteresis", by="trial"),
@@ -232,13 +232,13 @@ UNKNOWN = {
     "unexplained": (
         Reason("unexplained", 14.2, 6.0, nearest="creep", leaves=0.983, of="rotation_deg"),
         "none was worth adding (the likeliest, creep, would leave 98 % of chi-square), and the "
-        "residual of these 3 trials remembers itself in rotation of the pulley: by 14.2 standard "
-        "errors, where chance stays below 6.",
+        "residual of these 3 trials is autocorrelated in rotation of the pulley for longer than "
+        "noise: by 14.2 standard errors, where chance stays below 6.",
     ),
     "unexplained, nothing to try": (
         Reason("unexplained", 14.2, 6.0, of="load_n"),
-        "there was none to try, and the residual of these 3 trials remembers itself in load: by "
-        "14.2 standard errors, where chance stays below 6.",
+        "there was none to try, and the residual of these 3 trials is autocorrelated in load for "
+        "longer than noise: by 14.2 standard errors, where chance stays below 6.",
     ),
 }  # fmt: skip
 
@@ -247,7 +247,7 @@ UNKNOWN = {
 def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limit(reason, said):
     found = replace(diagnosed("hysteresis"), verdict="unknown", tones={"load_n": 12.5})
     head = "Something is missing in model lab that no effect of the catalogue carries: "
-    tone = " What is left of load rings at 12.5 Hz."
+    tone = " What is left of load oscillates at 12.5 Hz."
     assert sentence(found, reason) == head + said + tone
 
 

@@ -121,7 +121,7 @@ def _cut(
         pieces = gaps.pieces(each.trial, found)
         said = "; ".join(gap.words() for gap in found)
         left = {0: "nothing long enough is left", 1: "one piece is used"}.get(
-            len(pieces), f"{len(pieces)} pieces are used, each with a start of its own"
+            len(pieces), f"{len(pieces)} pieces are used"
         )
         messages.append((each.name, f"{said}: the trial is cut there; {left}"))
         cut = [_piece(each, piece) for piece in pieces]
@@ -162,8 +162,8 @@ def _started(
         start = with_start(plant, each.trial, wholes.get(each.name, each.trial), moving)
         if start is None:
             words.append(
-                f"{each.name} begins {moving}, and is too short to forget it: it is not used; "
-                "begin the log at rest, under its first commands"
+                f"{each.name} begins {moving}, and most of it depends on how it began: it is not "
+                "used; begin the log at rest, under its first commands"
             )
             continue
         words.append(f"{each.name} {start.words(float(each.trial.time[0]))}")

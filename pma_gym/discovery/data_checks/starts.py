@@ -2,7 +2,7 @@
 
 A trial is simulated from rest under its first commands. A log that was cut out of a longer one, or
 lies behind a gap, begins in motion: the simulation begins elsewhere and catches up only after a
-while, and what a rig remembers (hysteresis, creep) is another's. Such a trial is given a way there:
+while, and hysteresis and creep begin in another state. Such a trial is given a way there:
 commands that come from rest to its first ones, with their speed. Its readings count from when the
 way there no longer matters to the model.
 """
@@ -71,13 +71,13 @@ class Start:
     def words(self, begin: float) -> str:
         """What to say of a trial that begins at a time (s)."""
         led = (
-            ", commands that lead from rest to its first ones at their speed"
+            "commands that lead there from rest are put before it; "
             if self.trial.time[0] < begin
             else ""
         )
         return (
-            f"begins {self.moving}: it gets a start of its own{led}; its readings count from "
-            f"{self.counts_from - begin:.2g} s after its beginning, when the model has forgotten it"
+            f"begins {self.moving}: {led}its readings count from {self.counts_from - begin:.2g} s "
+            "after its beginning, when the simulation no longer depends on how it began"
         )
 
 
@@ -99,7 +99,7 @@ def moving_start(plant: Plant, trial: Trial) -> str:
     seen = [found for name in trial.measurements if (found := _first_speed(trial, name))]
     if not seen:
         return ""
-    # Contraction's speed is told where it is known, else the most certain one.
+    # Contraction's speed is named where it is known, else the most certain one.
     quantity, speed, _ = max(seen, key=lambda each: (each[0] == "contraction", each[2]))
     way = way_there(plant.model, trial, trial)
     if way is None:

@@ -64,7 +64,7 @@ def test_trials_that_begin_in_motion_get_a_start_of_their_own(tmp_path):
     assert len(found.checked) == 3
     for words, each in zip(found.checked, found.trials, strict=True):
         assert f"{each.name} begins at 0.0" in words
-        assert "m/s (contraction_mm), not at rest: it gets a start of its own" in words
+        assert "m/s (contraction_mm), not at rest: commands that lead there from rest" in words
         # It begins settled: no command moves in its first rows, nothing counts there.
         assert np.ptp(each.trial.commands["motor_voltage"][:20]) == 0.0
         assert np.isnan(each.trial.measurements["contraction"][:100]).all()
@@ -77,7 +77,7 @@ def test_a_piece_too_short_to_forget_its_beginning_is_named_and_left_out(tmp_pat
     columns = without(log(2.0, 300.0, 1, seconds=4.2), 2.0, 3.5)
     found = checked(write(tmp_path / "lab", [columns]))
     assert [each.name for each in found.trials] == ["trial0.csv"]
-    assert "too short to forget it: it is not used; begin the log at rest" in found.checked[-1]
+    assert "depends on how it began: it is not used; begin the log at rest" in found.checked[-1]
 
 
 def test_copies_are_used_once(tmp_path):
