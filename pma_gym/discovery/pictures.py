@@ -45,7 +45,7 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
             if max(shares) > _LOGARITHMIC:
                 _logarithmic(panel, [*values, gap.floor])
             else:
-                panel.set_ylim(0.0, 1.15 * max(*values, gap.floor))
+                panel.set_ylim(0.0, 1.3 * max(*values, gap.floor))
             panel.grid(visible=False, axis="x")
         line = Line2D([], [], label="noise of the measurement", **FLOOR)  # type: ignore[arg-type]
         legend_below(drawn, [line], 1)
@@ -83,7 +83,7 @@ def trials_picture(diagnosis: Diagnosis) -> bytes:
 def _logarithmic(panel: Axes, values: Sequence[float]) -> None:
     """Bars whose lengths count factors, from half the smallest value on."""
     smallest = min((value for value in values if value > 0.0), default=1.0)
-    low, high = 0.5 * smallest, 1.6 * max(*values, smallest)
+    low, high = 0.5 * smallest, 2.5 * max(*values, smallest)
     panel.set_yscale("log")
     panel.set_ylim(low, high)
     panel.set_yticks(*_plain_ticks(low, high))
