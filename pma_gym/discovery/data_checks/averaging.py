@@ -57,8 +57,9 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
         return list(named), []
     least, most = min(factors), max(factors)
     how = f"{most}" if least == most else f"{least} to {most}"
+    trials = f"the {len(named)} trials have" if len(named) > 1 else "the trial has"
     return kept, [
-        f"the {len(named)} trials have {total} rows: readings are averaged over {how} rows each, "
+        f"{trials} {total} rows: readings are averaged over {how} rows each, "
         f"which leaves {left}; commands are kept to 0.01 % of their range. What is faster "
         "than that is not looked for: cut the log to the part that matters if you need it"
     ]
