@@ -137,7 +137,7 @@ def scatter_of_repeats(
     squares, count = 0.0, 0
     for group in _repeats(logged, named):
         for i, j in zip(group, group[1:], strict=False):
-            apart = _difference(logged[i], logged[j], channel)
+            apart = difference(logged[i], logged[j], channel)
             free = OUTPUTS[channel] in FREE_ZEROS and apart.size > 1
             # A file that was copied is no repeat.
             if apart.size and np.any(apart):
@@ -157,7 +157,7 @@ def _repeats(logged: Sequence[Logged], named: Sequence[NamedTrial]) -> list[list
     return [group for group in groups.values() if len(group) > 1]
 
 
-def _difference(one: Logged, other: Logged, channel: int) -> Array:
+def difference(one: Logged, other: Logged, channel: int) -> Array:
     """What one repeat reads beyond another (SI), shape (n,); empty where their times differ."""
     shared = min(len(one.time), len(other.time))
     if not np.array_equal(one.time[:shared], other.time[:shared]):

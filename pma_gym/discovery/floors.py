@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.dataset import NamedTrial
+from pma_gym.discovery.acceptance_floors import difference
 from pma_gym.discovery.evidence import FREE_ZEROS
 from pma_gym.discovery.noise import (
     at_rest,
@@ -92,17 +93,8 @@ def _between_repeats(
     squares, count = 0.0, 0
     for group in groups.values():
         for i, j in zip(group, group[1:], strict=False):
-            apart = _difference(logged[i], logged[j], channel)
+            apart = difference(logged[i], logged[j], channel)
             if apart.size > centred:
                 squares += float(np.sum((apart - centred * apart.mean()) ** 2)) / 2.0
                 count += apart.size - centred
     return float(np.sqrt(squares / count)) if count else None
-
-
-def _difference(one: Logged, other: Logged, channel: int) -> Array:
-    """What one repeat reads beyond another (SI), shape (n,); empty where their times differ."""
-    shared = min(len(one.time), len(other.time))
-    if not np.array_equal(one.time[:shared], other.time[:shared]):
-        return np.empty(0)
-    both = _readings(other, channel)[:shared] - _readings(one, channel)[:shared]
-    return both[np.isfinite(both)]
