@@ -1,7 +1,5 @@
 """What is left of the signals in sentences: how many floors, and which log would decide."""
 
-from collections.abc import Iterable
-
 from pma_gym.discovery.acceptance_floors import ENOUGH, ERRORS, REPEATS, REST, TOLERANCE
 from pma_gym.discovery.adequacy import LEAST_BLOCKS, MOST_EXPLAINED, MOST_FLOORS, OPEN
 from pma_gym.discovery.diagnosis import Diagnosis, Judgement
@@ -27,7 +25,7 @@ def agreement(diagnosis: Diagnosis) -> str:
 
 
 def remainder(diagnosis: Diagnosis) -> str:
-    """What is left where a model agrees, with the most floors: the noise of the sensors."""
+    """What is left where a model agrees: the noise of the sensors, or what repeats differ by."""
     sources = list(dict.fromkeys(each.source for each in diagnosis.adequacy.values()))
     what = {
         REST: "the noise of the sensors",
@@ -101,8 +99,3 @@ def _longer(judged: Judgement) -> str:
         return f"log at least {LEAST_BLOCKS} s in all"
     times = (judged.bound / MOST_EXPLAINED) ** 2
     return f"log {figure(max(times, 2.0), 2)} times as long"
-
-
-def sources_said(judgements: Iterable[Judgement]) -> str:
-    """Where floors come from, in words."""
-    return listed(list(dict.fromkeys(FLOORS[each.source] for each in judgements if each.source)))

@@ -96,7 +96,9 @@ def refit(
 ) -> Diagnosis:
     """Refit a model's own parameters to measured trials, without looking for what it misses.
 
-    Arguments and errors as `diagnose`; the verdict is `parameters` or `agrees`.
+    Arguments and errors as `diagnose`. The verdict is `parameters` or `agrees` where the residual
+    of readings left out is noise, `unknown` where parameters alone do not explain the readings, and
+    `undecidable` where the trials cannot tell.
     """
     with linear_algebra_alone():
         return _Work(trials, model, seed, jobs, journal, progress, checks=checks).run(search=False)
