@@ -2,11 +2,11 @@
 
 The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
 two hundred data sets. It opens too where the residual itself is no noise: where it is many times as
-large (`far_off`), where it is autocorrelated beyond the noise (`excess`), or
-bursts (`bursts`) and an effect explains the bursts. What passes is fitted together with the model's parameters; the likeliest is taken; then
-the same again beside it. Each effect is then left out once: one that is not missed goes. Noise is
-learnt anew only when all effects are found: before, an autoregression would take the next effect
-for noise.
+large (`far_off`), where it is autocorrelated beyond the noise (`excess`), or bursts (`bursts`) and
+an effect explains the bursts. What passes is fitted together with the model's parameters; the
+likeliest is taken; then the same again beside it. Each effect is then left out once: one that is
+not missed goes. Noise is learnt anew only when all effects are found: before, an autoregression
+would take the next effect for noise.
 """
 
 from collections.abc import Callable, Sequence
