@@ -29,7 +29,7 @@ Run = Mapping[str, Any]
 _BLOCK = re.compile(
     r"(?P<start><!-- figures: (?P<name>\w+) -->\n).*?(?P<end><!-- end of figures -->)", re.DOTALL
 )
-_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse")
+_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
 
 
 class RunError(ValueError):
@@ -92,6 +92,7 @@ def replay(run: Run) -> str:
             cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
             rows.append([f"{name} ({UNITS[task]})", *cells])
     header = ["Simulated less measured", "slope (per s)", "intercept", "mean position", "RMSE"]
+    header += ["line part", "scatter"]
     return _table(header, rows, words=1)
 
 

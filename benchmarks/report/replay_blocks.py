@@ -9,6 +9,7 @@ from benchmarks.replay import (
     summarise,
     table_angle,
 )
+from benchmarks.report.score_parts import parts_explained, parts_table
 from benchmarks.report.tables import replay_table
 from benchmarks.results import Results
 from benchmarks.score import measured_score
@@ -37,7 +38,9 @@ def replay_blocks(results: Results) -> list[Block]:
     if displacement:
         blocks += [_against_simple_prediction(results, displacement)]
         blocks += [Paragraph(displacement_verdict(results, displacement))]
-    blocks += [replay_table(trials) for trials in errors.values()]
+    for (task, phase), trials in errors.items():
+        blocks += [replay_table(trials), parts_table(results, task, phase)]
+    blocks.append(parts_explained())
     held = errors.get(("rotation", "II"))
     if held:
         blocks += _hold_blocks(results, held)

@@ -21,6 +21,7 @@ from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.parameters import unit
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.documents import read_toml
+from pma_gym.plant.memory_start import memory_states
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import OUTPUTS, Plant
 from pma_gym.units import SI_FACTORS
@@ -44,16 +45,17 @@ def trial_states(
     for suspect in chosen:
         own |= suspect.own
     evidence = bench.evidence(fit.model, chosen)
-    begun = evidence.first_states(fit.values) if _begins_freely(fit.model) else None
+    starts = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
+    begun = evidence.first_states(fit.values) if starts else None
     found = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
             states = dict(zip(evidence.plant.states, begun[i].tolist(), strict=True))
             parameters |= {
-                path: states[state] / SI_FACTORS[unit(path)] for state, path in STARTS.items()
+                path: states[state] / SI_FACTORS[unit(path)] for state, path in starts.items()
             }
-        if begun is not None:
+        if _begins_freely(fit.model):
             parameters = _started(fit.model, bench.trials[i], parameters)
         held = simulated(fit.model, bench.trials[i], TrialState({}, parameters))
         found[name] = TrialState(_zeros(bench.trials[i], held), parameters)

@@ -21,7 +21,7 @@ from pma_gym.kernels.random import philox, uniform
 from pma_gym.kernels.substitute import substitute
 from pma_gym.plant.march import FUSED, memory
 from pma_gym.plant.program import FIRST_S, balanced
-from pma_gym.plant.system import static_force
+from pma_gym.plant.system import memories_at_start, static_force
 
 TARE_READINGS = 192
 """Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""
@@ -70,7 +70,8 @@ class BeginningWriter(BlockMemory):
         keys = self.circuit.slot("key_0"), self.circuit.slot("key_1")
         stream = self.circuit.slot("episode") * 4 + DRAW
         self.share = uniform(philox((nothing, stream, nothing, nothing), keys)[0])
-        return [self.force, *self.reach, *self.line]
+        self.memories = memories_at_start(eq)
+        return [self.force, *self.reach, *self.line, *self.memories.values()]
 
     def _begin(self) -> None:
         """Begin trials of environments, at rest wherever their states are not set already.
@@ -121,6 +122,7 @@ class BeginningWriter(BlockMemory):
         zero = balanced(b, self.eq, self.force, known, none, reach)
         found = {"zero": zero, "pressure": pressure}
         real = {name: found[what] for name, what in _AT_REST.items()}
+        real |= {name: known[value.id] for name, value in self.memories.items()}
         real |= {"zero_contraction": zero, "size": ir.Constant(DOUBLE, FIRST_S)}
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
         real |= self._asked_before(b, regulator)

@@ -20,7 +20,7 @@ from pma_gym.envs.engine_memory import EngineMemory
 from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.plant.settle import NoLoad
@@ -44,7 +44,7 @@ class Episodes(EngineMemory):
         pressures: Sequence[Pressure] | None,
     ) -> None:
         """Check the pressures that are asked for, then compile."""
-        self.task, self.told = task, told_model(task, load_model(options.model))
+        self.task, self.told = task, told_model(task, options.nominal)
         # The very same model where nothing is added: its plant is known by that.
         rig = rig_model(task, replace(options, model=self.told))
         nominal = Plant(rig, options.tolerance)

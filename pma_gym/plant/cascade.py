@@ -3,9 +3,11 @@
     x_in = map(V, P)                                   static map of table 18
     u' = (K_M / B_M) (x_in - u)                        servo, or with inertia Eq. 10
     y' = (u - y) K / B                                 muscle, tau = B / K at the pressure
-    x = F_ce / K - y                                   contraction
+    c' = (F_ce / K - c) K / B                          what it contracts with no load, by Eq. 16 too
+    x = c - y                                          contraction
 
-One-way: the muscle does not load the motor. With J = 0 and one pressure this is Eq. 22. The load
+One-way: the muscle does not load the motor. With J = 0 and one pressure, at which c stays F_ce / K,
+this is Eq. 22. The load
 cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
 """
 
@@ -49,12 +51,13 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 
-POSITIONS: dict[str, float] = {"extension": 0.003, "servo": 0.01}
+POSITIONS: dict[str, float] = {"extension": 0.003, "free_contraction": 0.003, "servo": 0.01}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
     "extension": 25e-3,
+    "free_contraction": 25e-3,
     "servo": 25e-3,
     "servo_rate": 1.0,
     "pressure": 500e3,
@@ -75,9 +78,11 @@ def write_equations(equations: Equations) -> None:
     eq.let("displacement_input", eq.one("position_map"))
     eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))
     no_load = trace(contractile_force, eq["pressure"], force) / eq["muscle_stiffness"]
-    eq.let("contraction", no_load - eq["extension"])
-    # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
-    eq.let("velocity", eq["extension"] - eq["servo"])
+    filling = no_load - eq["free_contraction"]
+    eq.let("contraction", eq["free_contraction"] - eq["extension"])
+    # Damping asks only for the sign: the muscle shortens where it has further to go than the motor
+    # holds it back.
+    eq.let("velocity", filling + (eq["extension"] - eq["servo"]))
     eq.let("resistance", eq.one("muscle_damping"))
     eq.outputs = {
         "contraction": eq["contraction"],
@@ -85,8 +90,9 @@ def write_equations(equations: Equations) -> None:
         "load": eq["muscle_stiffness"] * eq["extension"],
         "pressure": eq["pressure"],
     }
-    pull = eq["muscle_stiffness"] / eq["resistance"] * (eq["servo"] - eq["extension"])
-    eq.add_state("extension", pull, SCALES["extension"])
+    pace = eq["muscle_stiffness"] / eq["resistance"]
+    eq.add_state("extension", pace * (eq["servo"] - eq["extension"]), SCALES["extension"])
+    eq.add_state("free_contraction", pace * filling, SCALES["free_contraction"])
     _write_servo(eq)
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
     eq.add_memories(("regulator_delay",))

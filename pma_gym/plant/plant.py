@@ -10,6 +10,7 @@ import numpy as np
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors, settle
 from pma_gym.plant.attempt import first_size
+from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.program import FIRST_S, program, table, vector
 from pma_gym.plant.simulation import Run, simulate_all
@@ -117,7 +118,7 @@ class Plant:
         pressure: float | None = None,
         regulator_voltage: float | None = None,
     ) -> Condition:
-        """The plant at rest at constant commands, memories at zero.
+        """The plant at rest at constant commands, memories as the model says that trials begin.
 
         Args:
             motor_voltage: motor command (V).
@@ -243,6 +244,9 @@ class Plant:
     ) -> Trial:
         """Run a trial's commands and log what the station's sensors would.
 
+        It begins settled at its first commands, memories as the trial says or, where it says
+        nothing, as the model does.
+
         Args:
             trial: time and commands: motor_voltage or load_command, regulator_voltage or
                 pressure_command.
@@ -255,6 +259,9 @@ class Plant:
             ValueError: a command that is missing, or not given in the first row; a later empty cell
                 holds the value before it.
         """
+        begun = begun_at(self.model, trial.memory_at_start)
+        if begun != self.model:
+            return Plant(begun, self.tolerance).simulate(trial, noise, seed, joined)
         motor, regulator = sensors.voltages(self.model, trial)
         states, zero = self.run(trial.time, motor, regulator, joined)
         truth = self.observe(states, zero)
@@ -267,6 +274,7 @@ class Plant:
             measurements=measured,
             truth=truth,
             provenance=provenance,
+            memory_at_start=trial.memory_at_start,
         )
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.plant.model import Model
-from pma_gym.plant.rest_search import Search, effect_parameters
+from pma_gym.plant.rest_search import Search, effect_parameters, put_memories
 from pma_gym.plant.station_rest import balances, settle_station
 
 if TYPE_CHECKING:
@@ -22,8 +22,9 @@ def at_rest(
         motor_voltage: motor command (V).
         regulator_voltage: regulator command (V).
     Returns:
-        State vector (SI) with memories at zero, but for a load that has long arrived, and the
-        contraction x0 (m) that the muscle would have with no load at this pressure.
+        State vector (SI) with memories as the model says that trials begin, a load that has long
+        arrived, and the contraction x0 (m) that the muscle would have with no load at this
+        pressure.
     Raises:
         ValueError: no contraction within twice the limits balances the load.
     """
@@ -118,6 +119,7 @@ class NoLoad:
             states[:, i] = zero
         for i in self._pressures:
             states[:, i] = pressures
+        put_memories(self.plant, vectors, states)
         return states, zero
 
 
@@ -171,6 +173,8 @@ def _cascade(search: Search) -> None:
     plant = search.plant
     search.relax("servo", of="servo_rate" if "servo_rate" in search.names else "servo")
     search["extension"] = search["servo"]
+    # From below: the muscle's pace there is that of shortening all the way.
+    search.relax("free_contraction", about=-1.0)
     truth = np.empty((len(search.state), len(plant.outputs)))
     for i, (state, out) in enumerate(zip(search.state, truth, strict=True)):
         numbers = plant.vector if search.vectors is None else search.vectors[i]

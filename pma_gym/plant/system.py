@@ -59,11 +59,26 @@ def rates(eq: Equations) -> list[Value]:
     return found
 
 
+def memories_at_start(eq: Equations) -> dict[str, Value]:
+    """The memories that do not begin at 0, as values of the model's parameters, by state."""
+    return {
+        name: getattr(eq.parameters[effect.name], effect.memory_start)
+        for effect in eq.effects.values()
+        if effect.memory_start
+        for name in effect.memory_names
+    }
+
+
 def static_force(eq: Equations) -> Value:
-    """Force of the muscle on the slide at rest, without the cable, memories at zero."""
+    """Force of the muscle on the slide at rest, without the cable, memories as trials begin."""
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
-    memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
+    begun = memories_at_start(eq)
+    memories = {
+        entry.value.id: begun.get(entry.name, nothing)
+        for entry in eq.remembered
+        if "memory_" in entry.name
+    }
     here = at_rest(eq) | {eq["velocity"].id: nothing}
     (first,) = substitute([force], here)
     return substitute([first], memories | {eq["velocity"].id: nothing})[0]
