@@ -13,8 +13,8 @@ from benchmarks.training.stations import Stations
 from controllers.form import Form
 from controllers.pilot import Pilot
 from controllers.view import View
+from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAEnv
-from pma_gym.envs.observation import BOUND
 
 
 class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[Any], NDArray[Any]]):

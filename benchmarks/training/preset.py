@@ -17,8 +17,8 @@ from controllers.form import Form
 from controllers.pilot import base_of
 from controllers.view import View
 from pma_gym.documents import is_file, read_yaml
+from pma_gym.engine.options import parse_options, parse_task
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.envs.options import parse_options, parse_task
 
 PRESETS = Path(__file__).with_name("presets")
 """Folder of the presets."""
