@@ -65,6 +65,11 @@ class Reading(NamedTuple):
         return np.where(wound < self.gap_deg * DEG, 0.0, factor * wound)
 
 
+def reading(gain: float, gap_deg: float, slack: float) -> Reading:
+    """A reading by its gain on the true angle, its gap (deg) and the slack (m) taken up."""
+    return Reading(gain * CALIBRATED_DEG_PER_V, CALIBRATED_DEG_PER_V, gap_deg, slack)
+
+
 DECODED_DEG_PER_V = 64.0
 """5 V over the 320 deg of the part's travel (Serres 2008, 2.1.3: the potentiometer)."""
 

@@ -203,9 +203,7 @@ def rmse_from_regression(
     Returns:
         The RMSE (unit).
     """
-    return math.sqrt(
-        line.ss_error / line.n + _line_mean_square(line, ideal_slope, ideal_intercept)
-    )
+    return math.sqrt(line.ss_error / line.n + _line_mean_square(line, ideal_slope, ideal_intercept))
 
 
 def line_error(line: Regression, ideal_slope: float, ideal_intercept: float = 0.0) -> float:

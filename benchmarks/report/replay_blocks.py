@@ -9,6 +9,7 @@ from benchmarks.replay import (
     summarise,
     table_angle,
 )
+from benchmarks.report.reading_blocks import reading_blocks
 from benchmarks.report.score_parts import parts_explained, parts_table
 from benchmarks.report.tables import replay_table
 from benchmarks.results import Results
@@ -44,6 +45,7 @@ def replay_blocks(results: Results) -> list[Block]:
     held = errors.get(("rotation", "II"))
     if held:
         blocks += _hold_blocks(results, held)
+        blocks += reading_blocks(model)
     return blocks
 
 

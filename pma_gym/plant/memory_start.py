@@ -42,6 +42,19 @@ def memory_states(model: Model) -> dict[str, str]:
     }
 
 
+def memory_at_start(model: Model) -> float | None:
+    """Where a model's trials begin; None for a model that has nothing to begin with.
+
+    >>> from pma_gym.plant.model import load_model
+    >>> memory_at_start(load_model("serres2008")) is None
+    True
+    """
+    for name, effect in model.effects.items():
+        if effect.memory_start:
+            return float(getattr(model.parameters[name], effect.memory_start))
+    return None
+
+
 def begun_at(model: Model, memory_at_start: float | None) -> Model:
     """A model whose trials begin with their memories at a value.
 
