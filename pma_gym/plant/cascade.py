@@ -78,21 +78,22 @@ def write_equations(equations: Equations) -> None:
     eq.let("displacement_input", eq.one("position_map"))
     eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))
     no_load = trace(contractile_force, eq["pressure"], force) / eq["muscle_stiffness"]
-    filling = no_load - eq["free_contraction"]
     eq.let("contraction", eq["free_contraction"] - eq["extension"])
-    # Damping asks only for the sign: the muscle shortens where it has further to go than the motor
-    # holds it back.
-    eq.let("velocity", filling + (eq["extension"] - eq["servo"]))
+    # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
+    eq.let("velocity", eq["extension"] - eq["servo"])
     eq.let("resistance", eq.one("muscle_damping"))
+    # By its own direction: one sign for both would make either jump where the other turns.
+    filling = no_load - eq["free_contraction"]
+    filling_pace = eq["muscle_stiffness"] / eq.one("muscle_damping", velocity=filling)
     eq.outputs = {
         "contraction": eq["contraction"],
         "rotation": eq["servo"] / eq.parameters["servo"].radius,
         "load": eq["muscle_stiffness"] * eq["extension"],
         "pressure": eq["pressure"],
     }
-    pace = eq["muscle_stiffness"] / eq["resistance"]
-    eq.add_state("extension", pace * (eq["servo"] - eq["extension"]), SCALES["extension"])
-    eq.add_state("free_contraction", pace * filling, SCALES["free_contraction"])
+    pull = eq["muscle_stiffness"] / eq["resistance"] * (eq["servo"] - eq["extension"])
+    eq.add_state("extension", pull, SCALES["extension"])
+    eq.add_state("free_contraction", filling_pace * filling, SCALES["free_contraction"])
     _write_servo(eq)
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
     eq.add_memories(("regulator_delay",))

@@ -73,8 +73,9 @@ def test_line_part_and_scatter_make_up_every_printed_rmse(task):
     for phase in PHASES[task]:
         for pressure in pressures(task):
             score = measured_score(task, phase, pressure)
+            # Slopes, intercepts and RMSEs are rounded in print.
             whole = np.hypot(score.line_error, score.scatter)
-            assert whole == pytest.approx(score.rmse, abs=0.011)
+            assert whole == pytest.approx(score.rmse, abs=0.012)
 
 
 def test_line_part_and_scatter_are_what_their_names_say():
