@@ -51,7 +51,7 @@ test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrat
 LOWER = .lower-bounds
 LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
 LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
-    tests/controllers tests/envs
+    tests/controllers tests/engine tests/envs tests/sb3
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
 LOWER_TESTS += --ignore=tests/sb3/test_threads.py
 
