@@ -50,7 +50,7 @@ test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrat
 # Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
 LOWER = .lower-bounds
 LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
-LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
+LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen tests/integrator tests/plant tests/estimation \
     tests/controllers tests/envs
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
 LOWER_TESTS += --ignore=tests/envs/test_sb3_threads.py

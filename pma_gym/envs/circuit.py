@@ -7,19 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
+from pma_gym.codegen.random import normals, philox
+from pma_gym.codegen.substitute import substitute
 from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.envs.exercised import Exercised, held_volts
 from pma_gym.envs.observation import BOUND, ObservationTable, Prescribed, heard_position
 from pma_gym.envs.record import NOISE, OPERATOR, PARTS, START, TRUTH, Record
 from pma_gym.envs.scoring import position_of
-from pma_gym.kernels.generic import to_real, where
-from pma_gym.kernels.graph import CHANGING, HELD, Graph, Value
-from pma_gym.kernels.random import normals, philox
-from pma_gym.kernels.substitute import substitute
+from pma_gym.integrator.equations import COMMANDS, ZERO, Equations
+from pma_gym.integrator.step_attempt import first_size
+from pma_gym.integrator.system import at_rest
 from pma_gym.plant import sensors
-from pma_gym.plant.attempt import first_size
-from pma_gym.plant.compose import COMMANDS, ZERO, Equations
-from pma_gym.plant.system import at_rest
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 

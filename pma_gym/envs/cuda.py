@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.machine.cuda_driver import Arguments, Function, GpuError, driver, gpu
 from pma_gym.envs.cuda_kernel import ARGUMENTS, THREADS, CudaKernel, Name
 from pma_gym.envs.device import DeviceEngine
 from pma_gym.envs.options import Options
-from pma_gym.kernels.driver import Arguments, Function, GpuError, driver, gpu
 from pma_gym.tasks import Task
 
 

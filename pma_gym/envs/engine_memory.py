@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.machine.native import simd_lanes
 from pma_gym.envs.block_memory import ARGUMENTS, BEFORE
 from pma_gym.envs.kernel import Kernel
 from pma_gym.envs.observation import ObservationTable
 from pma_gym.envs.options import Options
 from pma_gym.envs.record import Record
-from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Task

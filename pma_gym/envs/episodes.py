@@ -20,10 +20,10 @@ from pma_gym.envs.engine_memory import EngineMemory
 from pma_gym.envs.operators import check_prescription, operators, wound_back
 from pma_gym.envs.options import Options, Pressure, motor_at_rest, rig_model, told_model
 from pma_gym.envs.record import START
+from pma_gym.plant.equilibrium.settling import NoLoad
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import FIRST_S, vector
-from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
 
 FIRST, LAST, SETTLES = (ARGUMENTS.index(name) for name in ("first", "last", "settles"))

@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import Value
 from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.envs.observation import Prescribed
 from pma_gym.envs.record import GUARDED, NOISE, plan_of_places
-from pma_gym.kernels.generic import to_real, where
-from pma_gym.kernels.graph import Value
 from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
 from pma_gym.tasks.guard import MOMENT_FILTER_S, SPEED_FILTER_S, let_through
 from pma_gym.tasks.human import FORESIGHT_S, moved, unsteady

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
+from pma_gym.codegen.machine import cuda_driver
+from pma_gym.codegen.machine.control import INTEGER, function
+from pma_gym.codegen.machine.native import Library
 from pma_gym.envs import cuda
 from pma_gym.envs.cuda_kernel import CudaKernel, shared_job
 from pma_gym.envs.device import DeviceEngine
 from pma_gym.envs.engine import Engine
 from pma_gym.envs.options import Options
 from pma_gym.envs.stand_in import StandIn
-from pma_gym.kernels import driver
-from pma_gym.kernels.control import INTEGER, function
-from pma_gym.kernels.native import Library
 from pma_gym.tasks import TASKS
 
 EVERYTHING = {
@@ -233,11 +233,11 @@ def test_without_torch_or_gpu_a_sentence_says_what_to_do(monkeypatch):
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr(cuda.importlib, "import_module", missing)
-    with pytest.raises(driver.GpuError, match="pip install torch"):
+    with pytest.raises(cuda_driver.GpuError, match="pip install torch"):
         cuda.CudaEngine(TASKS["displacement"], Options(), 4)
     monkeypatch.setattr(cuda.importlib, "import_module", lambda name: None)
-    monkeypatch.setattr(driver, "_ELSEWHERE", ("libnothing.so.0",))
-    monkeypatch.setattr(driver, "_LIBRARIES", {})
-    driver.driver.cache_clear()
-    with pytest.raises(driver.GpuError, match=r"libnothing.so.0 is not found.*gym.make_vec"):
+    monkeypatch.setattr(cuda_driver, "_ELSEWHERE", ("libnothing.so.0",))
+    monkeypatch.setattr(cuda_driver, "_LIBRARIES", {})
+    cuda_driver.driver.cache_clear()
+    with pytest.raises(cuda_driver.GpuError, match=r"libnothing.so.0 is not found.*gym.make_vec"):
         cuda.torch_with_gpu()
