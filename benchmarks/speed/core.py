@@ -31,7 +31,7 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.native import compiled, simd_lanes
 from pma_gym.codegen.machine.simd import Lanes
-from pma_gym.envs.kernel_writer import Writer
+from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.integrator.integration import FUSED, memory
 
 CHAINS = 12

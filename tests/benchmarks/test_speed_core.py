@@ -9,7 +9,7 @@ from benchmarks.speed.views import views
 from pma_gym.codegen.graph import CHANGING
 from pma_gym.codegen.machine.native import simd_lanes
 from pma_gym.codegen.trace import order
-from pma_gym.envs.kernel_writer import Writer
+from pma_gym.engine.cpu.step_writer import Writer
 
 
 def row(key, per_second, facts=None, right_hand_sides=None):
