@@ -5,7 +5,7 @@ import pytest
 
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.plant.fitting import fit
+from pma_gym.estimation.fitting import fit
 from pma_gym.plant.memory_start import begun_at, best_shares, memory_starts
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
