@@ -25,6 +25,7 @@ from benchmarks.replay import all_replay_errors
 from benchmarks.report.blocks import report_blocks, report_pictures
 from benchmarks.report.summary import print_failures, print_summary
 from benchmarks.results import Results, csv_text, json_text
+from benchmarks.rotation_reading import entries
 from benchmarks.suite import Suite
 from benchmarks.targets import check_targets
 from pma_gym.pages.document import to_html, to_markdown
@@ -150,7 +151,12 @@ def _write_results(results: Results, out: Path, began: float) -> Results:
         for error in errors
     ]
     targets = [asdict(check) | {"verdict": check.verdict} for check in checks]
-    texts["scores.json"] = json_text(results, targets=targets, replay_errors=replay)
+    texts["scores.json"] = json_text(
+        results,
+        targets=targets,
+        replay_errors=replay,
+        rotation_reading=entries(results.suite.models[0]) if replay else [],
+    )
     # All is computed before anything is replaced, so that no folder mixes two runs.
     shutil.rmtree(out / PLOTS, ignore_errors=True)
     for name, image in pictures.items():

@@ -157,3 +157,25 @@ def mean_absolute_error(trials: list[ReadTrial], read: bool, figure: str = "rmse
         for each in trials
         for phase, score in each.measured.items()
     )
+
+
+def entries(model: str) -> list[dict[str, object]]:
+    """RMSE (deg) of every rotation trial and phase on a model, for files; none for no station.
+
+    Args:
+        model: a shipped name, or a TOML file.
+    """
+    plant = Plant(model)
+    if plant.model.plant != "station":
+        return []
+    return [
+        {
+            "pressure_kpa": each.pressure_kpa,
+            "phase": phase,
+            "measured": score.rmse,
+            "plain": each.plain[phase].rmse,
+            "read": each.read[phase].rmse,
+        }
+        for each in read_trials(plant)
+        for phase, score in each.measured.items()
+    ]
