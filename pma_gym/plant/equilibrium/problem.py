@@ -124,7 +124,7 @@ class EquilibriumProblem:
         return self.parameters("slide")["mass"] * self.rate("velocity", zero=contraction)
 
 
-def put_memories(plant: "CompiledModel", vectors: np.ndarray | None, state: np.ndarray) -> None:
+def put_memories(plant: CompiledModel, vectors: np.ndarray | None, state: np.ndarray) -> None:
     """Put memories where trials begin into states, shape (n, states); the others stay as they are.
 
     Args:
