@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks import tune
-from benchmarks.tune import TuneError, gains_from, run_tune
+from benchmarks.runner.worker import ProcessDied
+from benchmarks.tuning import tune
 from benchmarks.tuning.cost import UNSTABLE_COST, Cost, scaled_model
+from benchmarks.tuning.finished_rows import KeptRows
 from benchmarks.tuning.job import Job
-from benchmarks.tuning.kept import KeptRows
 from benchmarks.tuning.loop import Loop, lambda_tuning
-from benchmarks.worker import ProcessDied
+from benchmarks.tuning.tune import TuneError, gains_from, run_tune
 from controllers.gains import GAINS_FILE, Gains, scheduled_gains
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import load_model
