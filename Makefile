@@ -53,7 +53,7 @@ LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
 LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
     tests/controllers tests/envs
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
-LOWER_TESTS += --ignore=tests/envs/test_sb3_threads.py
+LOWER_TESTS += --ignore=tests/sb3/test_threads.py
 
 test-lower-bounds: ## Install every lower bound of pyproject.toml into .lower-bounds/ and run tests.
 	"$(PYTHON)" -m venv "$(LOWER)"

@@ -11,8 +11,8 @@ from benchmarks.runner.figures import figures
 from benchmarks.runner.isolated_controller import Isolated, driver
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import Entry, Episode, FrozenSuite, frozen_suite
+from pma_gym.engine.options import told_model
 from pma_gym.envs import PMAEnv
-from pma_gym.envs.options import told_model
 from pma_gym.plant.model import Model
 
 Row = dict[str, Any]

@@ -16,7 +16,7 @@ SOURCES = (
     "pma_gym/**/*.toml",
     "pma_gym/**/*.csv",
     "controllers/**/*.py",
-    "controllers/*.json",
+    "controllers/design/*.json",
     "benchmarks/runner/rollout.py",
     "benchmarks/runner/controller_spec.py",
     "benchmarks/suites/reproduction.py",

@@ -18,7 +18,7 @@ from llvmlite import ir
 
 from benchmarks.speed.loops import Prepared
 from benchmarks.speed.rows import DISPLACEMENT
-from pma_gym.envs.kernel_writer import Writer
+from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.kernels.control import (
     DOUBLE,
     INTEGER,

@@ -9,7 +9,7 @@ from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.recipe import Recipe
 from benchmarks.suites.reproduction import SuiteError
 from benchmarks.suites.stations import draw_station
-from pma_gym.envs.options import told_model
+from pma_gym.engine.options import told_model
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EXERCISES
 

@@ -14,7 +14,7 @@ It is an achieved figure: the optimum lies at or below it. Nothing that has to m
 predict can be expected there.
 
 Source:
-    Levenberg-Marquardt; the lifted form of a trial as `controllers.lifted`.
+    Levenberg-Marquardt; the lifted form of a trial as `controllers.models.lifted_model`.
 """
 
 import math
@@ -26,8 +26,8 @@ from scipy.linalg import solve
 from scipy.signal import lfilter
 
 from benchmarks.exercise.lag.rehearsal import RATE_HZ, Course, Exertion, Rehearsals
-from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.operators import ANGLES
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.reset.operators import ANGLES
 from pma_gym.plant.exercise import own_device
 from pma_gym.plant.prescription import follow_from
 from pma_gym.tasks import PACE

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.options import told_model
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.options import told_model
 from pma_gym.plant.exercise import own_device, resistive_moment
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import Model

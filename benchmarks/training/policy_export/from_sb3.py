@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium import spaces
 
 from benchmarks.training.policy_export.agreement import ExportError, check_agreement
-from controllers.form import Form
-from controllers.network import Layer, Scaling, Weights
-from controllers.policy_file import PolicyFile
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.network import Layer, Scaling, Weights
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import PolicyFile
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm
@@ -23,6 +23,8 @@ ONLY = "only an MlpPolicy of PPO, SAC, TD3 or TQC can be exported"
 
 OUTPUTS = {
     "stable_baselines3.common.policies.ActorCriticPolicy": "clip",
+    "pma_gym.sb3.policy.LeanMlpPolicy": "clip",
+    # By its module's name before version 0.1.0.
     "pma_gym.envs.sb3_policy.LeanMlpPolicy": "clip",
     "stable_baselines3.sac.policies.SACPolicy": "tanh",
     "stable_baselines3.td3.policies.TD3Policy": "tanh",

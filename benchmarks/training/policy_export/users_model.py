@@ -11,10 +11,10 @@ import gymnasium as gym
 
 from benchmarks.training.policy_export.from_sb3 import ExportError, policy_from_sb3
 from benchmarks.training.policy_export.onnx_file import onnx_bytes
-from controllers.designs import task_kind
-from controllers.form import MIDDLE_V, Form
-from controllers.policy_file import PolicyFile, policy_pair, save_policy_file
-from controllers.view import View
+from controllers.design.designs import task_kind
+from controllers.policies.action_mapping import MIDDLE_V, Form
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import PolicyFile, policy_pair, save_policy_file
 from pma_gym.documents import parse_json
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
 from pma_gym.files import check_output, replace_file
@@ -28,8 +28,13 @@ ALGORITHMS = {
 }
 """Where each algorithm's class is."""
 
-ACTOR_CRITIC = ("stable_baselines3.common.policies", "pma_gym.envs.sb3_policy")
-"""Where policies are that PPO shares with A2C; only PPO has a `clip_range`."""
+ACTOR_CRITIC = (
+    "stable_baselines3.common.policies",
+    "pma_gym.sb3.policy",
+    "pma_gym.envs.sb3_policy",
+)
+"""Where policies are that PPO shares with A2C, this package's by its old name too; only PPO has a
+`clip_range`."""
 
 UNREADABLE = (
     zipfile.BadZipFile,

@@ -11,7 +11,7 @@ from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.provenance import RUN, check_run, finished_rows, read_run
 from benchmarks.suites.reproduction import SuiteError
 from benchmarks.tuning.finished_rows import KeptRows
-from controllers.gains import Gains
+from controllers.design.gains import Gains
 from tests.benchmarks.hidden_effects.cheap_diagnosis import by_size
 from tests.fuzz.test_fuzz_documents import ROW
 

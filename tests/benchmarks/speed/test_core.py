@@ -6,7 +6,7 @@ import pytest
 from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted
 from benchmarks.speed.report.tables import views
 from benchmarks.speed.rows import CORE, EVALUATIONS
-from pma_gym.envs.kernel_writer import Writer
+from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.kernels.graph import CHANGING
 from pma_gym.kernels.native import simd_lanes
 from pma_gym.kernels.trace import order

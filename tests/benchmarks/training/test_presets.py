@@ -26,7 +26,7 @@ from benchmarks.training.job import ordered
 from benchmarks.training.learner import learner
 from benchmarks.training.policy_env import PilotedEnv
 from benchmarks.training.policy_export.product import station_of
-from controllers.view import View
+from controllers.policies.observation_spec import View
 from pma_gym.envs import ENVIRONMENTS
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
