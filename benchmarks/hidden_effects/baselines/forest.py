@@ -26,7 +26,7 @@ from benchmarks.hidden_effects.baselines.signatures import signature
 from benchmarks.hidden_effects.generation.cases import draw_case
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import case_name, write_case
-from pma_gym.data.dataset import Dataset, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import replace_file
 
 Array = NDArray[np.float64]

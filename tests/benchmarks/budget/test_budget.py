@@ -17,7 +17,7 @@ from benchmarks.budget.tables import alone_rows, share_rows, waterfall_rows
 from benchmarks.budget.trial import Budget, trial_budget
 from benchmarks.runner.rollout import make_environment, rollout
 from controllers import SerresFeedforward
-from pma_gym.effects.hysteresis import hysteresis_force
+from pma_gym.effects.muscle.hysteresis import hysteresis_force
 from pma_gym.envs import Reading, Station
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import load_model
@@ -195,7 +195,7 @@ def test_command_writes_tables_and_pictures(tmp_path, monkeypatch):
     [("as causes", waterfall_rows), ("one thing alone", alone_rows), ("share of", share_rows)],
 )
 def test_the_documentation_has_the_commands_figures(budgets, task, words, make):
-    page = (Path(__file__).parents[2] / "docs" / "error-budget.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "error-budget.md").read_text(encoding="utf-8")
     (table,) = (
         [[cell.strip() for cell in line.strip("|\n").split("|")] for line in lines.splitlines()]
         for title, lines in re.findall(r"\*\*(.+?)\*\*\n\n((?:\|.*\n)+)", page)

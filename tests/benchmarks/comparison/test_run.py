@@ -25,7 +25,7 @@ from benchmarks.runner.provenance import finished_rows, read_run
 from benchmarks.runner.worker import ProcessDied
 from benchmarks.suites.frozen import frozen_suite
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 SUITE = """
 schema = 2

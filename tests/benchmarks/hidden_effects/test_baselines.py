@@ -24,7 +24,7 @@ from benchmarks.hidden_effects.baselines.signatures import signature
 from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation import files
 from benchmarks.hidden_effects.generation.cases import draw_case
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import bursts, leftovers, selection, workflow
 from pma_gym.discovery.fits import Bench
 from pma_gym.discovery.noise import white_noise

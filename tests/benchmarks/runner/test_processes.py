@@ -18,7 +18,7 @@ from benchmarks.runner.processes import run_all
 from benchmarks.runner.worker import ProcessDied
 from benchmarks.suites.reproduction import load_suite
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 DEADLY = """
 import os

@@ -19,7 +19,7 @@ from benchmarks.suites.reproduction import load_suite
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 MODEL = "serres2008"
 
 

@@ -20,7 +20,7 @@ from benchmarks.speed.report.ratios import (
 from benchmarks.speed.report.tables import rate, three
 from benchmarks.speed.rows import all_rows, matches, select
 
-WORKERS = Path(__file__).parents[2] / "benchmarks" / "speed" / "workers"
+WORKERS = Path(__file__).parents[3] / "benchmarks" / "speed" / "workers"
 
 
 def rows_of(rates):

@@ -20,7 +20,7 @@ from benchmarks.speed.measure import Measurement, Plan
 from benchmarks.speed.report.tables import views
 from benchmarks.speed.rows import Row, all_rows, select
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 class StandIn:
