@@ -14,7 +14,7 @@ from controllers.models.nominal_motion import nominal_motion
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
 from pma_gym.envs import Reading, Station
-from pma_gym.plant.plant import regulator_voltage
+from pma_gym.plant.compiled_model import regulator_voltage
 
 
 class Settings(NamedTuple):

@@ -17,8 +17,9 @@ import numpy as np
 
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import Station
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.linear import FOLLOWING
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 
 VOLTAGE_LIMIT = 10.0
 """Largest voltage of motor and regulator (V)."""
