@@ -32,7 +32,8 @@ class ConstantPressure:
         pressure: the one that is held (Pa).
 
     Source:
-        Serres 2008, section 6.3, as `pma_gym.plant.exercise` has it; the nearest one is our own.
+        Serres 2008, section 6.3, as `pma_gym.plant.exercise_device.device` has it; the nearest
+        one is our own.
     """
 
     name = "constant_pressure"

@@ -1,26 +1,22 @@
 """Open loop in the moment: one pressure, or the pressure that a prescription needs at an angle."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, exercise_of, volts_of
 from pma_gym.envs import Reading, Station
-from pma_gym.plant.exercise import own_device
-from pma_gym.plant.prescription import follow_from
-
-if TYPE_CHECKING:
-    pass
+from pma_gym.plant.exercise_device.device import own_device
+from pma_gym.plant.exercise_device.prescription import follow_from
 
 
 class ScheduledPressure:
     """The pressure at which the nominal device gives the prescribed moment at the measured angle.
 
-    Found before the trial every 5 deg (`pma_gym.plant.prescription.follow_from`) and linear in
-    between. Damping, hysteresis and whatever the station differs in are left to themselves, and so
-    is an exercise of one speed: there the operator expects what the device gives at the trial's
-    first pressure, which is all that a schedule over the angle could give him.
+    Found before the trial every 5 deg
+    (`pma_gym.plant.exercise_device.prescription.follow_from`) and linear in between. Damping,
+    hysteresis and whatever the station differs in are left to themselves, and so is an exercise of
+    one speed: there the operator expects what the device gives at the trial's first pressure, which
+    is all that a schedule over the angle could give him.
     """
 
     name = "scheduled_pressure"

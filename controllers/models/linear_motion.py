@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import Station
-from pma_gym.envs.options import motor_at_rest
 from pma_gym.plant.linear import FOLLOWING
 from pma_gym.plant.plant import OUTPUTS, Plant
 

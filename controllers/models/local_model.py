@@ -24,9 +24,9 @@ import numpy as np
 from scipy.linalg import expm
 
 from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.plant.equilibrium.settling import all_at_rest
 from pma_gym.plant.linear import linearize_at
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.settle import all_at_rest
 
 if TYPE_CHECKING:
     import control
