@@ -15,7 +15,7 @@ from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
 from pma_gym.envs import Reading, Station
-from pma_gym.plant.plant import regulator_voltage
+from pma_gym.plant.compiled_model import regulator_voltage
 
 
 class Settings(NamedTuple):
