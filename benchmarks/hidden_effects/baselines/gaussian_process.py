@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.hidden_effects.baselines.preparation import answer, moved, prepare
 from benchmarks.hidden_effects.baselines.signatures import courses, means, ticks, within
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

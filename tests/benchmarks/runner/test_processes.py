@@ -17,6 +17,7 @@ from benchmarks.runner.controller_spec import Contender
 from benchmarks.runner.processes import run_all
 from benchmarks.runner.worker import ProcessDied
 from benchmarks.suites.reproduction import load_suite
+from tests.benchmarks.pieces import awkward, dies_once, exits, kills_itself, raises
 
 ROOT = Path(__file__).parents[3]
 
@@ -48,36 +49,6 @@ if __name__ == "__main__":
     works = [partial(sleeper, folder, index) for index in range(4)]
     print(run_all(works, 2, lambda index, result: print("done", index, flush=True)), flush=True)
 """
-
-
-class Awkward(Exception):
-    """An exception that no other process can make again."""
-
-    def __init__(self, one, two):
-        super().__init__(f"{one} {two}")
-
-
-def exits(code):
-    os._exit(code)
-
-
-def kills_itself():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def dies_once(marker):
-    if not marker.exists():
-        marker.touch()
-        os._exit(1)
-    return "alive"
-
-
-def raises(error):
-    raise error
-
-
-def awkward():
-    raise Awkward("one", "two")
 
 
 def run(works, jobs=2):
