@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from benchmarks.rotation_reading import reading
-from benchmarks.score import PHASES, measured_score
+from benchmarks.reproduction.rotation_reading import reading
+from benchmarks.reproduction.score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.evidence import Evidence

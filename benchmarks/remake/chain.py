@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.comparison.fingerprint import ROOT
-from benchmarks.comparison.suite import frozen_suite, suite_names
-from benchmarks.design import designable
 from benchmarks.remake.versions import model_digest
+from benchmarks.runner.fingerprint import ROOT
+from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.tuning.design import designable
 
 MODEL = Path("pma_gym/models/station.toml")
 GAINS = Path("controllers/design/gains.json")

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from statistics import fmean
 
-from benchmarks.comparison.fingerprint import ROOT
-from benchmarks.comparison.suite import suite_names
+from benchmarks.runner.fingerprint import ROOT
+from benchmarks.suites.frozen import suite_names
 from pma_gym.plant.model import ModelError, load_model
 
 Figures = dict[str, float]

@@ -8,11 +8,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.comparison.fingerprint import ROOT
-from benchmarks.damaged import UNREADABLE, reason, say_damaged
 from benchmarks.files import RESULTS, write_text
 from benchmarks.remake.chain import Step, command_line
 from benchmarks.remake.figures import Figures, compared, figures
+from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
+from benchmarks.runner.fingerprint import ROOT
 
 FOLDER = RESULTS / "remake"
 DONE, BEFORE, TABLE = "done.json", "before.json", "figures.txt"

@@ -8,8 +8,8 @@ import hashlib
 import re
 from pathlib import Path
 
-from benchmarks.comparison.fingerprint import ROOT
 from benchmarks.files import write_text
+from benchmarks.runner.fingerprint import ROOT
 from pma_gym.plant.model import load_model
 
 SUITES = ROOT / "benchmarks" / "suites"
