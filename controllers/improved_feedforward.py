@@ -4,7 +4,7 @@ from controllers.controller import Reference
 from controllers.models.inverse import VOLTAGE_LIMIT
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.serres import SerresFeedforward, SerresReplay
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 __all__ = ["ImprovedFeedforward", "SerresFeedforward", "SerresReplay"]
 
@@ -29,11 +29,11 @@ class ImprovedFeedforward:
     def __init__(self) -> None:
         self._motion: NominalMotion | None = None
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute the voltages of the whole trial, or take them as computed before."""
         self._motion = nominal_motion(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) to send now, for it is in force the action delay later."""
         assert self._motion is not None, "reset comes first"
         return min(max(self._motion.command(time), 0.0), VOLTAGE_LIMIT)

@@ -13,7 +13,7 @@ from controllers.models.model_key import Nominal
 from controllers.models.nominal_motion import nominal_motion
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.plant import regulator_voltage
 
 
@@ -95,7 +95,7 @@ class PreviewMPC:
         >>> controller.reset(env.reference, env.station)
         >>> ended = False
         >>> while not ended:
-        ...     *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        ...     *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
         >>> info["rmse_mm"] < 0.05
         True
     """
@@ -105,7 +105,7 @@ class PreviewMPC:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Foresee the trial: the nominal motion, the filters' gains, how voltages act.
 
         Raises:
@@ -127,9 +127,9 @@ class PreviewMPC:
         self._effort = self.settings.effort * changes.T @ changes
         self._entries = np.tril_indices(trial.horizon)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage of the task's actuator (V) to hold for the next control period."""
-        self._bank.see(observation, self._sent)
+        self._bank.see(measurement, self._sent)
         volts = self._volts(round(time / self._period) + self._delay)
         self._sent.append(volts)
         return volts
@@ -171,7 +171,7 @@ class PreviewMPC:
 class _Trial:
     """What a design depends on, equal to every other of which it is the same."""
 
-    def __init__(self, reference: Reference, station: Station, settings: Settings) -> None:
+    def __init__(self, reference: Reference, station: StationInfo, settings: Settings) -> None:
         self.station, self.settings, task = station, settings, station.task
         self.needed = nominal_motion(reference, station).volts
         times = station.period * np.arange(len(self.needed) + 1)

@@ -8,7 +8,7 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.design.designs import must_give_a_position
 from pma_gym.data.serres2008 import load_table, pressures
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
 from pma_gym.tasks import TASKS
 
@@ -52,7 +52,7 @@ class VoltageTable:
         at = int(np.searchsorted(self.times, time + 1e-9, side="right")) - 1
         return float(self.volts[max(at, 0)])
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Motor voltage (V) in the middle of the period for which it is held.
 
         The mean of a line over a period is its value in the middle, so the replay does not lag
@@ -73,7 +73,7 @@ class SerresReplay(VoltageTable):
 
     name = "serres_replay"
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Look up the profile of the trial.
 
         Raises:
@@ -127,7 +127,7 @@ class SerresFeedforward(VoltageTable):
 
     name = "serres_feedforward"
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute the profile.
 
         Raises:

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, PRESSURES, Resistance, exercise_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.exercise import own_device
 from pma_gym.plant.prescription import follow_from
 
@@ -36,7 +36,7 @@ class ConstantPressure:
     name = "constant_pressure"
     kinds = ("isokinetic", "moment")
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Find the pressure.
 
         Raises:
@@ -47,7 +47,7 @@ class ConstantPressure:
         prescribed = exercise.prescription is not None
         self.pressure = nearest_pressure(station, exercise) if prescribed else station.pressure
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
         share = min(time / CHANGE_S, 1.0)
         return self._volts(self._first + share * (self.pressure - self._first))
@@ -65,7 +65,7 @@ class ScheduledPressure:
     name = "scheduled_pressure"
     kinds = ("moment",)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Find the pressures.
 
         Raises:
@@ -74,12 +74,12 @@ class ScheduledPressure:
         exercise_of(self.name, station, prescribed=True)
         self._volts, self._schedule = volts_of(station), schedule(station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        return self._volts(float(np.interp(observation.rotation, ANGLES, self._schedule)))
+        return self._volts(float(np.interp(measurement.rotation, ANGLES, self._schedule)))
 
 
-def nearest_pressure(station: Station, exercise: "Exercise") -> float:
+def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:
     """Pressure (Pa) whose moments miss a prescription least over 0-90 deg, in the mean square."""
     assert exercise.prescription is not None
     wanted = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])
@@ -90,7 +90,7 @@ def nearest_pressure(station: Station, exercise: "Exercise") -> float:
     return float(fine[np.argmin(missed)])
 
 
-def schedule(station: Station) -> np.ndarray:
+def schedule(station: StationInfo) -> np.ndarray:
     """Pressures (Pa) over `ANGLES` that give the prescribed moments, shape (angles,).
 
     Raises:

@@ -18,7 +18,7 @@ from controllers.policies.observation_spec import (
     steps_of,
 )
 from controllers.policies.scales import scales_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 DIVERGED = (
     "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
@@ -42,7 +42,7 @@ class Pilot:
         self.view, self.form = view, form
         self.base = base_of(form) if base is None and form.base else base
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Raises:
@@ -64,11 +64,11 @@ class Pilot:
             self._actions = deque([0.0] * self.view.history, maxlen=self.view.history)
         else:
             self._table = self.view.table(station)
-            self._readings: deque[Reading] = deque(maxlen=self.view.history + 1)
+            self._readings: deque[Measurement] = deque(maxlen=self.view.history + 1)
         if self.base is not None:
             self.base.reset(reference, station)
 
-    def see(self, reading: Reading, time: float) -> NDArray[np.float32]:
+    def see(self, reading: Measurement, time: float) -> NDArray[np.float32]:
         """The entries of a control step, shape (entries,).
 
         Args:
@@ -99,7 +99,7 @@ class Pilot:
             entries.append(self._voltage - self._before)
         return clipped(entries)
 
-    def _environment(self, reading: Reading, step: int) -> NDArray[np.float32]:
+    def _environment(self, reading: Measurement, step: int) -> NDArray[np.float32]:
         self._readings.appendleft(reading)
         action = self._before / MIDDLE_V - 1.0
         return clipped(
@@ -126,12 +126,12 @@ class Pilot:
         return self._before
 
 
-def _no_number(reading: Reading, time: float) -> str:
+def _no_number(reading: Measurement, time: float) -> str:
     bad = [f"{k} is {v}" for k, v in reading._asdict().items() if not math.isfinite(v)]
     return f"every reading must be a number, at {time:g} s {', '.join(bad)}; check the sensor"
 
 
-def rest_voltage(station: Station) -> float:
+def rest_voltage(station: StationInfo) -> float:
     """Voltage of the task's actuator at rest (V): no pull, or what holds the pressure."""
     return 0.0 if station.task.actuator == "motor" else nominal_offset(station)
 
