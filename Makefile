@@ -50,8 +50,8 @@ test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrat
 # Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
 LOWER = .lower-bounds
 LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
-LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
-    tests/controllers tests/envs
+LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen \
+    tests/integrator tests/plant tests/estimation tests/controllers tests/engine tests/envs tests/sb3
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
 LOWER_TESTS += --ignore=tests/sb3/test_threads.py
 

@@ -5,7 +5,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.stiffness import spring_stiffness
+from pma_gym.effects.muscle.stiffness import spring_stiffness
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Condition, Plant
 

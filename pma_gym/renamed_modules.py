@@ -26,6 +26,15 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.envs.sb3_network": "pma_gym.sb3.network",
     "pma_gym.envs.sb3_policy": "pma_gym.sb3.policy",
     "pma_gym.envs.sb3_ppo": "pma_gym.sb3.ppo",
+    "pma_gym.data.dataset": "pma_gym.data.datasets.dataset",
+    "pma_gym.data.trial_files": "pma_gym.data.files.trial_files",
+    "pma_gym.data.trial_values": "pma_gym.data.files.trial_values",
+    "pma_gym.effects.own": "pma_gym.effects.user_effects",
+    "pma_gym.plant.exercise": "pma_gym.plant.exercise_device.device",
+    "pma_gym.plant.fitting": "pma_gym.estimation.fitting",
+    "pma_gym.plant.knee": "pma_gym.plant.exercise_device.knee",
+    "pma_gym.plant.muscles": "pma_gym.plant.exercise_device.parallel_muscles",
+    "pma_gym.plant.prescription": "pma_gym.plant.exercise_device.prescription",
 }
 """Old module names that users may have, and the new ones."""
 

@@ -7,8 +7,8 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, PRESSURES, Resistance, exercise_of, volts_of
 from pma_gym.envs import Measurement, StationInfo
-from pma_gym.plant.exercise import own_device
-from pma_gym.plant.prescription import follow_from
+from pma_gym.plant.exercise_device.device import own_device
+from pma_gym.plant.exercise_device.prescription import follow_from
 
 if TYPE_CHECKING:
     from pma_gym.tasks import Exercise
@@ -30,7 +30,8 @@ class ConstantPressure:
         pressure: the one that is held (Pa).
 
     Source:
-        Serres 2008, section 6.3, as `pma_gym.plant.exercise` has it; the nearest one is our own.
+        Serres 2008, section 6.3, as `pma_gym.plant.exercise_device.device` has it; the nearest
+        one is our own.
     """
 
     name = "constant_pressure"
@@ -56,10 +57,11 @@ class ConstantPressure:
 class ScheduledPressure:
     """The pressure at which the nominal device gives the prescribed moment at the measured angle.
 
-    Found before the trial every 5 deg (`pma_gym.plant.prescription.follow_from`) and linear in
-    between. Damping, hysteresis and whatever the station differs in are left to themselves, and so
-    is an exercise of one speed: there the operator expects what the device gives at the trial's
-    first pressure, which is all that a schedule over the angle could give him.
+    Found before the trial every 5 deg
+    (`pma_gym.plant.exercise_device.prescription.follow_from`) and linear in between. Damping,
+    hysteresis and whatever the station differs in are left to themselves, and so is an exercise of
+    one speed: there the operator expects what the device gives at the trial's first pressure, which
+    is all that a schedule over the angle could give him.
     """
 
     name = "scheduled_pressure"

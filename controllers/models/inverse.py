@@ -23,9 +23,9 @@ import numpy as np
 
 from controllers.models.contraction_inverse import ContractionInverse
 from controllers.models.muscle import Muscle
-from pma_gym.effects.position_map import mapped_displacement
+from pma_gym.codegen.rebinding import lanes
+from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.envs import StationInfo
-from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from pma_gym.plant.equilibrium.settling import all_at_rest
 from pma_gym.plant.linear import linearize_at
 from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.settle import all_at_rest
 
 if TYPE_CHECKING:
     import control

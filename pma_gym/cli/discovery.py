@@ -14,7 +14,7 @@ from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
 from pma_gym.cli.terminal import say, warnings_said, warnings_said_at_once
 from pma_gym.cli.time_left import DIAGNOSIS, FIT, TimeLeft
-from pma_gym.data.dataset import Dataset, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import OutputError
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -164,7 +164,7 @@ def _inputs(
     with warnings_said():
         trials = read_dataset(folder)
     for path in effects or ():
-        from pma_gym.effects.own import load_effects
+        from pma_gym.effects.user_effects import load_effects
 
         load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)

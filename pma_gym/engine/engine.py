@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine.builtin import builtin
+from pma_gym.codegen.threads.thread_pool import Crew
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
 from pma_gym.engine.options import Options, Pressure
 from pma_gym.engine.reset.episodes import FIRST, LAST, SETTLES, Episodes
 from pma_gym.engine.snapshot import Snapshot, put, take
-from pma_gym.kernels import arrays
-from pma_gym.kernels.builtin import builtin
-from pma_gym.kernels.crew import Crew
 from pma_gym.tasks import Task
 
 LEAST_BLOCKS = 2

@@ -3,12 +3,12 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.machine.native import simd_lanes
 from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
 from pma_gym.engine.cpu.kernel import Kernel
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options
 from pma_gym.engine.state_layout import Record
-from pma_gym.kernels.native import simd_lanes
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Task

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from pma_gym.codegen.graph import Kind, Value
 from pma_gym.engine.options import Options
-from pma_gym.kernels.graph import Kind, Value
 from pma_gym.tasks import PACE, Exercise, Human, Mind, Plan, Task
 
 Part = Literal["extension", "rotation", "load", "pressure"]

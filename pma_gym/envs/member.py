@@ -32,8 +32,9 @@ class Batch(Protocol):
     table: ObservationTable
     render_mode: str | None
     metadata: dict[str, Any]
-    single_observation_space: spaces.Box[Any]
-    single_action_space: spaces.Box[Any]
+    # In quotes: Gymnasium 1.1's Box takes no type.
+    single_observation_space: "spaces.Box[Any]"
+    single_action_space: "spaces.Box[Any]"
     _begun: NDArray[np.bool_]
     _ended: NDArray[np.bool_]
 

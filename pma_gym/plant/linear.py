@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.effects import CATALOGUE
+from pma_gym.plant.equilibrium.force_balance import static_force
 from pma_gym.plant.plant import OUTPUTS, Condition, Plant
-from pma_gym.plant.station_rest import static_force
 
 if TYPE_CHECKING:
     import control

@@ -17,10 +17,10 @@ from types import ModuleType
 
 import numpy as np
 
-from pma_gym.kernels.graph import Value
-from pma_gym.kernels.text import python_text
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.compose import COMMANDS, ZERO
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.text import python_text
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.plant.plant import Condition, Plant
 from pma_gym.plant.program import parameter_names
 

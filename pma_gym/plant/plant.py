@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant import sensors, settle
-from pma_gym.plant.attempt import first_size
+from pma_gym.integrator.step_attempt import first_size
+from pma_gym.plant import sensors
+from pma_gym.plant.equilibrium import settling
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.program import FIRST_S, program, table, vector
 from pma_gym.plant.simulation import Run, simulate_all
@@ -134,7 +135,7 @@ class Plant:
                 raise ValueError("settle needs a pressure (Pa) or a regulator_voltage (V)")
             regulator_voltage = self.regulator_voltage(pressure)
         check_voltages(motor_voltage, regulator_voltage)
-        state, zero = settle.at_rest(self, motor_voltage, regulator_voltage)
+        state, zero = settling.at_rest(self, motor_voltage, regulator_voltage)
         return Condition(state, zero, commands=(motor_voltage, regulator_voltage))
 
     def derivative(

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pma_gym.kernels.lanes import rebind
+from pma_gym.codegen.rebinding import rebind
 from pma_gym.plant.notation import Names, Notation
 from pma_gym.plant.plant import Plant
 

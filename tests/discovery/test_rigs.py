@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
 from benchmarks.hidden_effects.groups import group
-from pma_gym.data.clipping import ends
-from pma_gym.data.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.files.trial_files import write_trial
+from pma_gym.data.quality.clipping import ends
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.data.trial_files import write_trial
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.model import ModelError, parse_model
 from pma_gym.plant.plant import Plant

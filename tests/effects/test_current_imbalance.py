@@ -5,8 +5,8 @@ import pytest
 
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.current_imbalance import imbalance_load
-from pma_gym.plant.settle import all_at_rest
+from pma_gym.effects.drive.current_imbalance import imbalance_load
+from pma_gym.plant.equilibrium.settling import all_at_rest
 
 RADIUS_M = 25.9e-3
 SEEN_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)

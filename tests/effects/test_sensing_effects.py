@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant.settle import NoLoad, all_at_rest
+from pma_gym.plant.equilibrium.settling import NoLoad, all_at_rest
 
 
 def pressures(plant, step, dense):

@@ -5,9 +5,9 @@ import pytest
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.plant.equilibrium.settling import all_at_rest
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.settle import all_at_rest
 
 MANY = (
     *("nonlinear_stiffness", "warm_up", "drive_delay", "regulator_delay", "regulator_deadband"),

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from llvmlite import ir
 
+from pma_gym.codegen.machine import cuda_driver
+from pma_gym.codegen.machine.control import INTEGER, function
+from pma_gym.codegen.machine.native import Library
 from pma_gym.engine.cuda import engine
 from pma_gym.engine.cuda.cpu_device import StandIn
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.cuda.kernel import CudaKernel, shared_job
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
-from pma_gym.kernels import driver
-from pma_gym.kernels.control import INTEGER, function
-from pma_gym.kernels.native import Library
 from pma_gym.tasks import TASKS
 
 EVERYTHING = {
@@ -233,11 +233,11 @@ def test_without_torch_or_gpu_a_sentence_says_what_to_do(monkeypatch):
         raise ModuleNotFoundError(name)
 
     monkeypatch.setattr(engine.importlib, "import_module", missing)
-    with pytest.raises(driver.GpuError, match="pip install torch"):
+    with pytest.raises(cuda_driver.GpuError, match="pip install torch"):
         engine.CudaEngine(TASKS["displacement"], Options(), 4)
     monkeypatch.setattr(engine.importlib, "import_module", lambda name: None)
-    monkeypatch.setattr(driver, "_ELSEWHERE", ("libnothing.so.0",))
-    monkeypatch.setattr(driver, "_LIBRARIES", {})
-    driver.driver.cache_clear()
-    with pytest.raises(driver.GpuError, match=r"libnothing.so.0 is not found.*gym.make_vec"):
+    monkeypatch.setattr(cuda_driver, "_ELSEWHERE", ("libnothing.so.0",))
+    monkeypatch.setattr(cuda_driver, "_LIBRARIES", {})
+    cuda_driver.driver.cache_clear()
+    with pytest.raises(cuda_driver.GpuError, match=r"libnothing.so.0 is not found.*gym.make_vec"):
         engine.torch_with_gpu()

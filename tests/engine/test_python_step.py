@@ -7,11 +7,11 @@ import weakref
 import numpy as np
 import pytest
 
+from pma_gym.codegen.machine import arrays
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import parse_options
 from pma_gym.envs import PMAEnv
-from pma_gym.kernels import arrays
 from pma_gym.tasks import EVERY_TASK, TASKS
 
 

@@ -105,7 +105,7 @@ def gpu(name: str, count: int, precision: str) -> Prepared:
         precision: `float32` or `float64`.
     """
     from benchmarks.speed.gpu import prepare
-    from pma_gym.kernels.driver import GpuError
+    from pma_gym.codegen.machine.cuda_driver import GpuError
 
     try:
         return prepare(ENVIRONMENTS[name], count, precision)

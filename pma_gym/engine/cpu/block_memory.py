@@ -8,11 +8,8 @@ from typing import Protocol
 
 from llvmlite import ir
 
-from pma_gym.engine.graph.control_step_graph import Circuit
-from pma_gym.engine.graph.scoring import Sampling
-from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.state_layout import Record
-from pma_gym.kernels.control import (
+from pma_gym.codegen.graph import Kind, Value
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     FLOAT,
     INTEGER,
@@ -22,11 +19,14 @@ from pma_gym.kernels.control import (
     integer,
     offset,
 )
-from pma_gym.kernels.graph import Kind, Value
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.compose import Equations
-from pma_gym.plant.march import FUSED
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.engine.graph.control_step_graph import Circuit
+from pma_gym.engine.graph.scoring import Sampling
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.state_layout import Record
+from pma_gym.integrator.integration import FUSED
+from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
 from pma_gym.plant.program import Program
 
@@ -80,7 +80,7 @@ class BlockMemory:
         self.kernel, self.record, self.width = kernel, kernel.record, kernel.width
         self.element: ir.Type = DOUBLE
         self.places = kernel.record.places
-        self.eq = Equations(model.effects, model.parameters)
+        self.eq = PlantEquations(model.effects, model.parameters)
         PLANTS[model.plant].write_equations(self.eq)
         self.circuit = Circuit(kernel.record, self.eq)
         self.fixed: list[Value] = []

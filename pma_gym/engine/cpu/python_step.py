@@ -2,11 +2,9 @@
 
 from llvmlite import ir
 
-from pma_gym.engine.cpu.block_memory import ARGUMENTS
-from pma_gym.engine.state_layout import Record
-from pma_gym.kernels import arrays
-from pma_gym.kernels.builtin import INTERFACE
-from pma_gym.kernels.control import (
+from pma_gym.codegen.machine import arrays
+from pma_gym.codegen.machine.builtin import INTERFACE
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     FLOAT,
     INDEX,
@@ -19,6 +17,8 @@ from pma_gym.kernels.control import (
     loop,
     offset,
 )
+from pma_gym.engine.cpu.block_memory import ARGUMENTS
+from pma_gym.engine.state_layout import Record
 
 BOUND = (
     *("arguments", "infos", "keys", "copy", "no", "yes"),

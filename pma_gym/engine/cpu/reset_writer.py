@@ -2,9 +2,8 @@
 
 from llvmlite import ir
 
-from pma_gym.engine.cpu.block_memory import BlockMemory, Plan, narrowed, widened
-from pma_gym.engine.state_layout import DRAW, TARE
-from pma_gym.kernels.control import (
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INTEGER,
     POINTER,
@@ -15,11 +14,12 @@ from pma_gym.kernels.control import (
     loop,
     offset,
 )
-from pma_gym.kernels.graph import Value
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.random import philox, uniform
-from pma_gym.kernels.substitute import substitute
-from pma_gym.plant.march import FUSED, memory
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.random import philox, uniform
+from pma_gym.codegen.substitute import substitute
+from pma_gym.engine.cpu.block_memory import BlockMemory, Plan, narrowed, widened
+from pma_gym.engine.state_layout import DRAW, TARE
+from pma_gym.integrator.integration import FUSED, memory
 from pma_gym.plant.program import FIRST_S, balanced
 from pma_gym.plant.system import static_force
 
@@ -32,7 +32,9 @@ _AT_REST = {
     "lag_lvdt": "zero",
     "lag_pressure_transducer": "pressure",
 }
-"""States that are not 0 where the cable hangs slack; see `pma_gym.plant.settle.NoLoad`."""
+"""States that are not 0 where the cable hangs slack.
+
+See `pma_gym.plant.equilibrium.settling.NoLoad`."""
 
 
 class BeginningWriter(BlockMemory):

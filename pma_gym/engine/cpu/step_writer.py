@@ -6,11 +6,9 @@ from typing import Protocol
 
 from llvmlite import ir
 
-from pma_gym.engine.cpu.block_memory import BEFORE, Plan, narrowed, widened
-from pma_gym.engine.cpu.python_step import write_advance
-from pma_gym.engine.cpu.reset_writer import BeginningWriter
-from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
-from pma_gym.kernels.control import (
+from pma_gym.codegen.generic import to_real
+from pma_gym.codegen.graph import FIXED, HELD
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INTEGER,
     POINTER,
@@ -23,14 +21,16 @@ from pma_gym.kernels.control import (
     repeat,
     variable,
 )
-from pma_gym.kernels.crew import write_another
-from pma_gym.kernels.generic import to_real
-from pma_gym.kernels.graph import FIXED, HELD
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import pairs
-from pma_gym.kernels.trace import split
-from pma_gym.plant.attempt import attempt
-from pma_gym.plant.march import FUSED, Lane, Layout, march, memory
+from pma_gym.codegen.machine.native import pairs
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.threads.thread_pool import write_another
+from pma_gym.codegen.trace import split
+from pma_gym.engine.cpu.block_memory import BEFORE, Plan, narrowed, widened
+from pma_gym.engine.cpu.python_step import write_advance
+from pma_gym.engine.cpu.reset_writer import BeginningWriter
+from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
+from pma_gym.integrator.integration import FUSED, Lane, Layout, march, memory
+from pma_gym.integrator.step_attempt import attempt
 from pma_gym.plant.model import PLANTS
 
 BAD_ACTION = 4

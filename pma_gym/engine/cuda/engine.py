@@ -22,10 +22,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.codegen.machine.cuda_driver import Arguments, Function, GpuError, driver, gpu
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.cuda.kernel import ARGUMENTS, THREADS, CudaKernel, Name
 from pma_gym.engine.options import Options
-from pma_gym.kernels.driver import Arguments, Function, GpuError, driver, gpu
 from pma_gym.tasks import Task
 
 

@@ -12,11 +12,8 @@ import numpy as np
 from llvmlite import ir
 from numpy.typing import NDArray
 
-from pma_gym.engine.cuda.thread_writer import ThreadWriter
-from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.state_layout import Record
-from pma_gym.kernels import cache
-from pma_gym.kernels.control import (
+from pma_gym.codegen.cache import compile_cache
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INTEGER,
     POINTER,
@@ -27,8 +24,8 @@ from pma_gym.kernels.control import (
     loop,
     offset,
 )
-from pma_gym.kernels.native import Library, compiled
-from pma_gym.kernels.ptx import (
+from pma_gym.codegen.machine.native import Library, compiled
+from pma_gym.codegen.machine.ptx import (
     WARP,
     Turns,
     bounded,
@@ -39,6 +36,9 @@ from pma_gym.kernels.ptx import (
     warp_any,
     warp_meet,
 )
+from pma_gym.engine.cuda.thread_writer import ThreadWriter
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.state_layout import Record
 from pma_gym.plant.program import Program, structure
 
 Name = Literal["step", "begin"]
@@ -135,12 +135,12 @@ class CudaKernel:
 
     def ptx(self, arch: str = "sm_90") -> str:
         """PTX text of the functions, for an architecture and all that came after it."""
-        key = cache.digest((cache.source_digest(), arch, *self._key()))
-        kept = cache.load(key)
+        key = compile_cache.digest((compile_cache.source_digest(), arch, *self._key()))
+        kept = compile_cache.load(key)
         if kept is not None:
             return kept.decode()
         text = ptx(self._threads(), arch)
-        cache.keep(key, text.encode())
+        compile_cache.keep(key, text.encode())
         return text
 
     def _threads(self) -> ir.Module:

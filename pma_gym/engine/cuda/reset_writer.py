@@ -2,8 +2,17 @@
 
 from llvmlite import ir
 
+from pma_gym.codegen.machine.control import (
+    DOUBLE,
+    FLOAT,
+    INTEGER,
+    Builder,
+    Operand,
+    integer,
+    loop,
+    offset,
+)
 from pma_gym.engine.cuda.thread_memory import ThreadMemory
-from pma_gym.kernels.control import DOUBLE, FLOAT, INTEGER, Builder, Operand, integer, loop, offset
 
 _BYTE = ir.IntType(8)
 

@@ -4,13 +4,22 @@ A number of all environments lies side by side, so that threads beside each othe
 other.
 """
 
+from pma_gym.codegen.graph import Kind, Value
+from pma_gym.codegen.machine.control import (
+    DOUBLE,
+    FLOAT,
+    INDEX,
+    INTEGER,
+    Builder,
+    Operand,
+    integer,
+    offset,
+)
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import Plan, narrowed
 from pma_gym.engine.cpu.step_writer import Writer
-from pma_gym.kernels.control import DOUBLE, FLOAT, INDEX, INTEGER, Builder, Operand, integer, offset
-from pma_gym.kernels.graph import Kind, Value
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.march import FUSED
+from pma_gym.integrator.integration import FUSED
 
 
 class ThreadMemory(Writer):

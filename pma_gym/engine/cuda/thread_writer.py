@@ -10,10 +10,8 @@ from typing import Protocol
 
 from llvmlite import ir
 
-from pma_gym.engine.cpu.block_memory import narrowed, widened
-from pma_gym.engine.cuda.reset_writer import BeginWriter
-from pma_gym.engine.graph.scoring import Sampling
-from pma_gym.kernels.control import (
+from pma_gym.codegen.graph import HELD, Value
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INDEX,
     INTEGER,
@@ -24,10 +22,12 @@ from pma_gym.kernels.control import (
     offset,
     repeat,
 )
-from pma_gym.kernels.graph import HELD, Value
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.march import FUSED, memory
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.engine.cpu.block_memory import narrowed, widened
+from pma_gym.engine.cuda.reset_writer import BeginWriter
+from pma_gym.engine.graph.scoring import Sampling
+from pma_gym.integrator.integration import FUSED, memory
 
 
 class Turns(Protocol):

@@ -6,19 +6,19 @@ From the action to the drive, from the plant's state to reading, observation, re
 from collections.abc import Mapping
 from functools import cached_property
 
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.random import normals, philox
+from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.exercise_step import Exercised, held_volts
 from pma_gym.engine.graph.scoring import position_of
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, heard_position
 from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
-from pma_gym.kernels.generic import to_real, where
-from pma_gym.kernels.graph import Value
-from pma_gym.kernels.random import normals, philox
-from pma_gym.kernels.substitute import substitute
+from pma_gym.integrator.step_attempt import first_size
+from pma_gym.integrator.system import at_rest
 from pma_gym.plant import sensors
-from pma_gym.plant.attempt import first_size
-from pma_gym.plant.system import at_rest
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 

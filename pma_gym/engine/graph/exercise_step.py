@@ -3,12 +3,12 @@
 import math
 from collections.abc import Mapping
 
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import Value
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import GUARDED, NOISE, plan_of_places
-from pma_gym.kernels.generic import to_real, where
-from pma_gym.kernels.graph import Value
 from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
 from pma_gym.tasks.guard import MOMENT_FILTER_S, SPEED_FILTER_S, let_through
 from pma_gym.tasks.human import FORESIGHT_S, moved, unsteady

@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import CHANGING, HELD, Value
+from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import START, plan_of_places
-from pma_gym.kernels.derivative import derivatives
-from pma_gym.kernels.graph import CHANGING, HELD, Value
-from pma_gym.kernels.substitute import substitute
+from pma_gym.integrator.equations import Equations
+from pma_gym.integrator.step_attempt import Attempt
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.attempt import Attempt
-from pma_gym.plant.compose import Equations
 from pma_gym.tasks import Plan, Task
 
 SAMPLE_PERIOD = 1.0 / SAMPLE_RATE_HZ

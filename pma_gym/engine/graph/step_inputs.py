@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
 from pma_gym.engine.state_layout import START, Record
-from pma_gym.kernels.graph import CHANGING, HELD, Graph, Value
-from pma_gym.plant.compose import COMMANDS, ZERO, Equations
+from pma_gym.integrator.equations import COMMANDS, ZERO, Equations
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from pma_gym.engine.reset.reset_state import (
     settled_under_load,
 )
 from pma_gym.engine.state_layout import START
+from pma_gym.plant.equilibrium.settling import NoLoad
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant, regulator_voltage
 from pma_gym.plant.program import FIRST_S, vector
-from pma_gym.plant.settle import NoLoad
 from pma_gym.tasks import Events, Task
 
 FIRST, LAST, SETTLES = (ARGUMENTS.index(name) for name in ("first", "last", "settles"))

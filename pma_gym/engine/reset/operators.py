@@ -8,9 +8,19 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.options import Options, Pressure
 from pma_gym.engine.state_layout import DRAW
-from pma_gym.plant.exercise import FULL_ANGLE, own_device, pressure_grid, resistive_moment
+from pma_gym.plant.exercise_device.device import (
+    FULL_ANGLE,
+    own_device,
+    pressure_grid,
+    resistive_moment,
+)
+from pma_gym.plant.exercise_device.prescription import (
+    Miss,
+    UnreachableError,
+    constant_moments,
+    follow_from,
+)
 from pma_gym.plant.model import Model
-from pma_gym.plant.prescription import Miss, UnreachableError, constant_moments, follow_from
 from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, Plan, Task, plan_of
 
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))

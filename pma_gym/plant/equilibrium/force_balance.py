@@ -1,0 +1,180 @@
+"""A station at rest: the contractions at which muscles balance what cables and drives ask for."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from pma_gym.effects.cable.hanging_load import GRAVITY
+from pma_gym.effects.effect import signals
+from pma_gym.plant.equilibrium.search import Search
+
+if TYPE_CHECKING:
+    from pma_gym.plant.plant import Plant
+
+RIPPLE = "drive_ripple"
+"""Port whose effects make the load depend on where the motor stands."""
+
+_CLEAR_M, _NEAR_RAD, _MOST_APPROACHES = 1e-3, 1e-13, 100
+"""Slack (m) that shows a drive's load without the cable; by how much an angle may still miss, and
+how often it is tried anew."""
+
+
+def settle_station(search: Search) -> None:
+    """Put a station's contraction and angle where muscle, cable and drive hold each other."""
+    search.zero[:] = _balance(search, np.zeros(len(search.state)))
+    search["contraction"] = search.zero
+    # With the zero at the contraction itself the cable is slack: the rotor shows the drive's load.
+    load = _drive_load(search)
+    search["contraction"] = _balance(search, np.maximum(load, 0.0))
+    search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+    ripples = [e for e in search.plant.model.effects.values() if e.port == RIPPLE and e.law]
+    angles = {"angle", "motor_angle"}
+    if any(angles & set(signals(effect.law)) for effect in ripples if effect.law):
+        _settle_by_angle(search)
+
+
+def _drive_load(search: Search) -> np.ndarray:
+    """Load of the drive (N), which the pulley shows while the cable hangs slack."""
+    rotor, pull = search.parameters("rotor"), search.rate("spin")
+    effects, inertia = search.plant.model.effects, rotor["inertia"]
+    if "leg" in effects:
+        inertia = inertia + search.parameters("leg")["inertia"]
+    if "hanging_load" not in effects:
+        return pull * inertia / rotor["radius"]
+    # The load is what accelerates rotor and weights, whose mass is the load's: L - M a = J a / r^2.
+    share = search.parameters("hanging_load")["share"] * rotor["radius"] * pull / GRAVITY
+    return pull * inertia / (rotor["radius"] * (1.0 - share))
+
+
+def _settle_by_angle(search: Search) -> None:
+    """Bring contractions and angles to where the loads at those angles hold them.
+
+    How far to go towards the angle that the load asks for is told by how that changed the last time
+    (Wegstein 1958). Each row stops by itself.
+    """
+    rotor = search.parameters("rotor")
+    angle, contraction = search["angle"].copy(), search["contraction"].copy()
+    done = np.zeros(angle.shape, bool)
+    before, asked = np.full((2, *angle.shape), np.nan)
+    for _ in range(_MOST_APPROACHES):
+        search["angle"] = angle
+        search["contraction"] = search.zero - rotor["radius"] * angle - _CLEAR_M
+        load = _drive_load(search)
+        search["angle"] = 0.0
+        search["contraction"] = _balance(search, np.maximum(load, 0.0))
+        found = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+        near = ~(np.abs(found - angle) > _NEAR_RAD)
+        contraction = np.where(done, contraction, search["contraction"])
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = (angle - before) / (angle - before - (found - asked))
+        share = np.where(np.isfinite(share), np.clip(share, 0.2, 2.0), 0.5)
+        before, asked = angle, found
+        angle = np.where(done, angle, np.where(near, found, angle + share * (found - angle)))
+        done = done | near
+        if np.all(done):
+            break
+    if not np.all(done):
+        search.unbalanced = search.unbalanced or (
+            "a ripple of the motor changes the load faster with its angle than the muscle can "
+            "hold, so that no rest is found; make the ripple's amplitude or periods a turn smaller"
+        )
+        contraction = np.where(done, contraction, np.nan)
+    search["angle"], search["contraction"] = angle, contraction
+
+
+def _balance(search: Search, loads: np.ndarray) -> np.ndarray:
+    """Contractions (m) at which the muscles balance loads (N); NaN where none does."""
+    limits = search.parameters("limits")
+    low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
+    at_low, at_high = search.force(low), search.force(high)
+    found = balances(search.plant, search["pressure"], loads, search.vectors)
+    found = np.where((loads == 0.0) & (at_low == 0.0) & (at_high == 0.0), 0.0, found)
+    outside = ~((at_low - loads) * (at_high - loads) <= 0.0)
+    if np.any(outside):
+        ends = np.broadcast_to(1e3 * low, outside.shape), np.broadcast_to(1e3 * high, outside.shape)
+        numbers = [column[outside][0] for column in (*ends, loads, at_low, at_high)]
+        search.unbalanced = search.unbalanced or (
+            "no contraction between {:g} and {:g} mm balances a load of {:.4g} N (the muscle gives "
+            "{:.4g} to {:.4g} N there); lower the first motor voltage or raise the pressure"
+        ).format(*numbers)
+    return np.where(outside, np.nan, found)
+
+
+def balances(
+    plant: "Plant", pressures: np.ndarray, loads: np.ndarray, vectors: np.ndarray | None = None
+) -> np.ndarray:
+    """Contraction (m) at which the muscle balances each load (N) at each pressure (Pa).
+
+    Args:
+        plant: a station.
+        pressures: shape (n,).
+        loads: shape (n,).
+        vectors: parameters of each, shape (n, numbers); the plant's own if not given.
+    Returns:
+        Shape (n,); an end of the bracket of twice the limits where nothing balances.
+    """
+    pressures, loads = np.ascontiguousarray(pressures, float), np.ascontiguousarray(loads, float)
+    numbers = plant.vector if vectors is None else np.ascontiguousarray(vectors, float)
+    stride = 0 if vectors is None else numbers.shape[1]
+    out = np.empty(len(pressures))
+    addresses = (a.ctypes.data for a in (pressures, loads, numbers))
+    plant.program.balance(len(out), *addresses, stride, out.ctypes.data)
+    return out
+
+
+def static_force(plant: "Plant", state: np.ndarray) -> Callable[[float], float]:
+    """Force of the muscle (N) over contraction (m), at the state's pressure, without the cable."""
+    mass = plant.model.parameters["slide"].mass
+    probe = state.copy()
+    x, velocity = plant.states.index("contraction"), plant.states.index("velocity")
+
+    def force(contraction: float) -> float:
+        # With the zero at the contraction itself the cable is slack.
+        probe[x] = contraction
+        return float(mass * plant.derivative(probe, 0.0, 0.0, contraction)[velocity])
+
+    return force
+
+
+def _taut_angles(search: Search, loads: np.ndarray) -> np.ndarray:
+    """Angles at which the cables carry the loads (N) that the drives ask for."""
+    rotor, cable = search.parameters("rotor"), search.parameters("cable")
+    extension = search.zero - search["contraction"]
+
+    def torque(angles: np.ndarray) -> np.ndarray:
+        search["angle"] = angles
+        return search.rate("spin")
+
+    furthest = extension + cable["slack"] + 2.0 * loads / cable["stiffness"]
+    return _roots(torque, extension / rotor["radius"], furthest / rotor["radius"])
+
+
+_MOST_SECANTS = 200
+
+
+def _roots(
+    function: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
+) -> np.ndarray:
+    """Zeros of a function that falls between two ends: regula falsi that halves what stands still.
+
+    Each row stops by itself, so that its bits do not depend on the others.
+    """
+    at_low, at_high = function(low), function(high)
+    found, done = high, np.zeros(low.shape, bool)
+    for _ in range(_MOST_SECANTS):
+        with np.errstate(invalid="ignore", divide="ignore"):
+            middle = high - at_high * (high - low) / (at_high - at_low)
+        middle = np.where((middle >= low) & (middle <= high), middle, 0.5 * (low + high))
+        value = function(middle)
+        near = np.abs(middle - found) <= 1e-15 + 1e-14 * np.abs(middle)
+        found = np.where(done, found, middle)
+        done = done | near | ~(value != 0.0) | np.isnan(value)
+        if np.all(done):
+            break
+        above = value > 0.0
+        # An end that stays where it is counts half the next time.
+        at_high = np.where(above, 0.5 * at_high, value)
+        at_low = np.where(above, value, 0.5 * at_low)
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return found
