@@ -15,8 +15,8 @@ from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import Own, own_parameters, values
 from pma_gym.discovery.suspects import Suspect, suspects
 from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

@@ -19,7 +19,7 @@ from pma_gym.discovery.acceptance_floors import REST, AcceptanceFloor, is_summar
 from pma_gym.discovery.flexible_regression import explained, variables
 from pma_gym.discovery.noise import Whitening, at_rest, autoregression, white_noise
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
