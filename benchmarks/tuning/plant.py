@@ -8,7 +8,7 @@ import control
 import numpy as np
 from scipy.optimize import root_scalar
 
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import Station
 from pma_gym.plant.condition import Condition

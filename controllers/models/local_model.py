@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.linear import linearize_at
@@ -48,8 +49,6 @@ LARGEST_ORDER = 4
 SENSORS = {"extension": "lvdt", "contraction": "lvdt", "rotation": "potentiometer"}
 """Sensor by what is followed."""
 
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
 
 _SEARCHED = 201
 """Voltages at which the plant is put to rest in search of the places."""
