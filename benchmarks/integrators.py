@@ -37,8 +37,9 @@ from pma_gym.integrator.integration import Layout
 from pma_gym.integrator.step_attempt import attempt
 from pma_gym.integrator.system import System
 from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import PLANTS, Model, load_model
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import Program, table
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.terminal import SafeConsole

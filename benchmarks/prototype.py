@@ -15,7 +15,8 @@ from pma_gym.codegen.trace import live_inputs, operation_counts
 from pma_gym.integrator.equations import COMMANDS, ZERO, State
 from pma_gym.integrator.events import BEYOND
 from pma_gym.integrator.step_attempt import GROW, LEAST_S, SAFETY, SHRINK
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, parameter_names
 from pma_gym.plant.rigs.station import POSITIONS, TIGHTENING_M, TURNING_M
 

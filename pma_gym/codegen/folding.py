@@ -15,12 +15,9 @@ one rule, the reciprocal:
 import math
 import struct
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from pma_gym.codegen.graph import Graph, Value
-
-_MASK = (1 << 64) - 1
+from pma_gym.codegen.value import MASK, Value, ValueGraph
 
 
 def to_bits(number: float) -> int:
@@ -53,10 +50,10 @@ _REAL: dict[str, Callable] = {
     "bits": to_bits,
 }
 _INTEGER: dict[str, Callable] = {
-    "add": lambda a, b: (a + b) & _MASK,
-    "subtract": lambda a, b: (a - b) & _MASK,
-    "multiply": lambda a, b: (a * b) & _MASK,
-    "shift_left": lambda a, b: (a << b) & _MASK,
+    "add": lambda a, b: (a + b) & MASK,
+    "subtract": lambda a, b: (a - b) & MASK,
+    "multiply": lambda a, b: (a * b) & MASK,
+    "shift_left": lambda a, b: (a << b) & MASK,
     "shift_right": lambda a, b: a >> b,
     "to_real": float,
     "from_bits": from_bits,
@@ -80,7 +77,7 @@ def compute(operation: str, kind: str, numbers: list) -> Any:  # noqa: ANN401
     return (table.get(operation) or _ANY[operation])(*numbers)
 
 
-def simplify(graph: "Graph", operation: str, operands: tuple["Value", ...]) -> "Value | None":
+def simplify(graph: ValueGraph, operation: str, operands: tuple[Value, ...]) -> Value | None:
     """A simpler value for an operation, or None if it is to be left as it is."""
     if all(operand.is_constant for operand in operands):
         numbers = [operand.data for operand in operands]
@@ -97,16 +94,16 @@ def simplify(graph: "Graph", operation: str, operands: tuple["Value", ...]) -> "
 _COMMUTES = frozenset(("add", "multiply", "and", "or", "xor", "equal", "not_equal"))
 
 
-def _is(value: "Value", number: float) -> bool:
+def _is(value: Value, number: float) -> bool:
     return value.is_constant and value.data == number
 
 
-def _inside(value: "Value") -> "Value | None":
+def _inside(value: Value) -> Value | None:
     """What a value is the negative of."""
     return value.operands[0] if value.operation == "negative" else None
 
 
-def _add(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _add(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if _is(a, 0):
         return b
     if _is(b, 0):
@@ -117,7 +114,7 @@ def _add(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
     return b - plus if plus is not None else None
 
 
-def _subtract(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _subtract(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if _is(b, 0):
         return a
     if a.kind == "integer":
@@ -130,7 +127,7 @@ def _subtract(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
     return -(plus + b) if plus is not None else None
 
 
-def _multiply(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _multiply(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if b.is_constant:
         a, b = b, a
     if _is(a, 1):
@@ -144,7 +141,7 @@ def _multiply(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
     return _signed_product(a, b)
 
 
-def _signed_product(a: "Value", b: "Value") -> "Value | None":
+def _signed_product(a: Value, b: Value) -> Value | None:
     if b.level < a.level:
         a, b = b, a
     plus, minus = _inside(a), _inside(b)
@@ -156,7 +153,7 @@ def _signed_product(a: "Value", b: "Value") -> "Value | None":
     return -(plus * b) if plus is not None and a.level == b.level else None
 
 
-def _twice_the_positive_part(total: "Value") -> "Value | None":
+def _twice_the_positive_part(total: Value) -> Value | None:
     if total.operation != "add":
         return None
     for value, size in (total.operands, total.operands[::-1]):
@@ -165,7 +162,7 @@ def _twice_the_positive_part(total: "Value") -> "Value | None":
     return None
 
 
-def _divide_values(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _divide_values(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if b.is_constant:
         return a * _divide(1.0, b.data)
     above, below = _inside(a), _inside(b)
@@ -176,40 +173,40 @@ def _divide_values(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
     return a * (1.0 / b) if b.level < a.level else None
 
 
-def _negative(graph: "Graph", a: "Value") -> "Value | None":
+def _negative(graph: ValueGraph, a: Value) -> Value | None:
     return _inside(a)
 
 
-def _absolute(graph: "Graph", a: "Value") -> "Value | None":
+def _absolute(graph: ValueGraph, a: Value) -> Value | None:
     if a.operation == "absolute":
         return a
     inside = _inside(a)
     return abs(inside) if inside is not None else None
 
 
-def _not(graph: "Graph", a: "Value") -> "Value | None":
+def _not(graph: ValueGraph, a: Value) -> Value | None:
     return a.operands[0] if a.operation == "not" else None
 
 
-def _and(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _and(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if b.is_constant:
         a, b = b, a
-    full = True if a.kind == "truth" else _MASK
+    full = True if a.kind == "truth" else MASK
     if _is(a, full) or a is b:
         return b
     return a if _is(a, 0) else None
 
 
-def _or(graph: "Graph", a: "Value", b: "Value") -> "Value | None":
+def _or(graph: ValueGraph, a: Value, b: Value) -> Value | None:
     if b.is_constant:
         a, b = b, a
-    full = True if a.kind == "truth" else _MASK
+    full = True if a.kind == "truth" else MASK
     if _is(a, full):
         return a
     return b if _is(a, 0) or a is b else None
 
 
-def _select(graph: "Graph", condition: "Value", yes: "Value", no: "Value") -> "Value | None":
+def _select(graph: ValueGraph, condition: Value, yes: Value, no: Value) -> Value | None:
     if condition.is_constant:
         return yes if condition.data else no
     if yes is no:
@@ -219,7 +216,7 @@ def _select(graph: "Graph", condition: "Value", yes: "Value", no: "Value") -> "V
     return _clip(graph, condition, yes, no)
 
 
-def _clip(graph: "Graph", condition: "Value", low: "Value", inner: "Value") -> "Value | None":
+def _clip(graph: ValueGraph, condition: Value, low: Value, inner: Value) -> Value | None:
     """A clip, low if x < low else (high if high < x else x): the upper bound, then the lower."""
     if inner.operation != "select" or not low.is_constant:
         return None
@@ -233,14 +230,14 @@ def _clip(graph: "Graph", condition: "Value", low: "Value", inner: "Value") -> "
     return graph.select(inner < low, low, inner) if clips else None
 
 
-def _is_less(condition: "Value", a: "Value", b: "Value") -> bool:
+def _is_less(condition: Value, a: Value, b: Value) -> bool:
     if condition.operation != "less":
         return False
     left, right = condition.operands
     return left is a and right is b
 
 
-_RULES: dict[str, Callable[..., "Value | None"]] = {
+_RULES: dict[str, Callable[..., Value | None]] = {
     "add": _add,
     "subtract": _subtract,
     "multiply": _multiply,

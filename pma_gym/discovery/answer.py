@@ -36,8 +36,8 @@ from pma_gym.discovery.verdict.residual_fraction import leftover, tones
 from pma_gym.discovery.verdict.residual_laws import residual_law
 from pma_gym.discovery.verdict.unknown import shapeless_laws, telling, why_unknown
 from pma_gym.discovery.verdict.worsened import worsened
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
-from pma_gym.plant.plant import OUTPUTS
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""

@@ -12,8 +12,8 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, check_tolerance
 from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,

@@ -36,7 +36,8 @@ from pma_gym.envs.state import EnvState, check_state, generator_at, generator_st
 from pma_gym.envs.station_info import Reading, Reference, Station, detached_task
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Events, Human, Task
 
 if TYPE_CHECKING:

@@ -23,8 +23,8 @@ from pma_gym.data.trial import Trial
 from pma_gym.estimation.fitted import Fit, Round
 from pma_gym.estimation.least_squares import inverse, least
 from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE
 
 __all__ = ["Fit", "Round", "fit"]
 

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import PLANTS, Model
-from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 

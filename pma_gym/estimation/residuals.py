@@ -19,9 +19,10 @@ from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
 from pma_gym.plant import sensors
-from pma_gym.plant.equilibrium import settling
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
+from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model, ModelError
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, parameter_names, table
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.units import Quantity
@@ -207,7 +208,7 @@ class Residuals:
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
-        states, zeros = settling.all_at_rest(self.plant, commands[0], commands[1], every)
+        states, zeros = solver.equilibria_at(self.plant, commands[0], commands[1], every)
         found: list[Array] = []
         shape = (len(self._trials), count)
         finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)

@@ -53,7 +53,17 @@ HIDDEN = {
 """What is hidden in the sets of `rigs/`, its size, and by what share that may be missed."""
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+QUICK = ("raw_volts", "one_long_trial")
+"""Sets that other tests here diagnose too."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in QUICK else pytest.mark.example, id=name)
+        for name in HIDDEN
+    ],
+)
 def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     effect, size = HIDDEN[name]
     found = diagnosed(name)

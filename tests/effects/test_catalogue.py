@@ -15,8 +15,9 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model, shipped_models
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.rigs import cascade, slide, station
 
 SIGNALS = {

@@ -9,7 +9,7 @@ from benchmarks.training.stations import Stations
 from pma_gym.engine.reset import reset_state
 from pma_gym.engine.reset.reset_state import holding_voltages, settled_at_no_load
 from pma_gym.envs import PMAVectorEnv
-from pma_gym.plant.equilibrium.settling import NoLoad
+from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.plant import Plant, vector
 
 PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
@@ -30,7 +30,7 @@ def nothing_kept(monkeypatch):
 def begun(nominal, models, pressures=PRESSURES):
     numbers = np.array([vector(model, nominal.tolerance) for model in models])
     return settled_at_no_load(
-        NoLoad(nominal), models, pressures, holding_voltages(models, pressures), numbers
+        NoLoadEquilibria(nominal), models, pressures, holding_voltages(models, pressures), numbers
     )
 
 

@@ -12,7 +12,7 @@ from pma_gym.estimation import fitting, residuals
 from pma_gym.estimation.fitting import fit
 from pma_gym.estimation.least_squares import inverse, least
 from pma_gym.estimation.residuals import Residuals
-from pma_gym.plant.equilibrium import settling
+from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model, ModelError, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import vector
@@ -242,13 +242,13 @@ def test_many_settle_as_one_does():
             value = plant.model.at_the_door(effect)[door]
             models.append(plant.model.replace({path: value * (1.0 + 0.01 * i)}))
             scaled[i] = vector(models[i], plant.tolerance)
-        states, zeros = settling.all_at_rest(plant, motor, regulator, np.array(scaled))
+        states, zeros = solver.equilibria_at(plant, motor, regulator, np.array(scaled))
         for i, model in enumerate(models):
             rest = Plant(model).settle(motor[i], regulator_voltage=regulator[i])
             np.testing.assert_array_equal(states[i], rest.state)
             assert zeros[i] == rest.zero_contraction
     plant = Plant("serres2008")
-    states, zeros = settling.all_at_rest(plant, np.array([10.0, 1.0]), np.array([1.2, 7.0]))
+    states, zeros = solver.equilibria_at(plant, np.array([10.0, 1.0]), np.array([1.2, 7.0]))
     assert np.isnan(states[0, 0]) and np.isfinite(states[1]).all() and np.isfinite(zeros[1])
 
 

@@ -15,9 +15,10 @@ from benchmarks.reference import (
     simulated,
     switches,
 )
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plain import PlainPlant
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
 
 

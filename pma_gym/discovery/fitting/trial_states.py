@@ -21,8 +21,9 @@ from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.documents import read_toml
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

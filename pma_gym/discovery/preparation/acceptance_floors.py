@@ -17,7 +17,7 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.noise import at_rest, step_between
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -18,8 +18,8 @@ from pma_gym.discovery.preparation.noise import (
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 

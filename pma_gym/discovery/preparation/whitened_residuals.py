@@ -18,8 +18,8 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

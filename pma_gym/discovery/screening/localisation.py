@@ -23,7 +23,7 @@ from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, singl
 from pma_gym.discovery.screening.residual_maps import residual_map
 from pma_gym.discovery.screening.residuals import left_over
 from pma_gym.discovery.screening.time_bins import PIECE_TICKS, Ticks, ticks_of
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -11,7 +11,7 @@ from pma_gym.discovery.preparation.noise import Whitening, autoregression, step_
 from pma_gym.discovery.preparation.whitened_residuals import Evidence
 from pma_gym.discovery.screening.autocorrelation import Memory, memory
 from pma_gym.discovery.screening.scan_statistic import NO_BURSTS, Bursts, bursts
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

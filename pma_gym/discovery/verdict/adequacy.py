@@ -19,7 +19,7 @@ from pma_gym.discovery.preparation.acceptance_floors import REST, AcceptanceFloo
 from pma_gym.discovery.preparation.noise import Whitening, at_rest, autoregression, white_noise
 from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from pma_gym.discovery.fitting.candidate_effect import Suspect
 from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import Evidence, Pieces
 from pma_gym.estimation.least_squares import inverse
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from pma_gym.codegen.machine.native import Library, compiled, pairs, simd_lanes
 from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.state_layout import Record
-from pma_gym.plant.equilibrium.settling import hangs_by_itself
+from pma_gym.plant.equilibrium.solver import hangs_by_itself
 from pma_gym.plant.program import Program, structure
 
 

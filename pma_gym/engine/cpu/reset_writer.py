@@ -34,7 +34,7 @@ _AT_REST = {
 }
 """States that are not 0 where the cable hangs slack.
 
-See `pma_gym.plant.equilibrium.settling.NoLoad`."""
+See `pma_gym.plant.equilibrium.solver.NoLoadEquilibria`."""
 
 
 class BeginningWriter(BlockMemory):

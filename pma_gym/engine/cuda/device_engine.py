@@ -17,8 +17,9 @@ from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options, rig_model
 from pma_gym.engine.reset.reset_state import hangs_slack
 from pma_gym.engine.state_layout import Record
-from pma_gym.plant.equilibrium import settling
-from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.compiled_model import regulator_voltage
+from pma_gym.plant.equilibrium import solver
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import vector
 from pma_gym.tasks import Task
 
@@ -143,7 +144,7 @@ class DeviceEngine:
         for pressure in (low, high):
             # Refuses what the regulator does not reach.
             regulator_voltage(self.nominal.model, pressure)
-        return hangs_slack(settling.NoLoad(self.nominal), low, high)
+        return hangs_slack(solver.NoLoadEquilibria(self.nominal), low, high)
 
     def _allocate(self, pressures: NDArray[np.float64]) -> None:
         made, kernel, n = self._device, self.kernel, self.count

@@ -20,9 +20,10 @@ from pma_gym.engine.reset.reset_state import (
     settled_under_load,
 )
 from pma_gym.engine.state_layout import START
-from pma_gym.plant.equilibrium.settling import NoLoad
+from pma_gym.plant.compiled_model import regulator_voltage
+from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.tasks import Events, Task
 
@@ -55,7 +56,7 @@ class Episodes(EngineMemory):
         self._possible: set[str] = set()
         self._check_prescription(self.wanted)
         super().__init__(task, options, self.told, nominal, count, single)
-        self._rest = NoLoad(self.nominal)
+        self._rest = NoLoadEquilibria(self.nominal)
         self._settling = self._slack_range()
         self._usual = self._ranges.copy() if self._settles(self.wanted) else None
         self._beginning = self._arguments.copy()

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 from pma_gym.codegen.random import philox, uniform
 from pma_gym.engine.options import Options, Pressure
 from pma_gym.engine.state_layout import DISTURB, DRAW
-from pma_gym.plant.equilibrium import settling
+from pma_gym.plant.compiled_model import regulator_voltage
+from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import Plant, regulator_voltage
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import Program
 from pma_gym.tasks import Events, Task
 
@@ -84,7 +85,7 @@ _KEPT: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {
 
 
 def settled_at_no_load(
-    rest: settling.NoLoad,
+    rest: solver.NoLoadEquilibria,
     models: Sequence[Model],
     pressures: NDArray[np.float64],
     regulator: NDArray[np.float64],
@@ -117,7 +118,7 @@ def settled_at_no_load(
     fresh: dict[tuple[Program, bytes, float], tuple[NDArray[np.float64], float]] = {}
     if new:
         at = list(new.values())
-        rested = settling.all_at_rest(nominal, np.zeros(len(at)), regulator[at], numbers[at])
+        rested = solver.equilibria_at(nominal, np.zeros(len(at)), regulator[at], numbers[at])
         fresh = dict(zip(new, zip(*rested, strict=True), strict=True))
     for key, (state, zero) in fresh.items():
         if np.isnan(zero) or np.isnan(state).any():
@@ -132,7 +133,7 @@ def settled_at_no_load(
     return np.array(states), np.array(zeros)
 
 
-def hangs_slack(rest: settling.NoLoad, low: float, high: float) -> bool:
+def hangs_slack(rest: solver.NoLoadEquilibria, low: float, high: float) -> bool:
     """Whether the cable hangs slack at 0 V, and muscles balance, at all pressures of a range.
 
     Args:
@@ -165,7 +166,7 @@ def settled_under_load(
     Raises:
         ValueError: no contraction balances the load.
     """
-    states, zero = settling.all_at_rest(nominal, np.full(len(regulator), motor), regulator, vectors)
+    states, zero = solver.equilibria_at(nominal, np.full(len(regulator), motor), regulator, vectors)
     lost = np.flatnonzero(np.isnan(states).any(axis=1) | np.isnan(zero))
     if len(lost):
         raise ValueError(

@@ -1,16 +1,13 @@
-"""A station at rest: the contractions at which muscles balance what cables and drives ask for."""
+"""Equilibrium of a station: contractions at which muscles balance what cables and drives ask."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from pma_gym.effects.cable.hanging_load import GRAVITY
 from pma_gym.effects.effect import signals
-from pma_gym.plant.equilibrium.search import Search
-
-if TYPE_CHECKING:
-    from pma_gym.plant.plant import Plant
+from pma_gym.plant.compiled_model import CompiledModel
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
 
 RIPPLE = "drive_ripple"
 """Port whose effects make the load depend on where the motor stands."""
@@ -20,52 +17,52 @@ _CLEAR_M, _NEAR_RAD, _MOST_APPROACHES = 1e-3, 1e-13, 100
 how often it is tried anew."""
 
 
-def settle_station(search: Search) -> None:
+def solve_station(problem: EquilibriumProblem) -> None:
     """Put a station's contraction and angle where muscle, cable and drive hold each other."""
-    search.zero[:] = _balance(search, np.zeros(len(search.state)))
-    search["contraction"] = search.zero
+    problem.zero[:] = _balance(problem, np.zeros(len(problem.state)))
+    problem["contraction"] = problem.zero
     # With the zero at the contraction itself the cable is slack: the rotor shows the drive's load.
-    load = _drive_load(search)
-    search["contraction"] = _balance(search, np.maximum(load, 0.0))
-    search["angle"] = np.where(load > 0.0, _taut_angles(search, load), 0.0)
-    ripples = [e for e in search.plant.model.effects.values() if e.port == RIPPLE and e.law]
+    load = _drive_load(problem)
+    problem["contraction"] = _balance(problem, np.maximum(load, 0.0))
+    problem["angle"] = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
+    ripples = [e for e in problem.plant.model.effects.values() if e.port == RIPPLE and e.law]
     angles = {"angle", "motor_angle"}
     if any(angles & set(signals(effect.law)) for effect in ripples if effect.law):
-        _settle_by_angle(search)
+        _settle_by_angle(problem)
 
 
-def _drive_load(search: Search) -> np.ndarray:
+def _drive_load(problem: EquilibriumProblem) -> np.ndarray:
     """Load of the drive (N), which the pulley shows while the cable hangs slack."""
-    rotor, pull = search.parameters("rotor"), search.rate("spin")
-    effects, inertia = search.plant.model.effects, rotor["inertia"]
+    rotor, pull = problem.parameters("rotor"), problem.rate("spin")
+    effects, inertia = problem.plant.model.effects, rotor["inertia"]
     if "leg" in effects:
-        inertia = inertia + search.parameters("leg")["inertia"]
+        inertia = inertia + problem.parameters("leg")["inertia"]
     if "hanging_load" not in effects:
         return pull * inertia / rotor["radius"]
     # The load is what accelerates rotor and weights, whose mass is the load's: L - M a = J a / r^2.
-    share = search.parameters("hanging_load")["share"] * rotor["radius"] * pull / GRAVITY
+    share = problem.parameters("hanging_load")["share"] * rotor["radius"] * pull / GRAVITY
     return pull * inertia / (rotor["radius"] * (1.0 - share))
 
 
-def _settle_by_angle(search: Search) -> None:
+def _settle_by_angle(problem: EquilibriumProblem) -> None:
     """Bring contractions and angles to where the loads at those angles hold them.
 
     How far to go towards the angle that the load asks for is told by how that changed the last time
     (Wegstein 1958). Each row stops by itself.
     """
-    rotor = search.parameters("rotor")
-    angle, contraction = search["angle"].copy(), search["contraction"].copy()
+    rotor = problem.parameters("rotor")
+    angle, contraction = problem["angle"].copy(), problem["contraction"].copy()
     done = np.zeros(angle.shape, bool)
     before, asked = np.full((2, *angle.shape), np.nan)
     for _ in range(_MOST_APPROACHES):
-        search["angle"] = angle
-        search["contraction"] = search.zero - rotor["radius"] * angle - _CLEAR_M
-        load = _drive_load(search)
-        search["angle"] = 0.0
-        search["contraction"] = _balance(search, np.maximum(load, 0.0))
-        found = np.where(load > 0.0, _taut_angles(search, load), 0.0)
+        problem["angle"] = angle
+        problem["contraction"] = problem.zero - rotor["radius"] * angle - _CLEAR_M
+        load = _drive_load(problem)
+        problem["angle"] = 0.0
+        problem["contraction"] = _balance(problem, np.maximum(load, 0.0))
+        found = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
         near = ~(np.abs(found - angle) > _NEAR_RAD)
-        contraction = np.where(done, contraction, search["contraction"])
+        contraction = np.where(done, contraction, problem["contraction"])
         with np.errstate(invalid="ignore", divide="ignore"):
             share = (angle - before) / (angle - before - (found - asked))
         share = np.where(np.isfinite(share), np.clip(share, 0.2, 2.0), 0.5)
@@ -75,26 +72,26 @@ def _settle_by_angle(search: Search) -> None:
         if np.all(done):
             break
     if not np.all(done):
-        search.unbalanced = search.unbalanced or (
+        problem.unbalanced = problem.unbalanced or (
             "a ripple of the motor changes the load faster with its angle than the muscle can "
             "hold, so that no rest is found; make the ripple's amplitude or periods a turn smaller"
         )
         contraction = np.where(done, contraction, np.nan)
-    search["angle"], search["contraction"] = angle, contraction
+    problem["angle"], problem["contraction"] = angle, contraction
 
 
-def _balance(search: Search, loads: np.ndarray) -> np.ndarray:
+def _balance(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
     """Contractions (m) at which the muscles balance loads (N); NaN where none does."""
-    limits = search.parameters("limits")
+    limits = problem.parameters("limits")
     low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
-    at_low, at_high = search.force(low), search.force(high)
-    found = balances(search.plant, search["pressure"], loads, search.vectors)
+    at_low, at_high = problem.force(low), problem.force(high)
+    found = balances(problem.plant, problem["pressure"], loads, problem.vectors)
     found = np.where((loads == 0.0) & (at_low == 0.0) & (at_high == 0.0), 0.0, found)
     outside = ~((at_low - loads) * (at_high - loads) <= 0.0)
     if np.any(outside):
         ends = np.broadcast_to(1e3 * low, outside.shape), np.broadcast_to(1e3 * high, outside.shape)
         numbers = [column[outside][0] for column in (*ends, loads, at_low, at_high)]
-        search.unbalanced = search.unbalanced or (
+        problem.unbalanced = problem.unbalanced or (
             "no contraction between {:g} and {:g} mm balances a load of {:.4g} N (the muscle gives "
             "{:.4g} to {:.4g} N there); lower the first motor voltage or raise the pressure"
         ).format(*numbers)
@@ -102,7 +99,10 @@ def _balance(search: Search, loads: np.ndarray) -> np.ndarray:
 
 
 def balances(
-    plant: "Plant", pressures: np.ndarray, loads: np.ndarray, vectors: np.ndarray | None = None
+    plant: CompiledModel,
+    pressures: np.ndarray,
+    loads: np.ndarray,
+    vectors: np.ndarray | None = None,
 ) -> np.ndarray:
     """Contraction (m) at which the muscle balances each load (N) at each pressure (Pa).
 
@@ -123,7 +123,7 @@ def balances(
     return out
 
 
-def static_force(plant: "Plant", state: np.ndarray) -> Callable[[float], float]:
+def static_force(plant: CompiledModel, state: np.ndarray) -> Callable[[float], float]:
     """Force of the muscle (N) over contraction (m), at the state's pressure, without the cable."""
     mass = plant.model.parameters["slide"].mass
     probe = state.copy()
@@ -137,14 +137,14 @@ def static_force(plant: "Plant", state: np.ndarray) -> Callable[[float], float]:
     return force
 
 
-def _taut_angles(search: Search, loads: np.ndarray) -> np.ndarray:
+def _taut_angles(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
     """Angles at which the cables carry the loads (N) that the drives ask for."""
-    rotor, cable = search.parameters("rotor"), search.parameters("cable")
-    extension = search.zero - search["contraction"]
+    rotor, cable = problem.parameters("rotor"), problem.parameters("cable")
+    extension = problem.zero - problem["contraction"]
 
     def torque(angles: np.ndarray) -> np.ndarray:
-        search["angle"] = angles
-        return search.rate("spin")
+        problem["angle"] = angles
+        return problem.rate("spin")
 
     furthest = extension + cable["slack"] + 2.0 * loads / cable["stiffness"]
     return _roots(torque, extension / rotor["radius"], furthest / rotor["radius"])

@@ -16,7 +16,8 @@ from pma_gym.discovery.verdict.flexible_regression import Explained, explained, 
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import LEVELS, OFF, STATION, commanded, diagnosed, measured
 
 TRUE = dict(zip(OUTPUTS, LEVELS, strict=True))

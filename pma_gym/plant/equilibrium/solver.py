@@ -1,46 +1,46 @@
-"""A plant at rest: the state in which it stands still at constant commands."""
-
-from typing import TYPE_CHECKING
+"""Solve for equilibria: the states in which plants stand still at constant commands."""
 
 import numpy as np
 
-from pma_gym.plant.equilibrium.force_balance import balances, settle_station
-from pma_gym.plant.equilibrium.search import Search, effect_parameters
+from pma_gym.plant.compiled_model import CompiledModel
+from pma_gym.plant.condition import Condition, check_voltages
+from pma_gym.plant.equilibrium.force_balance import balances, solve_station
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters
 from pma_gym.plant.model import Model
 
-if TYPE_CHECKING:
-    from pma_gym.plant.plant import Plant
 
-
-def at_rest(
-    plant: "Plant", motor_voltage: float, regulator_voltage: float
-) -> tuple[np.ndarray, float]:
-    """State at rest and the contraction at no load.
+def equilibrium_at(
+    plant: CompiledModel, motor_voltage: float, regulator_voltage: float
+) -> Condition:
+    """The plant's equilibrium at constant commands.
 
     Args:
         plant: the plant.
         motor_voltage: motor command (V).
         regulator_voltage: regulator command (V).
     Returns:
-        State vector (SI) with memories at zero, but for a load that has long arrived, and the
+        Where it stands: memories at zero, but for a load that has long arrived, and the
         contraction x0 (m) that the muscle would have with no load at this pressure.
     Raises:
-        ValueError: no contraction within twice the limits balances the load.
+        ValueError: a voltage out of 0-10 V, or no contraction within twice the limits balances
+            the load.
     """
+    check_voltages(motor_voltage, regulator_voltage)
     commands = np.array([motor_voltage], float), np.array([regulator_voltage], float)
-    search = _search(plant, *commands, None)
-    if search.unbalanced:
-        raise ValueError(f"model {plant.model.name}: {search.unbalanced}")
-    return search.state[0], float(search.zero[0])
+    problem = _solve(plant, *commands, None)
+    if problem.unbalanced:
+        raise ValueError(f"model {plant.model.name}: {problem.unbalanced}")
+    zero = float(problem.zero[0])
+    return Condition(problem.state[0], zero, commands=(motor_voltage, regulator_voltage))
 
 
-def all_at_rest(
-    plant: "Plant",
+def equilibria_at(
+    plant: CompiledModel,
     motor_voltages: np.ndarray,
     regulator_voltages: np.ndarray,
     vectors: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Many plants of one structure at rest, as `at_rest` one; none depends on the others.
+    """Equilibria of many plants of one structure, as `equilibrium_at`; none depends on another.
 
     Args:
         plant: one of them.
@@ -52,8 +52,8 @@ def all_at_rest(
         State vectors, shape (n, states), and contractions x0 (m), shape (n,); NaN where no
         contraction balances the load.
     """
-    search = _search(plant, motor_voltages, regulator_voltages, vectors)
-    return search.state, search.zero
+    problem = _solve(plant, motor_voltages, regulator_voltages, vectors)
+    return problem.state, problem.zero
 
 
 def hangs_by_itself(model: Model) -> bool:
@@ -67,7 +67,7 @@ def hangs_by_itself(model: Model) -> bool:
     return model.plant == "station" and not sensed and not delayed
 
 
-class NoLoad:
+class NoLoadEquilibria:
     """Stations at rest with 0 V on the motor, many at once.
 
     Args:
@@ -77,7 +77,7 @@ class NoLoad:
         plant: the same.
     """
 
-    def __init__(self, plant: "Plant") -> None:
+    def __init__(self, plant: CompiledModel) -> None:
         self.plant = plant
         self._common = self._ends(None) if hangs_by_itself(plant.model) else None
         self._contractions, self._pressures = (
@@ -121,66 +121,66 @@ class NoLoad:
         return states, zero
 
 
-def _search(
-    plant: "Plant",
+def _solve(
+    plant: CompiledModel,
     motor_voltages: np.ndarray,
     regulator_voltages: np.ndarray,
     vectors: np.ndarray | None,
-) -> Search:
-    search = Search(plant, motor_voltages, regulator_voltages, vectors)
-    search.relax_memory("regulator_delay")
-    if "pressure" in search.names:
-        _settle_pressure(search)
+) -> EquilibriumProblem:
+    problem = EquilibriumProblem(plant, motor_voltages, regulator_voltages, vectors)
+    problem.relax_memory("regulator_delay")
+    if "pressure" in problem.names:
+        _settle_pressure(problem)
     for port in ("drive_delay", "drive_lag"):
-        search.relax_memory(port)
-    {"station": settle_station, "cascade": _cascade, "slide": _slide}[plant.model.plant](search)
+        problem.relax_memory(port)
+    {"station": solve_station, "cascade": _cascade, "slide": _slide}[plant.model.plant](problem)
     for name in plant.states:
         if name.startswith("lag_"):
-            search.relax(name)
+            problem.relax(name)
     if plant.model.plant == "slide" and "lag_lvdt" in plant.states:
-        search.follow("lag_lvdt", search["velocity"])
-    return search
+        problem.follow("lag_lvdt", problem["velocity"])
+    return problem
 
 
 _STEADY = 1.0
 """Rate (Pa/s) under which a pressure has settled."""
 
 
-def _settle_pressure(search: Search) -> None:
+def _settle_pressure(problem: EquilibriumProblem) -> None:
     """Pressures at which the regulators rest.
 
     A limit on their rate has them searched for where they are asked to be, and a deadband, in which
     they rest anywhere, has them begin there.
     """
-    if not {"regulator_rate_limit", "regulator_deadband"} & search.plant.model.effects.keys():
-        search.relax("pressure")
+    if not {"regulator_rate_limit", "regulator_deadband"} & problem.plant.model.effects.keys():
+        problem.relax("pressure")
         return
     with np.errstate(divide="ignore", invalid="ignore"):
-        search.relax("pressure")
-        found, line = search["pressure"].copy(), search.parameters("regulator_line")
-        settled = np.abs(search.rate("pressure")) <= _STEADY
-        asked = np.maximum(line["gain"] * search.inputs[:, 1] + line["offset"], 0.0)
-        search.relax("pressure", about=asked)
-    found = np.where(settled, found, search["pressure"])
-    if "regulator_deadband" in search.plant.model.effects:
-        found = np.where(search.parameters("regulator_deadband")["width"] > 0.0, asked, found)
-    search["pressure"] = found
+        problem.relax("pressure")
+        found, line = problem["pressure"].copy(), problem.parameters("regulator_line")
+        settled = np.abs(problem.rate("pressure")) <= _STEADY
+        asked = np.maximum(line["gain"] * problem.inputs[:, 1] + line["offset"], 0.0)
+        problem.relax("pressure", about=asked)
+    found = np.where(settled, found, problem["pressure"])
+    if "regulator_deadband" in problem.plant.model.effects:
+        found = np.where(problem.parameters("regulator_deadband")["width"] > 0.0, asked, found)
+    problem["pressure"] = found
 
 
-def _cascade(search: Search) -> None:
-    plant = search.plant
-    search.relax("servo", of="servo_rate" if "servo_rate" in search.names else "servo")
-    search["extension"] = search["servo"]
-    truth = np.empty((len(search.state), len(plant.outputs)))
-    for i, (state, out) in enumerate(zip(search.state, truth, strict=True)):
-        numbers = plant.vector if search.vectors is None else search.vectors[i]
+def _cascade(problem: EquilibriumProblem) -> None:
+    plant = problem.plant
+    problem.relax("servo", of="servo_rate" if "servo_rate" in problem.names else "servo")
+    problem["extension"] = problem["servo"]
+    truth = np.empty((len(problem.state), len(plant.outputs)))
+    for i, (state, out) in enumerate(zip(problem.state, truth, strict=True)):
+        numbers = plant.vector if problem.vectors is None else problem.vectors[i]
         addresses = (a.ctypes.data for a in (numbers, out))
         plant.program.observe(1, state.ctypes.data, 0.0, *addresses)
-    search.zero[:] = truth[:, plant.outputs.index("contraction")] + search["extension"]
+    problem.zero[:] = truth[:, plant.outputs.index("contraction")] + problem["extension"]
 
 
-def _slide(search: Search) -> None:
+def _slide(problem: EquilibriumProblem) -> None:
     """A slide that nothing holds begins as its model says; its bristles are relaxed."""
-    start = search.parameters("start")
-    search.zero[:] = search["contraction"] = start["contraction"]
-    search["velocity"] = start["velocity"]
+    start = problem.parameters("start")
+    problem.zero[:] = problem["contraction"] = start["contraction"]
+    problem["velocity"] = start["velocity"]

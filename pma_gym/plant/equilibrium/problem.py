@@ -1,16 +1,14 @@
-"""States of many plants of one structure on their way to rest, and what they are asked there."""
+"""The equilibrium problem of many plants of one structure: their states so far, and their rates."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from pma_gym.plant.plant import Plant
+from pma_gym.plant.compiled_model import CompiledModel
 
 
-class Search:
-    """States on their way to rest; x0 is 0 until it is known.
+class EquilibriumProblem:
+    """States on their way to equilibrium; x0 is 0 until it is known.
 
     Attributes:
         plant: one of the plants.
@@ -18,12 +16,12 @@ class Search:
         vectors: parameters of each, shape (n, numbers); None where all have the plant's own.
         inputs: motor and regulator command (V) and x0 (m), shape (n, 3).
         state: the states (SI), shape (n, states).
-        unbalanced: why no rest is found, in words; empty so far.
+        unbalanced: why there is no equilibrium, in words; empty so far.
     """
 
     def __init__(
         self,
-        plant: "Plant",
+        plant: CompiledModel,
         motor: np.ndarray,
         regulator: np.ndarray,
         vectors: np.ndarray | None,
@@ -35,7 +33,7 @@ class Search:
         self.state = np.zeros((len(motor), len(self.names)))
         numbers = plant.vector if self.vectors is None else self.vectors
         self._stride = 0 if self.vectors is None else self.vectors.shape[1]
-        # A search asks for thousands of rates: looking its addresses up takes as long as they do.
+        # A solution takes thousands of rates: looking its addresses up takes as long as they do.
         self._state_at, self._numbers_at = self.state.ctypes.data, numbers.ctypes.data
         self._numbers = numbers
         self._columns: dict[str, dict[str, np.ndarray]] = {}
@@ -126,7 +124,7 @@ class Search:
 
 
 def effect_parameters(
-    plant: "Plant", vectors: np.ndarray | None, effect: str
+    plant: CompiledModel, vectors: np.ndarray | None, effect: str
 ) -> dict[str, np.ndarray]:
     """An effect's parameters, one each or one for all."""
     numbers = plant.vector[None, :] if vectors is None else vectors

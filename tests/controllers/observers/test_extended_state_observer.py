@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from controllers.models.lag_model import LagObserver, Lags, lags_of, place_of, placed
+from controllers.models.lag_model import Lags, lags_of
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
+from controllers.observers.extended_state_observer import LagObserver, place_of, placed
 from pma_gym.tasks import ISOTONIC
 
 PERIOD = 0.01

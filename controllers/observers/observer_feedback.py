@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from controllers.controller import Reference
-from controllers.models.lag_model import LagObserver
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.pid import VOLTAGE_LIMIT
+from controllers.models.voltage import VOLTAGE_LIMIT
+from controllers.observers.extended_state_observer import LagObserver
 from pma_gym.envs import Reading, Station
 
 if TYPE_CHECKING:
