@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
-from benchmarks.measured.blind import Proposal, Undecidable, undecidable
+from benchmarks.measured.detectability import Proposal, Undecidable, undecidable
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from benchmarks.score import PHASES, measured_score
+from benchmarks.reproduction.score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
