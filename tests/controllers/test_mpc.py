@@ -104,7 +104,7 @@ def test_it_tracks_rotation_within_the_target(drive):
 
 
 def test_it_lets_the_cable_go_loose_without_throwing_the_rotor(drive):
-    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bound`).
+    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bounds.achievable`).
     by_phase, _ = drive(PreviewMPC(), "rotation", 575)
     assert by_phase["III"] < 0.2
 
@@ -131,7 +131,7 @@ def driven(controller, seed=3):
     ended, info = False, {}
     while not ended:
         *_, terminated, truncated, info = env.step(
-            env.action(controller.act(env.reading, env.time))
+            env.action(controller.act(env.measurement, env.time))
         )
         ended = terminated or truncated
     return info["rmse_mm"], env.voltages

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
-from benchmarks.hidden_effects.groups import group
+from benchmarks.hidden_effects.generation.groups import group
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.quality.clipping import ends
