@@ -237,7 +237,7 @@ def operator_step(
 
     Args:
         human: who.
-        mind: as it was.
+        state: as it was before the step.
         wish: effort times plan at the intended angle (N m).
         away: intended angle less the true one (rad).
         coming: angle of the knee so far ahead as he sees (rad).
@@ -246,7 +246,7 @@ def operator_step(
         period: of the control step (s).
         share: how far the moment rises in a step, 1 - exp(-period / rise).
     Returns:
-        The moment (N m), and his mind after the step.
+        The moment (N m), and the state after the step.
     """
     kept = math.exp(-period / WANDER_S)
     wander = kept * state.wander + math.sqrt(1.0 - kept * kept) * normal
