@@ -39,7 +39,7 @@ def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
     commands = (other, held) if moves_regulator else (held, other)
     start = plant.settle(motor, regulator_voltage=regulator)
     times = station.period * np.arange(len(held))
-    states, zero = plant.run(times, *commands, joined=False, condition=start)
+    states, zero = plant.run(times, *commands, interpolation="zoh", condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
     found = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
     found[:2] -= found[:2, :1]

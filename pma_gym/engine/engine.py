@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.machine import arrays
 from pma_gym.codegen.machine.builtin import builtin
-from pma_gym.codegen.threads.thread_pool import Crew
+from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
 from pma_gym.engine.options import Options, Pressure
@@ -29,7 +29,7 @@ BEGUN_PARTS = 8
 """Parts of a thread's share of these."""
 
 _BEGINNING = 1
-"""The crew's second work; the first is a step."""
+"""The pool's second work; the first is a step."""
 
 
 class ActionError(ValueError):
@@ -88,7 +88,7 @@ class Engine(Episodes):
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._steps = self._parts(threads)
-        self._crew = Crew((address("step"), self._steps), (address("begin"), shares))
+        self._crew = ThreadPool((address("step"), self._steps), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -33,7 +33,7 @@ def marched(plant, trial, pressure):
     """States at every command, and attempts at steps."""
     start, told = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
     columns = (told.time, told.motor, told.regulator)
-    run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+    run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
     attempts = simulate_all(plant.program, [run])
     return run.states, attempts
 

@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from benchmarks.convergence import FixedStep, orders, smooth_plant
+from benchmarks.accuracy.convergence import FixedStep, orders, smooth_plant
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import evaluate
 from pma_gym.integrator.equations import State

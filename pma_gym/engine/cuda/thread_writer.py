@@ -22,7 +22,7 @@ from pma_gym.codegen.machine.control import (
     offset,
     repeat,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import narrowed, widened
 from pma_gym.engine.cuda.reset_writer import BeginWriter
@@ -157,7 +157,7 @@ class ThreadWriter(BeginWriter):
         wide = {i: widened(b, number) for i, number in wide.items()}
         wide[self.eq.graph.input("clock", HELD).id] = b.load(self._clock, typ=DOUBLE)
         # What an attempt's samples share is asked for, or it would be a part of each one's sum.
-        found = Lanes(1, fused=FUSED).emit(b, [one.done, one.when], wide)
+        found = SimdEmitter(1, fused=FUSED).emit(b, [one.done, one.when], wide)
         return {one.when.id: narrowed(b, found[one.when.id], self.element)}
 
 
