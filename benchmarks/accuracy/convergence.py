@@ -1,7 +1,7 @@
 """Order of convergence of the integrator's steps, on a trial without a kink.
 
 Nobody can command the size of a plant's internal steps. Here the very arithmetic of a step, without
-its choice of size, is written as plain Python and marched with sizes that are given.
+its choice of size, is written as plain Python and integrated with sizes that are given.
 """
 
 from collections.abc import Callable

@@ -49,11 +49,12 @@ from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
 from benchmarks.hidden_effects.physics.simulation import Commands  # noqa: E402
 from pma_gym.data.datasets.dataset import Dataset, read_dataset  # noqa: E402
 from pma_gym.data.trial import Trial  # noqa: E402
-from pma_gym.discovery.fits import Bench, Fitted  # noqa: E402
-from pma_gym.discovery.noise import Whitening  # noqa: E402
-from pma_gym.discovery.parameters import own_parameters  # noqa: E402
-from pma_gym.discovery.screening import Baseline, beginnings, look  # noqa: E402
-from pma_gym.discovery.suspects import Suspect, suspects  # noqa: E402
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted  # noqa: E402
+from pma_gym.discovery.fitting.free_parameters import own_parameters  # noqa: E402
+from pma_gym.discovery.preparation.noise import Whitening  # noqa: E402
+from pma_gym.discovery.screening.candidates import suspects  # noqa: E402
+from pma_gym.discovery.screening.score_test import Baseline, beginnings, look  # noqa: E402
 from pma_gym.files import replace_file  # noqa: E402
 from pma_gym.plant.model import Model, load_model  # noqa: E402
 

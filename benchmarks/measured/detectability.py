@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from benchmarks.measured.held_out import Rig
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.blind_spots import for_blind
-from pma_gym.discovery.screening import Baseline, Look, look
+from pma_gym.discovery.experiments.detectability import for_blind
+from pma_gym.discovery.screening.score_test import Baseline, Look, look
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 

@@ -10,7 +10,7 @@ from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, Form
 from controllers.policies.adapter import DIVERGED, base_of
 from controllers.policies.observation_spec import View, ahead, clipped, start_entry, steps_of
 from controllers.policies.scales import scales_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class Pilots:
@@ -26,7 +26,7 @@ class Pilots:
     """
 
     def __init__(
-        self, count: int, view: View, form: Form, station: Callable[[float], Station]
+        self, count: int, view: View, form: Form, station: Callable[[float], StationInfo]
     ) -> None:
         if view.kind != "tracking":
             raise ValueError(
@@ -110,7 +110,7 @@ class Pilots:
         for i in range(self.count) if which is None else which.tolist():
             now = int(self.steps[i]) * self._period
             taken = max(int(self.steps[i]) - self._late, 0) * self._period
-            reading = Reading(taken, *readings[:, i].tolist())
+            reading = Measurement(taken, *readings[:, i].tolist())
             self._base_volts[i] = self._bases[i].act(reading, now)
 
     def volts(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:

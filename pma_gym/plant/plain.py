@@ -5,7 +5,7 @@
     for made in plain.attempts(rest, motor_voltage=3.0, regulator_voltage=6.0, duration=0.01):
         print(made.length, made.accepted, made.state)
 
-It makes the same attempts in the same order as the compiled march, some hundred times slower.
+It makes the same attempts in the same order as the compiled integration, some hundred times slower.
 Compiled code rounds a product and a sum at once (fused multiply-add) and adds first what is there
 first, so a step's numbers differ from it by a few units in the last place, and a long trial's by
 what those grow to.

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
 from benchmarks.hidden_effects.baselines.signatures import SLACK_N
-from pma_gym.discovery.suspects import PERIODS
+from pma_gym.discovery.screening.candidates import PERIODS
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.answer import MOVED
-from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.floors import Level, initial_floors
-from pma_gym.discovery.leftovers import left_over
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import own_parameters, unit, values
-from pma_gym.discovery.suspects import Suspect, suspects
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import own_parameters, unit, values
+from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.screening.residuals import left_over
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 

@@ -1,6 +1,7 @@
 """Signatures of a residual as numbers: how much, where, and along what.
 
-What `pma_gym.discovery.where` localises, at the same conditions for every data set: for each signal
+What `pma_gym.discovery.screening.localisation` localises, at the same conditions for every data
+set: for each signal
 the size of the refitted model's residual, how much of its gap lies in each region, and how it goes
 with what the effects of the catalogue would make of it.
 """
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
-from pma_gym.discovery.ticks import TICK_S, Ticks, ticks_of
+from pma_gym.discovery.screening.time_bins import TICK_S, Ticks, ticks_of
 from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]

@@ -20,12 +20,12 @@ from benchmarks.hidden_effects.baselines.preparation import (
     prepare,
 )
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.leftovers import left_over
-from pma_gym.discovery.parameters import values
-from pma_gym.discovery.screening import Baseline, beginnings, look
-from pma_gym.discovery.selection import MOST_EFFECTS, NEAR, TRIED
-from pma_gym.discovery.suspects import Suspect
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.screening.residuals import left_over
+from pma_gym.discovery.screening.score_test import Baseline, beginnings, look
+from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS, NEAR, TRIED
 
 Array = NDArray[np.float64]
 

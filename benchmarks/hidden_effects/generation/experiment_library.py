@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.hidden_effects.generation.files import lab_model
 from benchmarks.hidden_effects.physics.rig import Array
 from benchmarks.hidden_effects.physics.simulation import RATE
-from pma_gym.discovery.protocols import RATE_HZ, Protocol, library
+from pma_gym.discovery.experiments.excitation import RATE_HZ, Protocol, library
 from pma_gym.plant.model import parse_model
 
 Volts = tuple[Array, Array]

@@ -25,10 +25,12 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation import files
 from benchmarks.hidden_effects.generation.cases import draw_case
 from pma_gym.data.datasets.dataset import read_dataset
-from pma_gym.discovery import bursts, leftovers, selection, workflow
-from pma_gym.discovery.fits import Bench
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import own_parameters
+from pma_gym.discovery import workflow
+from pma_gym.discovery.fitting.fit_problem import Bench
+from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.screening import residuals, scan_statistic
+from pma_gym.discovery.selection import forward_selection
 from pma_gym.plant.model import load_model
 
 JUDGED = (1, 2, 3, 5, 101, 202)
@@ -162,9 +164,9 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
     def spied(*_, **__):
         own = workflow.own_parameters(ready.bench.given)
-        noise = leftovers.autoregression([np.sin(np.arange(400.0))], 0.1)
-        seen.update(prior=own.prior, noise=noise, chance=selection.look()[0].p_value)
-        seen["bursts"] = bursts.autoregression([np.sin(np.arange(400.0))], 0.1)
+        noise = residuals.autoregression([np.sin(np.arange(400.0))], 0.1)
+        seen.update(prior=own.prior, noise=noise, chance=forward_selection.look()[0].p_value)
+        seen["bursts"] = scan_statistic.autoregression([np.sin(np.arange(400.0))], 0.1)
 
         class Nothing:
             def document(self):
@@ -172,8 +174,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
         return Nothing()
 
-    found = selection.Look(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
-    monkeypatch.setattr(selection, "look", lambda: [found])
+    found = forward_selection.Look(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
+    monkeypatch.setattr(forward_selection, "look", lambda: [found])
     monkeypatch.setattr(ablations, "diagnose", spied)
     ablations.ours(dataset, 0, 1)
     prior, memory = seen["prior"], seen["noise"].coefficients
@@ -184,9 +186,9 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     ablations.no_whitening(dataset, 0, 1)
     assert seen["bursts"] == seen["noise"] == white_noise(pytest.approx(np.sqrt(0.5), rel=0.01))
     assert seen["chance"] == 0.3
-    whole = selection.look
+    whole = forward_selection.look
     ablations.no_gate(dataset, 0, 1)
-    assert seen["chance"] == 0.0 and selection.look is whole
+    assert seen["chance"] == 0.0 and forward_selection.look is whole
     ablations.ours(dataset, 0, 1)
     assert np.array_equal(seen["prior"], prior) and seen["noise"].coefficients == memory
 

@@ -34,9 +34,9 @@ from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
 from pma_gym.discovery.diagnosis import ADDED
-from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.floors import initial_floors
-from pma_gym.discovery.noise import white_noise
+from pma_gym.discovery.preparation.initial_floors import initial_floors
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 

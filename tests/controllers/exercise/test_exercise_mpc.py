@@ -7,7 +7,7 @@ from controllers import CONTROLLERS, ExerciseMPC
 from controllers.exercise.joint_prediction import Horizon, Joint, foreseen
 from controllers.exercise.leg_observer import Agitation, LegObserver, PressureObserver, leg_of
 from controllers.exercise.resistance import AWAY_PA
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 
 
 def rmse(name, task, seed, **options):
@@ -17,7 +17,7 @@ def rmse(name, task, seed, **options):
     controller.reset(env.reference, env.station)
     ended, info = False, {}
     while not ended:
-        voltage = controller.act(env.reading, env.time)
+        voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
@@ -26,7 +26,7 @@ def rmse(name, task, seed, **options):
 
 
 @pytest.fixture(scope="module")
-def exercised():
+def exercise_step():
     env = PMAEnv("isokinetic_exercise")
     env.reset(seed=0)
     return env.station
@@ -63,30 +63,32 @@ def test_a_task_that_is_no_exercise_is_refused():
         ExerciseMPC().reset(env.reference, env.station)
 
 
-def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(exercised):
-    observer = LegObserver(exercised, Agitation())
-    radius = exercised.model.parameters["rotor"].radius
+def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(exercise_step):
+    observer = LegObserver(exercise_step, Agitation())
+    radius = exercise_step.model.parameters["rotor"].radius
     load, moment = 250.0, 250.0 * radius
-    wound = 0.4 * radius - load / exercised.model.parameters["cable"].stiffness
+    wound = 0.4 * radius - load / exercise_step.model.parameters["cable"].stiffness
     for i in range(1000):
-        observer.see(Reading(exercised.period * i, wound, 0.4, load, exercised.pressure))
+        observer.see(
+            Measurement(exercise_step.period * i, wound, 0.4, load, exercise_step.pressure)
+        )
     np.testing.assert_allclose(observer.state, [0.4, 0.0, moment, 0.0, 0.0], atol=1e-3)
 
 
-def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercised):
-    observer, (inertia, damping) = LegObserver(exercised, Agitation()), leg_of(exercised)
-    radius = exercised.model.parameters["rotor"].radius
+def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercise_step):
+    observer, (inertia, damping) = LegObserver(exercise_step, Agitation()), leg_of(exercise_step)
+    radius = exercise_step.model.parameters["rotor"].radius
     speed, moment = 0.3, damping * 0.3
     for i in range(1000):
-        angle = speed * exercised.period * (i + 1)
-        observer.see(Reading(0.0, radius * angle, angle, 0.0, exercised.pressure))
+        angle = speed * exercise_step.period * (i + 1)
+        observer.see(Measurement(0.0, radius * angle, angle, 0.0, exercise_step.pressure))
     assert inertia > 0.45
     np.testing.assert_allclose(observer.state[1:3], [speed, moment], rtol=1e-3)
 
 
-def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(exercised):
+def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(exercise_step):
     for off, found in ((-5e3, -5e3), (-200e3, -AWAY_PA)):
-        observer = PressureObserver(exercised, Agitation())
+        observer = PressureObserver(exercise_step, Agitation())
         for _ in range(500):
             observer.see(300e3 + off, 300e3)
         assert observer.offset == pytest.approx(found, abs=1.0)
