@@ -198,6 +198,6 @@ class Oracle:
         if self._environment is None:
             raise ValueError(
                 "oracle must be shown the environment, whose true station it knows; call "
-                "see(environment) before reset, or take a controller that needs the sensors alone"
+                "receive(environment) before reset, or take a controller that needs the sensors alone"
             )
         return self._environment

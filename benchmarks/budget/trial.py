@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.bounds.open_loop import open_loop_positions
 from benchmarks.budget.causes import OpenLoop, causes_of, without
-from benchmarks.open_loop import open_loop_positions
-from benchmarks.score import measured_score
+from benchmarks.reproduction.score import measured_score
 from pma_gym.envs import Station
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant

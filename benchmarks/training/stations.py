@@ -5,10 +5,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.comparison.recipe import Recipe
-from benchmarks.comparison.stations import draw_station
-from benchmarks.comparison.suite import frozen_suite
-from benchmarks.suite import SuiteError
+from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.recipe import Recipe
+from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.stations import draw_station
 from pma_gym.engine.options import told_model
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EXERCISES

@@ -36,7 +36,7 @@ STATIONS = ((1.0, 1.0), (1.0, 1.0), (1.2, 0.8), (0.8, 1.2))
 
 
 class Cost:
-    """What gains cost; see `benchmarks.tune`."""
+    """What gains cost; see `benchmarks.tuning.tune`."""
 
     def __init__(self, job: Job) -> None:
         self.job = job

@@ -1,4 +1,4 @@
-"""Gains by model, loop, task, controller and pressure, as `benchmarks/tune.py` wrote them."""
+"""Gains by model, loop, task, controller and pressure, as `benchmarks.tuning.tune` writes them."""
 
 import math
 from functools import cache

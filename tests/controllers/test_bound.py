@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.bound import achievable_bound
+from benchmarks.bounds.achievable import achievable_bound
 from controllers import CONTROLLERS
 from pma_gym.plant.model import load_model
 

@@ -114,7 +114,7 @@ def test_horizon_counts_every_scored_sample_once(rate, delay):
 
 
 def test_it_must_be_shown_the_environment(station):
-    with pytest.raises(ValueError, match=r"must be shown the environment.*see\(environment\)"):
+    with pytest.raises(ValueError, match=r"must be shown the environment.*receive\(environment\)"):
         Oracle().reset(lambda time: 0.0, station())
 
 

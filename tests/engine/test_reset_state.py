@@ -10,7 +10,8 @@ from pma_gym.engine.reset import reset_state
 from pma_gym.engine.reset.reset_state import holding_voltages, settled_at_no_load
 from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
-from pma_gym.plant.plant import Plant, vector
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import vector
 
 PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
 

@@ -4,8 +4,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+from benchmarks.training.configuration.preset import Preset, load_preset
 from benchmarks.training.job import ENVIRONMENT_OF
-from benchmarks.training.preset import Preset, load_preset
 from controllers.policies.action_mapping import MIDDLE_V, ActionMapping
 
 HEADLINE = "ppo"
