@@ -77,7 +77,7 @@ class ADRC(ObserverFeedback[Settings]):
         >>> controller, ended, info = ADRC(), False, {}
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.05
         True

@@ -15,7 +15,7 @@ from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.lifted_model import LiftedModel
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.observers.extended_state_observer import LOOSE_N
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class Settings(NamedTuple):
@@ -97,7 +97,7 @@ class ILC:
         ...     _, ended = env.reset(seed=300), False
         ...     controller.reset(env.reference, env.station)
         ...     while not ended:
-        ...         volts = controller.act(env.reading, env.time)
+        ...         volts = controller.act(env.measurement, env.time)
         ...         *_, ended, info = env.step(env.action(volts))
         ...     left.append(info["rmse_mm"])
         >>> left[2] < 0.5 * left[0]
@@ -116,7 +116,7 @@ class ILC:
         self._given = settings
         self._learning_trials = LearningTrials(self.repetitions)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Learn from the trial before, or begin anew."""
         motion = nominal_motion(reference, station)
         if self._learning_trials.goes_on(motion):
@@ -137,13 +137,13 @@ class ILC:
         )
         self._pid.reset(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
-        voltage = self._pid.act(observation, time)
+        voltage = self._pid.act(measurement, time)
         expected = self._motion.expected(time - self._late)
-        self._errors.append(expected - self._position(observation))
+        self._errors.append(expected - self._position(measurement))
         self._added.append(voltage - self._pid.feedforward(time))
-        self._taut.append(observation.load >= self._loose)
+        self._taut.append(measurement.load >= self._loose)
         return voltage
 
     def _learn(self) -> None:
@@ -199,7 +199,7 @@ class LearningTrials:
         return goes_on
 
 
-def loose_load(station: Station) -> float:
+def loose_load(station: StationInfo) -> float:
     """Load (N) below which the cable may be slack, so that the position says nothing."""
     return LOOSE_N if station.task.protocol.quantity == "rotation" else -math.inf
 
@@ -254,7 +254,7 @@ class _Learned:
         self._motion, self._learned = motion, learned.tolist()
         self._period = motion.station.period
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Nothing to compute."""
 
     def voltage(self, time: float) -> float:

@@ -19,7 +19,7 @@ from controllers.observers.deviation_filter import (
     Unknowns,
     with_disturbance,
 )
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -96,7 +96,7 @@ class LQG:
         >>> controller, ended = LQG(), False
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, broken, ended, info = env.step(env.action(volts))
         >>> broken, info["rmse_mm"] < 0.05
         (False, True)
@@ -111,7 +111,7 @@ class LQG:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the nominal motion and its gains, and estimate anew."""
         settings = self._settings(station)
         self._motion = nominal_motion(reference, station)
@@ -129,13 +129,13 @@ class LQG:
             weight = lengths / self._stroke.models[0].gain
             self._free_gains = regulator(a, free[1], weight, settings.effort)
 
-    def _settings(self, station: Station) -> Settings:
+    def _settings(self, station: StationInfo) -> Settings:
         return self._given or designed(self.name, station, DEFAULTS)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) to send now."""
         estimator = self._filter
-        estimator.update(observation)
+        estimator.update(measurement)
         state, due = estimator.ahead()
         if estimator.alone:
             feedback = self._of_rotor(state)
@@ -173,7 +173,7 @@ class LQG:
         far = behind < -FAR_SHARE * self._motion.station.task.protocol.span
         return FREE_MOST_V if far and behind < self._behind else 0.0
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) once the filter has settled: volts by error.
 
         With s frozen and what it may change in a second counted as d's. The controller predicts

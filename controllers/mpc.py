@@ -14,7 +14,7 @@ from controllers.models.nominal_motion import nominal_motion
 from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.compiled_model import regulator_voltage
 
 
@@ -96,7 +96,7 @@ class PreviewMPC:
         >>> controller.reset(env.reference, env.station)
         >>> ended = False
         >>> while not ended:
-        ...     *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        ...     *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
         >>> info["rmse_mm"] < 0.05
         True
     """
@@ -106,7 +106,7 @@ class PreviewMPC:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Foresee the trial: the nominal motion, the filters' gains, how voltages act.
 
         Raises:
@@ -128,9 +128,9 @@ class PreviewMPC:
         self._effort = self.settings.effort * changes.T @ changes
         self._entries = np.tril_indices(trial.horizon)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage of the task's actuator (V) to hold for the next control period."""
-        self._bank.update(observation, self._sent)
+        self._bank.update(measurement, self._sent)
         volts = self._volts(round(time / self._period) + self._delay)
         self._sent.append(volts)
         return volts
@@ -172,7 +172,7 @@ class PreviewMPC:
 class _Trial:
     """What a design depends on, equal to every other of which it is the same."""
 
-    def __init__(self, reference: Reference, station: Station, settings: Settings) -> None:
+    def __init__(self, reference: Reference, station: StationInfo, settings: Settings) -> None:
         self.station, self.settings, task = station, settings, station.task
         self.needed = nominal_motion(reference, station).volts
         times = station.period * np.arange(len(self.needed) + 1)

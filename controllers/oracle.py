@@ -34,7 +34,7 @@ from controllers.design.horizon import horizon
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.prediction import PLANS, Commands, Prediction
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ class Oracle:
         >>> oracle.receive(env)
         >>> oracle.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = oracle.act(env.reading, env.time)
+        ...     volts = oracle.act(env.measurement, env.time)
         ...     _, _, terminated, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.01
         True
@@ -80,7 +80,7 @@ class Oracle:
         copied.__dict__ |= copy.deepcopy(self.__dict__, memo)
         return copied
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Look at the true station, and compute what its inverse needs.
 
         Raises:
@@ -105,7 +105,7 @@ class Oracle:
         self._plan = self._needed[delay : delay + len(ahead.blocks)]
 
     def _tabulate(
-        self, needed: NDArray[np.float64], reference: Reference, station: Station
+        self, needed: NDArray[np.float64], reference: Reference, station: StationInfo
     ) -> None:
         """Keep inverse and reference of the whole trial, and of a horizon beyond its end."""
         ahead, delay = self._horizon, len(self._sent)
@@ -115,7 +115,7 @@ class Oracle:
         self._wanted = np.array([reference(time) for time in times.tolist()])
         self._counts = np.where(times <= station.task.duration + 1e-9, 1.0 / self._unit, 0.0)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator, in force after the action delay."""
         begin = round(time / self._period) + len(self._sent)
         end = begin + len(self._plan)
@@ -198,6 +198,6 @@ class Oracle:
         if self._environment is None:
             raise ValueError(
                 "oracle must be shown the environment, whose true station it knows; call "
-                "receive(environment) before reset, or take a controller that needs the sensors alone"
+                "receive(environment) before reset, or take a controller that needs only sensors"
             )
         return self._environment

@@ -9,7 +9,7 @@ from controllers.policies.adapter import PolicyAdapter
 from controllers.policies.document import PolicyError
 from controllers.policies.network import Network
 from controllers.policies.policy_file import PolicyFile, load_policy_file
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 POLICIES = Path(__file__).parent / "policies" / "shipped"
 """Folder of the shipped policies, each called `{kind of task}-{loop}-{algorithm}`."""
@@ -40,7 +40,7 @@ class Policy:
         self._network = Network(self.file.weights)
         self._adapter = PolicyAdapter(self.file.view, self.file.form)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Raises:
@@ -55,9 +55,9 @@ class Policy:
             )
         self._adapter.reset(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period."""
-        entries = self._adapter.update(observation, time)
+        entries = self._adapter.update(measurement, time)
         return self._adapter.volts(float(self._network(entries)[0]))
 
 
@@ -78,7 +78,7 @@ class ShippedPolicy:
         self._policies: dict[str, Policy] = {}
         self._policy: Policy | None = None
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the policy for the station, and prepare it for a trial.
 
         Raises:
@@ -89,7 +89,7 @@ class ShippedPolicy:
         policy.reset(reference, station)
         self._policy = policy
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period.
 
         Raises:
@@ -97,9 +97,9 @@ class ShippedPolicy:
         """
         if self._policy is None:
             raise RuntimeError(f"policy {self.name} has no trial: call reset() before act()")
-        return self._policy.act(observation, time)
+        return self._policy.act(measurement, time)
 
-    def _chosen(self, station: Station) -> Policy:
+    def _chosen(self, station: StationInfo) -> Policy:
         # Gains of the nearest loop serve; a network's weights hold for the loop that made them.
         name = f"{task_kind(station)}-{loop_name(station)}-{self.name}"
         if name not in self._policies:
@@ -134,7 +134,7 @@ def shipped_policies(folder: Path = POLICIES) -> list[Path]:
     return sorted(folder.glob("*.json"))
 
 
-def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> list[str]:
+def differences(file: PolicyFile, station: StationInfo, anywhere: bool = False) -> list[str]:
     """What makes a station another one than a policy was trained for, in words.
 
     Args:
@@ -158,7 +158,7 @@ def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> l
     return differing + _other_rows(file, station)
 
 
-def _other_rows(file: PolicyFile, station: Station) -> list[str]:
+def _other_rows(file: PolicyFile, station: StationInfo) -> list[str]:
     """Entries of the observation that are others, and their count if it is another."""
     rows, known = file.view.rows(station, file.form.base), file.observation
     differing = []

@@ -15,7 +15,7 @@ from controllers.models.lifted_model import second_difference
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.policies.document import PolicyError
 from controllers.policy import ShippedPolicy
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 CUTOFF_HZ = 8.0
 """Frequency at which half of an error is learned (Hz)."""
@@ -82,7 +82,7 @@ class PolicyWithILC:
         self._policy = ShippedPolicy(self.algorithm)
         self._learning_trials = LearningTrials(self.repetitions)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Learn from the trial before, or begin anew.
 
         Raises:
@@ -109,10 +109,10 @@ class PolicyWithILC:
         self._softened = None if alone else self._earlier.softened(self.moved, motion)
         self._policy.reset(_Moved(reference, self.moved, station.period).at, station)
         self._loose = loose_load(station)
-        self._readings = list[Reading]()
+        self._readings = list[Measurement]()
         self._errors, self._taut = list[float](), list[bool]()
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period.
 
         Raises:
@@ -122,12 +122,12 @@ class PolicyWithILC:
             raise RuntimeError(f"{self.name} has no trial: call reset() before act()")
         station, step = self._motion.station, len(self._readings)
         expected = self._motion.expected(time - station.observation_delay)
-        self._errors.append(expected - station.position(observation))
-        self._taut.append(observation.load >= self._loose)
-        self._readings.append(observation)
+        self._errors.append(expected - station.position(measurement))
+        self._taut.append(measurement.load >= self._loose)
+        self._readings.append(measurement)
         if self._softened is not None:
-            observation = self._softened.reading(observation, step)
-        return self._policy.act(observation, time)
+            measurement = self._softened.reading(measurement, step)
+        return self._policy.act(measurement, time)
 
     def _learn(self) -> None:
         """Move the reference by what the last trial says, and remember its readings."""
@@ -161,7 +161,7 @@ class EarlierTrials:
         self._steps, self._first = steps, True
         self._readings, self._moves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
 
-    def add(self, readings: Sequence[Reading], moved: NDArray[np.float64]) -> None:
+    def add(self, readings: Sequence[Measurement], moved: NDArray[np.float64]) -> None:
         """Remember a trial, if it was whole."""
         if not self._first and len(readings) >= self._steps:
             self._readings.append(np.array([reading[1:] for reading in readings[: self._steps]]))
@@ -185,7 +185,7 @@ class EarlierTrials:
             return np.interp(taken, instants, moves)
 
         mean, places = np.mean(self._readings, axis=0), shown(np.mean(self._moves, axis=0))
-        column = Reading._fields.index(station.task.protocol.quantity) - 1
+        column = Measurement._fields.index(station.task.protocol.quantity) - 1
         apart = [
             readings[:, column] - mean[:, column] - shown(moves) + places
             for readings, moves in zip(self._readings, self._moves, strict=True)
@@ -207,13 +207,13 @@ class Softened:
     def __init__(self, means: list[list[float]], share: float) -> None:
         self.means, self.share = means, share
 
-    def reading(self, reading: Reading, step: int) -> Reading:
-        """Reading that the policy receives in a control step; unchanged beyond the last one."""
+    def reading(self, reading: Measurement, step: int) -> Measurement:
+        """Measurement that the policy receives in a control step; unchanged beyond the last one."""
         if step >= len(self.means):
             return reading
         share = self.share
         values = [m + share * (x - m) for m, x in zip(self.means[step], reading[1:], strict=True)]
-        return Reading(reading[0], *values)
+        return Measurement(reading[0], *values)
 
 
 def smooth(

@@ -96,7 +96,7 @@ class SlidingMode(ObserverFeedback[Settings]):
         >>> controller, ended, info = SlidingMode(), False, {}
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.05
         True

@@ -16,7 +16,7 @@ from benchmarks.runner.controller_spec import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
+from pma_gym.envs import ENVIRONMENTS, Measurement, PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
@@ -155,7 +155,7 @@ class _Log:
     def __init__(self) -> None:
         self.asked: list[float] = []
         self.commands: list[tuple[float, float]] = []
-        self.readings: list[Reading] = []
+        self.readings: list[Measurement] = []
         self.truths: list[tuple[float, float, float]] = []
         self.act_seconds: list[float] = []
         self.step_seconds = 0.0
@@ -166,7 +166,7 @@ class _Log:
         truth = environment.truth
         if not self.readings:
             self.start = truth["contraction"] + truth["extension"]
-        self.readings.append(environment.reading)
+        self.readings.append(environment.measurement)
         self.truths.append((truth["contraction"], truth["load"], truth["pressure"]))
 
     def rollout(self, environment: PMAEnv) -> Rollout:

@@ -72,7 +72,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Begin a trial."""
         _, info = self.env.reset(seed=seed, options=options)
         self.pilot.reset(self.rig.reference, self.rig.station)
-        return self.pilot.update(self.rig.reading, self.rig.time), info
+        return self.pilot.update(self.rig.measurement, self.rig.time), info
 
     def step(
         self, action: NDArray[Any]
@@ -81,7 +81,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
         command: Any = self.rig.action(volts)
         _, reward, terminated, truncated, info = self.env.step(command)
-        entries = self.pilot.update(self.rig.reading, self.rig.time)
+        entries = self.pilot.update(self.rig.measurement, self.rig.time)
         return entries, float(bounded(reward, terminated, self._scale)), terminated, truncated, info
 
 

@@ -10,7 +10,7 @@ from controllers.design.quadratic_program import BoundedProgram
 from controllers.exercise.joint_prediction import Horizon, Joint, Program, programmed
 from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
 from controllers.exercise.resistance import Resistance, exercise_of, pressures_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.tasks.exercise import PACE
 
 Array = NDArray[np.float64]
@@ -104,7 +104,7 @@ class ExerciseMPC:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Begin at rest, at the trial's first pressure.
 
         Raises:
@@ -138,12 +138,12 @@ class ExerciseMPC:
             angles = self._prescription.angles
             self._knots = angles, [self._prescription.at(angle) for angle in angles]
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        self._leg.update(observation)
-        self._regulator.update(observation.pressure, self._sent.pop(0))
+        self._leg.update(measurement)
+        self._regulator.update(measurement.pressure, self._sent.pop(0))
         now = max(round(time / self._station.period) - self._old, 0)
-        self._chosen = self._best(self._station.moment(observation), now)
+        self._chosen = self._best(self._station.moment(measurement), now)
         self._sent.append(self._chosen)
         return self._volts(self._chosen)
 
@@ -188,7 +188,7 @@ class ExerciseMPC:
         return programmed(joint, of_moment, self.settings.effort, self._horizon)
 
 
-def expected_moment(station: Station, device: Resistance, times: Array) -> Array:
+def expected_moment(station: StationInfo, device: Resistance, times: Array) -> Array:
     """What a typical operator gives (N m) at times (s), but for how far he is from his intent.
 
         K theta_i(t - reaction) + plan(theta_i(t - reaction - rise))
@@ -208,14 +208,14 @@ def expected_moment(station: Station, device: Resistance, times: Array) -> Array
     return people.stiffness * meant + np.array(plan)
 
 
-def _horizon(station: Station, length: float) -> Horizon:
+def _horizon(station: StationInfo, length: float) -> Horizon:
     late = round((station.action_delay + station.observation_delay) / station.period)
     stride = max(1, round(STRIDE_S / station.period))
     ahead = max(4, round((length / station.period + late) / stride))
     return Horizon(station.period, stride, ahead, late)
 
 
-def _joint(station: Station, fade: float) -> Joint:
+def _joint(station: StationInfo, fade: float) -> Joint:
     exercise = station.task.exercise
     assert exercise is not None
     lag = station.model.parameters["regulator_lag"].time_constant

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from controllers.exercise.resistance import AWAY_PA
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class ProcessNoise(NamedTuple):
@@ -54,7 +54,7 @@ class LegObserver:
         state: theta (rad), w (rad/s), M_h (N m), s (N m/s) and e (rad) at the last reading.
     """
 
-    def __init__(self, station: Station, process_noise: ProcessNoise) -> None:
+    def __init__(self, station: StationInfo, process_noise: ProcessNoise) -> None:
         cable, sensors = station.model.parameters["cable"], station.model.parameters
         self._radius, self._stiffness = sensors["rotor"].radius, cable.stiffness
         self._station = station
@@ -75,7 +75,7 @@ class LegObserver:
         self._moment = self._radius * station.load
         self.state = np.array([0.0, 0.0, self._moment, 0.0, 0.0])
 
-    def update(self, reading: Reading) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading, a period after the last."""
         moment = self._station.moment(reading)
         wound = reading.extension + reading.load / self._stiffness - self._stretch
@@ -96,7 +96,7 @@ class PressureObserver:
         offset: g (Pa).
     """
 
-    def __init__(self, station: Station, process_noise: ProcessNoise) -> None:
+    def __init__(self, station: StationInfo, process_noise: ProcessNoise) -> None:
         parameters = station.model.parameters
         kept = np.exp(-station.period / parameters["regulator_lag"].time_constant)
         whole = np.array([[kept, 1.0 - kept], [0.0, 1.0]])
@@ -115,7 +115,7 @@ class PressureObserver:
         self.offset = min(max(self.offset + self._gain[1] * error, -AWAY_PA), AWAY_PA)
 
 
-def leg_of(station: Station) -> tuple[float, float]:
+def leg_of(station: StationInfo) -> tuple[float, float]:
     """Inertia I (kg m^2) and damping D (N m s) of all that turns with the nominal joint."""
     parameters = station.model.parameters
     leg, rotor, slide = (parameters[name] for name in ("leg", "rotor", "slide"))
@@ -134,7 +134,7 @@ def settled_gain(
     return np.linalg.solve(seen @ covariance @ seen.T + spread, seen @ covariance).T
 
 
-def _leg(station: Station, fade: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _leg(station: StationInfo, fade: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The leg over a period: what becomes of its state, and of a moment at the joint."""
     inertia, damping = leg_of(station)
     rates = np.zeros((6, 6))

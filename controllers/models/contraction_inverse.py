@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from controllers.models.muscle import Muscle
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.plant import Plant
 
 PROBE_PA = 1e3
@@ -41,7 +41,7 @@ class ContractionInverse:
         """Into how many steps a control period is divided: memories need short ones."""
         return max(1, math.ceil(period / 2e-3 - 1e-9))
 
-    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Regulator voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
         needed = self.pressures(wanted, station, station.period / parts)
@@ -54,7 +54,7 @@ class ContractionInverse:
         asked = start + change / -np.expm1(-pace * station.period)
         return (asked - self.line.offset) / self.line.gain
 
-    def pressures(self, wanted: np.ndarray, station: Station, step: float) -> np.ndarray:
+    def pressures(self, wanted: np.ndarray, station: StationInfo, step: float) -> np.ndarray:
         """Pressure (Pa) in the middle of every step of a motion, shape (n,).
 
         Args:

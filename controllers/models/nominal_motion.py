@@ -12,7 +12,7 @@ from controllers.models.local_model import LocalModel, Stroke
 from controllers.models.model_key import ModelKey
 from controllers.models.nominal_rollout import improved, nominal_rollout, position_of
 from controllers.models.operating_range import sensor_of, stroke_along
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 
 VOLTAGES_KEPT = 128
 """Motions whose voltages a process keeps."""
@@ -38,7 +38,7 @@ class NominalMotion:
     """
 
     def __init__(
-        self, reference: Reference, station: Station, planned: np.ndarray, volts: np.ndarray
+        self, reference: Reference, station: StationInfo, planned: np.ndarray, volts: np.ndarray
     ) -> None:
         self.reference, self.station, self.volts = reference, station, volts
         self._volts: list[float] = volts.tolist()
@@ -123,7 +123,7 @@ class NominalMotion:
         return slope * (pressure - self.station.pressure)
 
 
-def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
+def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     """The nominal plant along a reference.
 
     Voltages and local models are kept for the process, so that many trials with one reference,
@@ -147,7 +147,7 @@ def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
     return NominalMotion(reference, station, planned, volts)
 
 
-def _sampled(reference: Reference, station: Station, parts: int) -> np.ndarray:
+def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarray:
     """The reference at all nodes.
 
     One that is the task's own at every control instant is taken as that, and asked for all times
@@ -165,7 +165,7 @@ def _sampled(reference: Reference, station: Station, parts: int) -> np.ndarray:
 class _Aim:
     """A motion of a station, equal to every other for which a model needs the same voltages."""
 
-    def __init__(self, planned: np.ndarray, station: Station) -> None:
+    def __init__(self, planned: np.ndarray, station: StationInfo) -> None:
         self.planned, self.station, task = planned, station, station.task
         said = task.protocol.quantity, task.load, station.pressure
         self._key = *said, station.period, station.action_delay, planned.tobytes()

@@ -5,7 +5,7 @@ import numpy as np
 from controllers.models.local_model import Stroke
 from controllers.models.operating_range import rest_voltages
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.plant import Plant
 
 REPETITIONS = 3
@@ -21,7 +21,7 @@ LEAST_LOAD_N = 5.0
 """Load (N) under which a cable may be slack, and an error tells nothing of the voltage."""
 
 
-def nominal_rollout(station: Station, volts: np.ndarray) -> np.ndarray:
+def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
     """What the nominal plant's sensors say at control instants under voltages, without noise.
 
     Args:
@@ -46,14 +46,16 @@ def nominal_rollout(station: Station, volts: np.ndarray) -> np.ndarray:
     return measured
 
 
-def position_of(station: Station, said: np.ndarray) -> np.ndarray:
+def position_of(station: StationInfo, said: np.ndarray) -> np.ndarray:
     """The task's position (m or rad), shape (n,), from the result of `nominal_rollout`."""
     contraction, rotation, _ = said
     quantity = station.task.protocol.quantity
     return {"extension": -contraction, "rotation": rotation, "contraction": contraction}[quantity]
 
 
-def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke) -> np.ndarray:
+def improved(
+    station: StationInfo, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke
+) -> np.ndarray:
     """Voltages after some rehearsals, in each of which errors that stay are learned from.
 
         V[k] += share * mean of e / g over a window about k

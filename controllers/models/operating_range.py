@@ -7,7 +7,7 @@ import numpy as np
 
 from controllers.models.local_model import SENSORS, Stroke, stroke_models
 from controllers.models.model_key import ModelKey
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 from pma_gym.plant.plant import Plant
 
@@ -15,7 +15,7 @@ STROKES_KEPT = 64
 """Strokes whose local models a process keeps: one a pressure, task and control period."""
 
 
-def stroke_along(positions: np.ndarray, station: Station) -> Stroke:
+def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
     """Local models over the stroke of a motion: the task's range, and beyond where it goes there.
 
     Args:
@@ -50,14 +50,14 @@ def _stroke(
     return stroke_models(plant, quantity, actuator, rest, reach, directions, period)
 
 
-def rest_voltages(station: Station) -> tuple[float, float]:
+def rest_voltages(station: StationInfo) -> tuple[float, float]:
     """Voltages of motor and regulator (V) at which the nominal station begins a trial."""
     load, drive = station.task.load, station.model.parameters.get("drive")
     motor = (load - drive.offset) / drive.gain if load and drive is not None else 0.0
     return motor, Plant(station.model).regulator_voltage(station.pressure)
 
 
-def sensor_of(station: Station, quantity: str) -> tuple[float, float]:
+def sensor_of(station: StationInfo, quantity: str) -> tuple[float, float]:
     """Lag (s) and noise (m or rad), the DAQ's rounding included, of the sensor of a quantity."""
     name = SENSORS[quantity]
     _, calibration = sensors.SENSORS[name]

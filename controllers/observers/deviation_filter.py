@@ -34,7 +34,7 @@ from controllers.models.nominal_motion import NominalMotion
 from controllers.models.operating_range import sensor_of
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.observers.pressure_filter import PressureFilter
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 ONSET_V = {"motor": 0.2, "regulator": 0.05}
 """Standard deviation of d as the motion begins (V), by actuator: 20 N, for what the muscle pulls is
@@ -133,7 +133,7 @@ class DeviationFilter:
         """Whether the rotor is, which has yet to tighten the cable: x is its angle's (rad)."""
         return self._free is not None and not self.cable.tightened
 
-    def update(self, reading: Reading) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading, however old: the estimate is then for when it was taken."""
         taken = round(reading.time / self._period)
         for k in range(self._taken, taken):
@@ -238,13 +238,13 @@ class DeviationFilter:
         away = float(state[0]) / self._stroke.models[at].gain
         return DOUBT**2 * (pushed**2 + away**2 + (nominal - self._stroke.volts[at]) ** 2)
 
-    def _deviation(self, reading: Reading) -> float:
+    def _deviation(self, reading: Measurement) -> float:
         """By how much a reading lies from the nominal motion's (m or rad)."""
         if self.alone:
             return reading.rotation - self._motion.predicted_rotation(reading.time)
         return self._station.position(reading) - self._motion.predicted(reading.time)
 
-    def _note(self, reading: Reading) -> None:
+    def _note(self, reading: Measurement) -> None:
         """Take in whether the cable pulls."""
         before = self.alone
         self.cable.update(reading)

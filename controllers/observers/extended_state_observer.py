@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from controllers.models.lag_model import LagDeadTimeModel, lag_dead_time_model
 from controllers.models.nominal_motion import NominalMotion
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 if TYPE_CHECKING:
     import control
@@ -150,7 +150,7 @@ class ExtendedStateObserver:
         """Number of the place nearest to a position (m or rad)."""
         return round(min(max((position - self._first) * self._scale, 0.0), PLACES - 1.0))
 
-    def update(self, observation: Reading, time: float) -> np.ndarray:
+    def update(self, observation: Measurement, time: float) -> np.ndarray:
         """Take in a reading, once a period.
 
         A slack cable says nothing about the muscle: while it is, the slope of d is 0, or it would

@@ -3,7 +3,7 @@
 import numpy as np
 
 from controllers.observers.filter_bank_design import FACTORS, BankDesign
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 PRIOR = (0.1, 0.2, 0.4, 0.2, 0.1)
 """How likely each of `FACTORS` is before a trial: our assumption."""
@@ -88,7 +88,7 @@ class DampingBank:
             estimates = self.moved(estimates, period, sent[period])
         return estimates
 
-    def update(self, reading: Reading, sent: list[float]) -> None:
+    def update(self, reading: Measurement, sent: list[float]) -> None:
         """Take in what the sensors say; a reading that came before adds nothing.
 
         Args:

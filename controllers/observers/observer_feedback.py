@@ -9,7 +9,7 @@ from controllers.controller import Reference
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.extended_state_observer import ExtendedStateObserver
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -51,19 +51,19 @@ class ObserverFeedback(ABC, Generic[Settings]):
         """Feed-forward (V) to send at a time (s)."""
         return self._motion.command(time)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute what all places need, and forget everything else."""
         self._design(nominal_motion(reference, station))
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
-        z = self._observer.update(observation, time)
+        z = self._observer.update(measurement, time)
         planned = self._planned(time)
         voltage = min(max(self._wanted(planned, z), 0.0), VOLTAGE_LIMIT)
         self._observer.send(voltage - planned)
         return voltage
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) where it is linear: volts by error."""
         made = type(self)(self._given)
         made._design(nominal_motion(station.task.protocol.at, station))

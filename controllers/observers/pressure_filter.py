@@ -12,7 +12,7 @@ pressure will be when a command comes into force.
 
 import math
 
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 
 INNOVATION_GATE = 4.5
@@ -41,7 +41,7 @@ class PressureFilter:
         excess: estimate of J (Pa).
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
         sensor, (_, calibration) = parameters.get(NAME), sensors.SENSORS[NAME]
         rounding = calibration.resolution / math.sqrt(12.0)

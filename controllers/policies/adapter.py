@@ -19,7 +19,7 @@ from controllers.policies.observation_spec import (
 )
 from controllers.policies.scales import scales_of
 from controllers.registry import CONTROLLERS
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 DIVERGED = (
     "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
@@ -45,7 +45,7 @@ class PolicyAdapter:
         self.view, self.form = view, form
         self.base = base_of(form) if base is None and form.base else base
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Raises:
@@ -67,11 +67,11 @@ class PolicyAdapter:
             self._actions = deque([0.0] * self.view.history, maxlen=self.view.history)
         else:
             self._table = self.view.table(station)
-            self._readings: deque[Reading] = deque(maxlen=self.view.history + 1)
+            self._readings: deque[Measurement] = deque(maxlen=self.view.history + 1)
         if self.base is not None:
             self.base.reset(reference, station)
 
-    def update(self, reading: Reading, time: float) -> NDArray[np.float32]:
+    def update(self, reading: Measurement, time: float) -> NDArray[np.float32]:
         """The entries of a control step, shape (entries,).
 
         Args:
@@ -102,7 +102,7 @@ class PolicyAdapter:
             entries.append(self._voltage - self._before)
         return clipped(entries)
 
-    def _environment(self, reading: Reading, step: int) -> NDArray[np.float32]:
+    def _environment(self, reading: Measurement, step: int) -> NDArray[np.float32]:
         self._readings.appendleft(reading)
         action = self._before / MIDDLE_V - 1.0
         return clipped(
@@ -129,7 +129,7 @@ class PolicyAdapter:
         return self._before
 
 
-def _no_number(reading: Reading, time: float) -> str:
+def _no_number(reading: Measurement, time: float) -> str:
     bad = [f"{k} is {v}" for k, v in reading._asdict().items() if not math.isfinite(v)]
     return f"every reading must be a number, at {time:g} s {', '.join(bad)}; check the sensor"
 

@@ -16,7 +16,7 @@ from controllers.policies.observation_spec import (
     steps_of,
 )
 from controllers.policies.scales import scales_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class BatchPolicyAdapter:
@@ -36,7 +36,7 @@ class BatchPolicyAdapter:
         count: int,
         view: ObservationSpec,
         form: ActionMapping,
-        station: Callable[[float], Station],
+        station: Callable[[float], StationInfo],
     ) -> None:
         if view.kind != "tracking":
             raise ValueError(
@@ -120,7 +120,7 @@ class BatchPolicyAdapter:
         for i in range(self.count) if which is None else which.tolist():
             now = int(self.steps[i]) * self._period
             taken = max(int(self.steps[i]) - self._late, 0) * self._period
-            reading = Reading(taken, *readings[:, i].tolist())
+            reading = Measurement(taken, *readings[:, i].tolist())
             self._base_volts[i] = self._bases[i].act(reading, now)
 
     def volts(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:

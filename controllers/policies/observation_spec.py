@@ -11,7 +11,7 @@ from controllers.controller import Reference
 from controllers.policies.scales import FINE_SHARE, Scales, delayed_rows, share_of
 from pma_gym.engine.observation import BOUND, ObservationTable
 from pma_gym.engine.options import Options
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 ViewKind = Literal["tracking", "environment"]
 VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")
@@ -71,7 +71,7 @@ class ObservationSpec:
         """It as JSON."""
         return asdict(self)
 
-    def rows(self, station: Station, base: str | None = None) -> list[tuple[str, str]]:
+    def rows(self, station: StationInfo, base: str | None = None) -> list[tuple[str, str]]:
         """Entries and what 1.0 stands for, in order.
 
         Args:
@@ -100,7 +100,7 @@ class ObservationSpec:
             rows += [(f"voltage of {base} less the one commanded last", "1 V")]
         return rows
 
-    def table(self, station: Station) -> ObservationTable:
+    def table(self, station: StationInfo) -> ObservationTable:
         """The environment's own observation with this preview and history."""
         return ObservationTable(
             station.task,
@@ -114,7 +114,7 @@ class ObservationSpec:
         )
 
 
-def steps_of(reference: Reference, station: Station, preview: int) -> NDArray[np.float64]:
+def steps_of(reference: Reference, station: StationInfo, preview: int) -> NDArray[np.float64]:
     """The reference at every control step and `preview` steps past the end (m or rad)."""
     last = station.task.steps(1.0 / station.period) + preview
     return np.array([reference(k * station.period) for k in range(last + 1)])
@@ -142,7 +142,7 @@ def clipped(entries: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float3
 
 def environment_entries(
     table: ObservationTable,
-    readings: Sequence[Reading],
+    readings: Sequence[Measurement],
     reference: Callable[[int], float],
     action: float,
 ) -> list[float]:

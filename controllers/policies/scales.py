@@ -4,7 +4,7 @@ from typing import Any
 
 from pma_gym.data.protocol import Protocol
 from pma_gym.engine.observation import ROTATION_SCALE, Prescribed
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
@@ -39,7 +39,7 @@ class Scales:
         delay: control steps after which a command is in force.
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
         if "drive" not in parameters or "rotor" not in parameters:
             raise ValueError(
@@ -84,7 +84,7 @@ class Scales:
 class ExerciseScales(Scales):
     """What the entries of an exercise are measured by: as `Scales`, of a regulator that resists."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         super().__init__(station)
         exercise = station.task.exercise
         assert exercise is not None
@@ -110,7 +110,7 @@ class ExerciseScales(Scales):
         return first, second, (pressure - start) / EXERCISE_PRESSURE, load / EXERCISE_LOAD
 
 
-def scales_of(station: Station) -> Scales:
+def scales_of(station: StationInfo) -> Scales:
     """What a station's entries are measured by."""
     return ExerciseScales(station) if station.task.exercise else Scales(station)
 

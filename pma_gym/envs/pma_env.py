@@ -33,11 +33,12 @@ from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.station_info import Reading, Reference, Station, detached_task
+from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Events, Human, Task
 
 if TYPE_CHECKING:
@@ -463,10 +464,12 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._count * self.options.period
 
     @property
-    def reading(self) -> Reading:
-        """What the sensors say now, as late as `observation_delay_s` makes them."""
+    def measurement(self) -> Measurement:
+        """What the sensors say, `observation_delay_s` ago."""
         taken = max(self._count - self.options.observation_delay, 0) * self.options.period
-        return Reading(taken, *self._row[self._heard].tolist())
+        return Measurement(taken, *self._row[self._heard].tolist())
+
+    reading = renamed_attribute("reading", "measurement")
 
     @property
     def truth(self) -> dict[str, float]:
@@ -513,10 +516,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._engine.events(self._index)
 
     @property
-    def station(self) -> Station:
+    def station(self) -> StationInfo:
         """What a controller may know, in copies: what it was designed with, how it is driven."""
         options = self.options
-        return Station(
+        return StationInfo(
             copy.copy(self._engine.told),
             self._detached_task,
             self.pressure,

@@ -38,6 +38,7 @@ from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Task, limit_in_words
 
 if TYPE_CHECKING:
@@ -429,14 +430,16 @@ class PMAVectorEnv(
         }
         return found | {name: found[name] != 0.0 for name in TRUTHS}
 
-    def readings(self) -> NDArray[np.float64]:
-        """What the sensors say now, as controllers hear it (SI), shape (4, num_envs).
+    def measurements(self) -> NDArray[np.float64]:
+        """What the sensors say, `observation_delay_s` ago (SI), shape (4, num_envs).
 
-        Extension (m), rotation (rad), load (N), pressure (Pa), as late as `observation_delay_s`
-        makes them: of each environment what `PMAEnv.reading` has.
+        Extension (m), rotation (rad), load (N), pressure (Pa): of each environment what
+        `PMAEnv.measurement` has.
         """
         late = self.options.observation_delay
         return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
+
+    readings = renamed_attribute("readings", "measurements")
 
     @property
     def pressures(self) -> NDArray[np.float64]:

@@ -37,11 +37,11 @@ def test_a_copy_in_the_middle_of_a_trial_goes_on_alike_and_alone(name):
         controller.receive(env)
     controller.reset(env.reference, env.station)
     for _ in range(BEFORE):
-        env.step(env.action(controller.act(env.reading, env.time)))
+        env.step(env.action(controller.act(env.measurement, env.time)))
     copied = copy.deepcopy(controller)
     readings, given = [], []
     for _ in range(1 if hasattr(controller, "receive") else AFTER):
-        readings.append((env.reading, env.time))
+        readings.append((env.measurement, env.time))
         given.append(float(controller.act(*readings[-1])))
         if not hasattr(controller, "receive"):
             env.step(env.action(given[-1]))

@@ -101,7 +101,7 @@ def trials(controller, env, nominal=None, count=10, seed=50):
         controller.reset(env.reference, told)
         ended, info = False, {}
         while not ended:
-            volts = controller.act(env.reading, env.time)
+            volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))
             ended = terminated or truncated
         left.append(info["rmse_mm"])

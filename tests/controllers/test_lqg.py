@@ -13,13 +13,15 @@ from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
 from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
 from controllers.observers.pressure_filter import PressureFilter
-from pma_gym.envs import PMAEnv, Reading, Station
+from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS
 
 
 def station_of(task="displacement", pressure_kpa=300.0, model="station", rate=100.0, **delays):
-    return Station(load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays)
+    return StationInfo(
+        load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays
+    )
 
 
 def test_regulator_solves_the_scalar_riccati_equation():
@@ -116,7 +118,7 @@ def test_free_rotor_is_exact_under_held_voltage():
 def readings(where, ways_mm, loads_n, period=0.01):
     radius = where.model.parameters["rotor"].radius
     for k, (way, load) in enumerate(zip(ways_mm, loads_n, strict=True)):
-        yield Reading(k * period, 0.0, 1e-3 * way / radius, load + 7.0, 300e3)
+        yield Measurement(k * period, 0.0, 1e-3 * way / radius, load + 7.0, 300e3)
 
 
 def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
@@ -194,7 +196,7 @@ def run(env, controller, nominal):
     controller.reset(env.reference, replace(env.station, model=nominal))
     ended, info = False, {}
     while not ended:
-        voltage = controller.act(env.reading, env.time)
+        voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
         *_, broken, ended, info = env.step(env.action(voltage))
         assert not broken

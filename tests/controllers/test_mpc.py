@@ -131,7 +131,7 @@ def driven(controller, seed=3):
     ended, info = False, {}
     while not ended:
         *_, terminated, truncated, info = env.step(
-            env.action(controller.act(env.reading, env.time))
+            env.action(controller.act(env.measurement, env.time))
         )
         ended = terminated or truncated
     return info["rmse_mm"], env.voltages

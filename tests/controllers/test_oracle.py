@@ -25,7 +25,7 @@ def commands_of(task, seed: int = 1, **options):
     oracle.receive(env)
     oracle.reset(env.reference, env.station)
     while not ended:
-        volts.append(oracle.act(env.reading, env.time))
+        volts.append(oracle.act(env.measurement, env.time))
         _, _, terminated, truncated, _ = env.step(env.action(volts[-1]))
         ended = terminated or truncated
     return np.array(volts), env

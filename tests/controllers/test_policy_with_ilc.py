@@ -11,7 +11,7 @@ from controllers import PolicyWithILC
 from controllers.models.nominal_motion import nominal_motion
 from controllers.policy import PolicyError
 from controllers.policy_with_ilc import LEAST_SHARE, EarlierTrials, Softened, smooth
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
 
 PERIOD, STEPS = 0.01, 501
@@ -32,7 +32,7 @@ def trials(controller, seeds, env):
         told = replace(env.station, model=load_model("station"))
         controller.reset(env.reference, told)
         while not ended:
-            volts = controller.act(env.reading, env.time)
+            volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))
             ended = terminated or truncated
         assert truncated
@@ -74,7 +74,7 @@ def scattered(motion, scatter, generator, moved=0.0):
 
 
 def _reading(row):
-    return Reading(0.0, *row)
+    return Measurement(0.0, *row)
 
 
 @pytest.fixture

@@ -179,7 +179,7 @@ def test_plants_and_what_controllers_get_pickle(single, same):
         assert plant.model == env.plant.model and plant.tolerance == env.plant.tolerance
         states, again = plant.settle(0.0, pressure=300e3), env.plant.settle(0.0, pressure=300e3)
         np.testing.assert_array_equal(states.state, again.state)
-        assert made(env.station) == env.station and made(env.reading) == env.reading
+        assert made(env.station) == env.station and made(env.measurement) == env.measurement
         assert made(env.options) == env.options and made(env.task) == env.task
         assert made(env.events).step_times.size == 0
         assert same(made(env.condition).state, env.condition.state)

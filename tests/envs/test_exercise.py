@@ -313,7 +313,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
     volts = env.regulator_voltage
     for _ in range(300):
         observation, *_ = env.step(env.action(volts))
-    reading, station, span = env.reading, env.station, env.task.protocol.span
+    reading, station, span = env.measurement, env.station, env.task.protocol.span
     plan = env.task.exercise.prescription
     assert observation[4] == pytest.approx(plan.at(reading.rotation) / span, rel=1e-6)
     assert observation[5] == pytest.approx(-station.position(reading) / span, rel=1e-5)

@@ -92,7 +92,7 @@ def test_a_training_leaves_a_policy_that_drives_an_exercise(
     env.reset(seed=1)
     driven.reset(env.reference, env.station)
     for _ in range(20):
-        _, _, terminated, *_ = env.step(env.action(driven.act(env.reading, env.time)))
+        _, _, terminated, *_ = env.step(env.action(driven.act(env.measurement, env.time)))
         assert not terminated
 
 
@@ -171,7 +171,7 @@ def driven(env, controller, seed):
     controller.reset(env.reference, env.station)
     ended = False
     while not ended:
-        *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
     return list(info["rmse_by_phase_deg"].values())
 
 

@@ -30,7 +30,7 @@ from controllers.policies.network import Network
 from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import Policy
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.sb3.policy import LeanMlpPolicy
 from pma_gym.sb3.ppo import LeanPPO
@@ -189,7 +189,7 @@ def test_onnx_computes_the_same(activation, output, scaled):
     from onnx.reference import ReferenceEvaluator
 
     parts = {"activation": activation, "output": output, "scaled": scaled}
-    station = Station(load_model("station"), TASKS["displacement"], 3e5, 0.01)
+    station = StationInfo(load_model("station"), TASKS["displacement"], 3e5, 0.01)
     policy = drawn_policy(station, view=ObservationSpec(), form=ActionMapping(), **parts)
     content = onnx_bytes(policy)
     rows = np.random.default_rng(3).normal(size=(20, len(policy.observation)))
@@ -247,7 +247,7 @@ def test_a_users_own_model_drives_as_a_policy_as_it_did_as_an_agent(saved, tmp_p
     policy.reset(env.reference, env.station)
     for _ in range(100):
         action, _ = model.predict(observation, deterministic=True)
-        volts = policy.act(env.reading, env.time)
+        volts = policy.act(env.measurement, env.time)
         assert abs(volts - (5.0 + 5.0 * float(action[0]))) < 1e-5
         observation, *_ = env.step(action)
 

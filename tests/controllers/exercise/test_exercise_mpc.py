@@ -7,7 +7,7 @@ from controllers import CONTROLLERS, ExerciseMPC
 from controllers.exercise.joint_prediction import Horizon, Joint, predicted
 from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
 from controllers.exercise.resistance import AWAY_PA
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 
 
 def rmse(name, task, seed, **options):
@@ -17,7 +17,7 @@ def rmse(name, task, seed, **options):
     controller.reset(env.reference, env.station)
     ended, info = False, {}
     while not ended:
-        voltage = controller.act(env.reading, env.time)
+        voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
@@ -69,7 +69,7 @@ def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(exercised):
     load, moment = 250.0, 250.0 * radius
     wound = 0.4 * radius - load / exercised.model.parameters["cable"].stiffness
     for i in range(1000):
-        observer.update(Reading(exercised.period * i, wound, 0.4, load, exercised.pressure))
+        observer.update(Measurement(exercised.period * i, wound, 0.4, load, exercised.pressure))
     np.testing.assert_allclose(observer.state, [0.4, 0.0, moment, 0.0, 0.0], atol=1e-3)
 
 
@@ -79,7 +79,7 @@ def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercised):
     speed, moment = 0.3, damping * 0.3
     for i in range(1000):
         angle = speed * exercised.period * (i + 1)
-        observer.update(Reading(0.0, radius * angle, angle, 0.0, exercised.pressure))
+        observer.update(Measurement(0.0, radius * angle, angle, 0.0, exercised.pressure))
     assert inertia > 0.45
     np.testing.assert_allclose(observer.state[1:3], [speed, moment], rtol=1e-3)
 
