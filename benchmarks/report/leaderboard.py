@@ -17,7 +17,7 @@ from benchmarks.suites.frozen import Entry, FrozenSuite
 from benchmarks.suites.reproduction import SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
-from pma_gym.tasks import ISOTONIC, TASKS, obstacle
+from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
 
 LOOP_TASKS = (*TASKS, *ISOTONIC)
 """Tasks whose loops are shown, the motor's and the regulator's. Unseen references have those of the
@@ -122,7 +122,7 @@ class Leaderboard:
         """Why the nominal actuator cannot follow, by task and pressure (kPa), where it cannot."""
         trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
         model = self.suite.nominal
-        known = {(t, kpa): obstacle(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
+        known = {(t, kpa): infeasibility_reason(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
         return {trial: why for trial, why in known.items() if why is not None}
 
     @cached_property

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.options import Options
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
@@ -255,7 +255,7 @@ def test_what_cannot_be_pickled_is_named_with_the_fix():
 
 def test_environments_on_a_device_say_that_they_cannot_be_copied():
     engine = DeviceEngine(
-        TASKS["displacement"], Options(model="serres2008"), 2, "double", StandIn()
+        TASKS["displacement"], Options(model="serres2008"), 2, "double", CpuDevice()
     )
     for made in (pickle.dumps, copy.copy, copy.deepcopy):
         with pytest.raises(TypeError, match="DeviceEngine cannot be copied or pickled.*; make"):

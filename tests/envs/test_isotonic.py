@@ -6,7 +6,7 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
@@ -161,7 +161,7 @@ def test_a_batch_has_the_bits_of_environments_alone(twins, options, mode):
 def test_threads_have_the_bits_of_the_processor():
     task, options = ISOTONIC["triangle_low"], Options(control_rate_hz=20.0)
     own = Engine(task, options, 7)
-    other = DeviceEngine(task, options, 7, "double", StandIn(3))
+    other = DeviceEngine(task, options, 7, "double", CpuDevice(3))
     every = np.arange(7)
     own.seed(every, [7 + i for i in range(7)])
     own.reset(every)
