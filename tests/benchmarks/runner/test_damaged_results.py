@@ -35,7 +35,7 @@ RUBBISH = {
 
 def order(folder):
     return Order(
-        block=Block("nothing", trials=1, seconds=2.0), count=3, seed=4, folder=folder, judge=by_size
+        block=Block("nothing", trials=3, seconds=2.0), count=3, seed=4, folder=folder, judge=by_size
     )
 
 
