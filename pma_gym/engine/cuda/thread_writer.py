@@ -2,7 +2,7 @@
 
 The arithmetic is the processor's own, by the same methods; only memory differs. A thread commands
 and senses environments thread, thread + threads, and so on. In between, the threads of a warp share
-the marches of theirs: who is done takes the next, so that none waits long for a neighbour whose
+the integrations of theirs: who is done takes the next, so that none waits long for a neighbour whose
 steps are short.
 """
 
@@ -31,7 +31,7 @@ from pma_gym.integrator.integration import FUSED, memory
 
 
 class Turns(Protocol):
-    """Which environment a thread marches next, and what threads of a warp do together."""
+    """Which environment a thread integrates next, and what threads of a warp do together."""
 
     def following(self, job: Operand) -> Operand:
         """Write the number of the environment after one; beyond the last if there is none."""
