@@ -1,8 +1,8 @@
 """The control step as one GPU kernel, one thread an environment, and its stand-in for tests.
 
 Two functions take the same arguments: `step` (command, integration, sensors, reward, end) and
-`begin` (new episodes where one has ended). The stand-in is the very same code for the processor, with the
-number of the thread counted by a loop.
+`begin` (new episodes where one has ended). The stand-in is the very same code for the processor,
+with the number of the thread counted by a loop.
 """
 
 import ctypes

@@ -2,8 +2,8 @@
 
 The arithmetic is the processor's own, by the same methods; only memory differs. A thread commands
 and senses environments thread, thread + threads, and so on. In between, the threads of a warp share
-the integrations of theirs: who is done takes the next, so that none waits long for a neighbour whose
-steps are short.
+the integrations of theirs: who is done takes the next, so that none waits long for a neighbour
+whose steps are short.
 """
 
 from typing import Protocol
