@@ -34,7 +34,7 @@ def draw_station() -> None:
     env.reset(seed=1)
     replay.reset(env.reference, env.station)
     while env.time < STOP_S - 1e-9:
-        env.step(env.action(replay.act(env.reading, env.time)))
+        env.step(env.action(replay.act(env.measurement, env.time)))
     IMAGES.mkdir(exist_ok=True)
     matplotlib.image.imsave(IMAGES / "station.png", env.render())
 

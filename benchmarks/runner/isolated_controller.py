@@ -21,7 +21,7 @@ from benchmarks.runner.rollout import checked_volts
 from benchmarks.runner.user_controller import Guarded
 from benchmarks.runner.worker import Worker, deaf_to_interrupt
 from controllers.controller import Controller, Reference
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 def driver(contender: Contender, period: float, keep_pace: bool = True) -> Controller:
@@ -64,14 +64,14 @@ class Isolated:
         self.act_seconds: list[float] = []
         self.name, self.repetitions = self._ask(partial(_make, contender, period, keep_pace))
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`."""
         self.act_seconds.clear()
         self._ask(partial(_reset, reference, station))
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`."""
-        volts, seconds = self._ask(partial(_act, observation, time))
+        volts, seconds = self._ask(partial(_act, measurement, time))
         self.act_seconds.append(seconds)
         return volts
 
@@ -118,13 +118,13 @@ def _make(contender: Contender, period: float, keep_pace: bool) -> tuple[str, in
     return _controller.name, int(getattr(_controller, "repetitions", 1))
 
 
-def _reset(reference: Reference, station: Station) -> None:
+def _reset(reference: Reference, station: StationInfo) -> None:
     _controller.reset(reference, station)
 
 
-def _act(observation: Reading, now: float) -> tuple[float, float]:
+def _act(measurement: Measurement, now: float) -> tuple[float, float]:
     began = time.perf_counter()
-    answer = _controller.act(observation, now)
+    answer = _controller.act(measurement, now)
     return checked_volts(answer, now), time.perf_counter() - began
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from benchmarks.runner.controller_spec import Contender, ControllerError, raised_at
 from benchmarks.runner.worker import begin_limited, end_limited
 from controllers.controller import Controller, Reference
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 MAKE_S, RESET_S, ACT_S = 60.0, 60.0, 2.0
 """How long importing and making a controller, its `reset` and its `act` may take before the
@@ -46,7 +46,7 @@ class Guarded:
     def __getattr__(self, name: str) -> object:
         return getattr(self._controller, name)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`.
 
         Raises:
@@ -62,7 +62,7 @@ class Guarded:
             end_limited()
 
     # Written out: a context manager would cost as much as a simple controller takes.
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`.
 
         Raises:
@@ -72,7 +72,7 @@ class Guarded:
         began = _clock()
         begin_limited("act", ACT_S)
         try:
-            answer = self._controller.act(observation, time)
+            answer = self._controller.act(measurement, time)
         except (Exception, SystemExit) as error:
             raise self._told("act", error, f"at {time:.4g} s") from error
         finally:

@@ -104,7 +104,9 @@ def test_compiled_beginnings_are_those_of_a_search_bit_for_bit(task, options):
         found = []
         for seed in (5, None, None, 6):
             envs.reset(seed=seed)
-            names = [n for n in engine.record.places if engine.record.kind(n) == "real"]
+            names = [
+                n for n in engine.state_layout.offsets if engine.state_layout.kind(n) == "real"
+            ]
             found.append([engine.pressures.copy(), *map(engine.numbers, names)])
         envs.close()
         return np.array(found)

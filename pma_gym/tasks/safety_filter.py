@@ -36,7 +36,7 @@ MOMENT_FILTER_S = 0.15
 """Time constant of the moment of late (s)."""
 
 
-class Guard(NamedTuple):
+class SafetyFilter(NamedTuple):
     """Numbers of the safety layer.
 
     Attributes:
@@ -63,15 +63,15 @@ class Guard(NamedTuple):
     end_influence: float = 0.08 / SI_FACTORS["kPa"]
 
 
-GUARD_PACED = Guard(speed_share=0.45, speed_reserve=2.0)
+FILTER_PACED = SafetyFilter(speed_share=0.45, speed_reserve=2.0)
 """Where the device sets the pace: the operator's joint is slack, and whatever is not balanced moves
 it."""
 
-GUARD_PACING = Guard(speed_share=0.5, speed_reserve=1.2)
+FILTER_PACING = SafetyFilter(speed_share=0.5, speed_reserve=1.2)
 """Where the operator keeps the pace with a stiff joint."""
 
 
-def let_through(
+def filtered_pressure(
     asked: Any,  # noqa: ANN401
     pressure: Any,  # noqa: ANN401
     moment: Any,  # noqa: ANN401
@@ -80,7 +80,7 @@ def let_through(
     angle: Any,  # noqa: ANN401
     safe_moment: float,
     safe_speed: float,
-    guard: Guard,
+    safety_filter: SafetyFilter,
 ) -> Any:  # noqa: ANN401
     """Pressure that the safety layer commands; numbers or traced values.
 
@@ -93,30 +93,34 @@ def let_through(
         angle: of the joint (rad).
         safe_moment: what the moment must not exceed (N m).
         safe_speed: what the speed must not (rad/s).
-        guard: its numbers.
+        safety_filter: its numbers.
     """
-    most = guard.speed_share * safe_speed
-    share = 1.0 / _influence(angle, guard)
+    most = safety_filter.speed_share * safe_speed
+    share = 1.0 / _influence(angle, safety_filter)
     ahead = slow - moment
-    falling = (_reserve(most - speed, guard) - ahead) * share
-    spare = moment - guard.slack_moment
-    taut = guard.taut_share * where(spare > 0.0, spare, 0.0) * share
+    falling = (_reserve(most - speed, safety_filter) - ahead) * share
+    spare = moment - safety_filter.slack_moment
+    taut = safety_filter.taut_share * where(spare > 0.0, spare, 0.0) * share
     falling = where(taut < falling, taut, falling)
-    rising = (_reserve(most + speed, guard) + ahead) * share
-    room = guard.moment_reserve * (guard.moment_share * safe_moment - moment) * share
+    rising = (_reserve(most + speed, safety_filter) + ahead) * share
+    room = (
+        safety_filter.moment_reserve * (safety_filter.moment_share * safe_moment - moment) * share
+    )
     rising = where(room < rising, room, rising)
     lowest, highest = pressure - falling, pressure + rising
     found = where(asked < lowest, lowest, asked)
     return where(found > highest, highest, found)
 
 
-def _reserve(left: Any, guard: Guard) -> Any:  # noqa: ANN401
+def _reserve(left: Any, safety_filter: SafetyFilter) -> Any:  # noqa: ANN401
     """Moment that may be unbalanced (N m) where so much speed is left (rad/s)."""
-    return guard.speed_reserve * where(left < 0.0, guard.brake * left, left)
+    return safety_filter.speed_reserve * where(left < 0.0, safety_filter.brake * left, left)
 
 
-def _influence(angle: Any, guard: Guard) -> Any:  # noqa: ANN401
+def _influence(angle: Any, safety_filter: SafetyFilter) -> Any:  # noqa: ANN401
     """Change of the moment by the pressure at an angle (N m/Pa)."""
     way = angle * (1.0 / FULL_ANGLE)
     held = where(way < 0.0, 0.0, where(way > 1.0, 1.0, way))
-    return guard.start_influence + held * (guard.end_influence - guard.start_influence)
+    return safety_filter.start_influence + held * (
+        safety_filter.end_influence - safety_filter.start_influence
+    )
