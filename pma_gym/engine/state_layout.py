@@ -108,7 +108,7 @@ class StateLayout:
 
     @property
     def held(self) -> list[str]:
-        """What the march needs that stays during a control step."""
+        """What the integration needs that stays during a control step."""
         own = [START] if self.task.actuator == "regulator" else []
         return ["motor_voltage", "regulator_voltage", "zero_contraction", *own, *self.prescribed]
 
