@@ -23,7 +23,7 @@ def safe_experiments() -> tuple[Excitation, ...]:
 
 
 def named(words: str, g: np.random.Generator) -> tuple[str, Volts]:
-    """Name and volts of an excitation whose name begins with words, at a random one of its settings.
+    """Name and volts of an excitation whose name begins with words, at one of its settings.
 
     Raises:
         ValueError: there is none.
