@@ -1,4 +1,4 @@
-"""The code uses the words of its fields: private words stand neither in identifiers nor in prose."""
+"""Code and pages use the words of their fields, in identifiers and in prose."""
 
 import ast
 import re
@@ -62,7 +62,7 @@ PHRASES = (
 )
 """Phrases that are never right, in code and pages."""
 
-TEXTS = ("pma_gym", "controllers", "benchmarks", "docs", "examples", "README.md")
+TEXTS = ("controllers", "docs", "README.md")
 EXEMPT = ("docs/notebook",)
 """Notes of what was thought then stay as they were written."""
 
