@@ -1,4 +1,4 @@
-"""What a controller is: told the reference and the station, then asked for volts."""
+"""The controller protocol: `reset` with the reference and the station, `act` for each voltage."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
@@ -61,7 +61,7 @@ class LinearController(Controller, Protocol):
         plant, unless the controller itself waits. Needs no `reset`.
 
         Args:
-            station: what the controller is told.
+            station: the station as the controller knows it.
             position: where on the stroke (m or rad).
         """
         ...

@@ -71,7 +71,7 @@ def _under_oracle(model: Model, task: str, pressure_kpa: float, rate: float) -> 
     )
     environment.reset(seed=0)
     oracle, ended = Oracle(), False
-    oracle.see(environment)
+    oracle.receive(environment)
     oracle.reset(environment.reference, environment.station)
     while not ended:
         voltage = oracle.act(environment.measurement, environment.time)

@@ -127,8 +127,8 @@ def rollout(
         controller: who drives; reset first.
         seed: seed of the episode.
         nominal: model that the controller receives, if the environment has another.
-        reveal: hand the environment to the controller's method `see` before each reset; only for
-            the oracle, which is no rival but the bound that rivals are measured by.
+        reveal: hand the environment to the controller's method `receive` before each reset; only
+            for the oracle, which is no rival but the bound that rivals are measured by.
     Returns:
         What happened, to the last scored sample or to where a physical limit ended it.
     Raises:
@@ -161,7 +161,7 @@ class _Log:
         self.step_seconds = 0.0
         self.start = 0.0
 
-    def see(self, environment: PMAEnv) -> None:
+    def record(self, environment: PMAEnv) -> None:
         """Write down where the station stands."""
         truth = environment.truth
         if not self.readings:
@@ -194,7 +194,7 @@ def _begin(
     """Reset the environment and the controller."""
     environment.reset(seed=seed)
     if reveal:
-        controller.see(environment)  # type: ignore[attr-defined]
+        controller.receive(environment)  # type: ignore[attr-defined]
     station = environment.station
     if nominal is not None:
         # A copy: whatever the controller does to it, the next case receives the same model.
@@ -204,7 +204,7 @@ def _begin(
 
 def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
     """Run an episode to its end."""
-    log.see(environment)
+    log.record(environment)
     clock, ended = time.perf_counter, False
     while not ended:
         now, reading = environment.time, log.readings[-1]
@@ -219,7 +219,7 @@ def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
         log.asked.append(volts)
         log.act_seconds.append(answered - asked)
         log.commands.append((environment.motor_voltage, environment.regulator_voltage))
-        log.see(environment)
+        log.record(environment)
         ended = terminated or truncated
 
 

@@ -113,13 +113,13 @@ def nearest_loop(wanted: str, known: list[str]) -> str:
 
 def _dead_time(loop: str) -> float:
     """Period and delay of a loop (s), read off its name."""
-    found = re.fullmatch(r"([0-9.e+-]+)hz(?:_delay([0-9.e+-]+)ms)?", loop)
-    if found is None:
+    match = re.fullmatch(r"([0-9.e+-]+)hz(?:_delay([0-9.e+-]+)ms)?", loop)
+    if match is None:
         raise ValueError(
             f"a loop is called like 100hz or 50hz_delay20ms (control rate in Hz, delay in ms), "
             f"got {loop!r}; write the settings anew: python -m benchmarks design"
         )
-    return 1.0 / float(found[1]) + 1e-3 * float(found[2] or 0.0)
+    return 1.0 / float(match[1]) + 1e-3 * float(match[2] or 0.0)
 
 
 @cache

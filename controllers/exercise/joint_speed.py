@@ -11,7 +11,7 @@ class JointSpeed:
     The LVDT is finer than the potentiometer. What the cable stretches is taken for no motion.
 
     Args:
-        station: what the controller is told.
+        station: the station as the controller knows it.
         time_constant: of the filter (s).
 
     Attributes:
@@ -23,7 +23,7 @@ class JointSpeed:
         self._kept = math.exp(-station.period / time_constant)
         self.speed = self._extension = 0.0
 
-    def see(self, reading: Measurement) -> float:
+    def update(self, reading: Measurement) -> float:
         """Take a reading; the speed (rad/s)."""
         rate = self._rate * (reading.extension - self._extension)
         self._extension = reading.extension

@@ -75,7 +75,7 @@ class MomentPID:
         slope = 0.0 if self._over is None else (over - self._over) / self._period
         self._slope, self._over = slope + self._kept * (self._slope - slope), over
         moment = gains.proportional * over + self._sum + gains.derivative * self._slope
-        coming = angle + gains.lead * self._speed.see(measurement)
+        coming = angle + gains.lead * self._speed.update(measurement)
         pressure = float(np.interp(coming, ANGLES, self._schedule))
         pressure -= moment / self._device.at(measurement.pressure, angle).influence
         if not self._arrival.held(measurement.pressure, -over):

@@ -92,7 +92,7 @@ def exercise_of(name: str, station: StationInfo, prescribed: bool | None = None)
 
     Args:
         name: of the controller.
-        station: what it is told.
+        station: the station as the controller knows it.
         prescribed: whether it follows a moment (True) or holds the speed (False); None: either.
     Raises:
         ValueError: it cannot; says which tasks it can do.
@@ -112,7 +112,7 @@ class Arrival:
     The nominal regulator is a lag: believed' = (commanded - believed) / tau.
 
     Args:
-        station: what the controller is told.
+        station: the station as the controller knows it.
     """
 
     def __init__(self, station: StationInfo) -> None:

@@ -77,7 +77,7 @@ class SpeedPID:
         gains, due = self.gains, time + self._ahead
         wanted = self._reference(due)
         slow = (self._reference(due + self._period) - wanted) / self._period
-        slow -= self._speed.see(measurement)
+        slow -= self._speed.update(measurement)
         behind = wanted - measurement.rotation
         moment = gains.speed * slow + gains.angle * behind + self._sum
         local = self._device.at(measurement.pressure, measurement.rotation)

@@ -42,7 +42,7 @@ class Cable:
             self._radius = parameters["rotor"].radius
             self._least = parameters["cable"].slack - LOOSE_WAY_M
 
-    def see(self, reading: Measurement) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading."""
         if not self._exists:
             return
@@ -79,7 +79,7 @@ def free_rotor(station: StationInfo, order: int) -> tuple[np.ndarray, np.ndarray
     slowed = -math.expm1(-rate * period) / rate
     a = np.array([[1.0, slowed], [0.0, 1.0 - rate * slowed]])
     b = push * np.array([(period - slowed) / rate, slowed])
-    found = observer_form((a, b, np.array([1.0, 0.0])))
+    observer = observer_form((a, b, np.array([1.0, 0.0])))
     columns = np.zeros((2, order))
-    columns[:, :2] = found.reshape(2, 2) * [[-1.0], [1.0]]
+    columns[:, :2] = observer.reshape(2, 2) * [[-1.0], [1.0]]
     return columns[0], columns[1]

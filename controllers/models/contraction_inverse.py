@@ -65,7 +65,7 @@ class ContractionInverse:
         motor = (station.task.load - self.drive.offset) / self.drive.gain
         muscle = Muscle(self.plant, self.plant.settle(motor, pressure=station.pressure))
         begin = muscle.zero - float(muscle.state[self.plant.states.index("contraction")])
-        found, pressure = [], station.pressure
+        pressures, pressure = [], station.pressure
         middles, speeds = 0.5 * (wanted[1:] + wanted[:-1]), np.diff(wanted) / step
         for contraction, speed in zip(middles.tolist(), speeds.tolist(), strict=True):
             motion = begin - contraction, -speed
@@ -76,8 +76,8 @@ class ContractionInverse:
             pressure += (load - here) / (above - here) * PROBE_PA
             muscle.tension_at(pressure, *motion)
             muscle.remember(*motion, step)
-            found.append(pressure)
-        return np.array(found)
+            pressures.append(pressure)
+        return np.array(pressures)
 
     def _pace(self, pressure: float, sign: int) -> float:
         """Rate (1/s) at which the pressure follows a command above (1) or below it (-1)."""

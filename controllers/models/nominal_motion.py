@@ -9,8 +9,8 @@ from controllers.design.designs import must_give_a_position
 from controllers.models.attainable_reference import begun_late, jumps, without_jumps
 from controllers.models.inverse import Inverse, inverse_of
 from controllers.models.local_model import LocalModel, Stroke
-from controllers.models.model_key import Nominal
-from controllers.models.nominal_rollout import improved, position_of, rehearsed
+from controllers.models.model_key import ModelKey
+from controllers.models.nominal_rollout import improved, nominal_rollout, position_of
 from controllers.models.operating_range import sensor_of, stroke_along
 from pma_gym.envs import StationInfo
 
@@ -70,7 +70,7 @@ class NominalMotion:
         """Position (m or rad) that the sensor should say at a time (s): the planned one, lagged."""
         return self.planned(time - self.sensor_lag)
 
-    def foreseen(self, time: float) -> float:
+    def predicted(self, time: float) -> float:
         """Position (m or rad) that the nominal plant's sensor says at a control instant (s).
 
         Simulated under `voltage` as held to 0-10 V: what comes of the plan where a cable has to
@@ -78,7 +78,7 @@ class NominalMotion:
         """
         return self._position[self._instant(time)]
 
-    def foreseen_rotation(self, time: float) -> float:
+    def predicted_rotation(self, time: float) -> float:
         """Pulley angle (rad) that its sensor says then, whatever the task asks for."""
         return self._rotation[self._instant(time)]
 
@@ -87,7 +87,7 @@ class NominalMotion:
 
     @cached_property
     def _said(self) -> np.ndarray:
-        return rehearsed(self.station, self.volts)
+        return nominal_rollout(self.station, self.volts)
 
     @cached_property
     def _position(self) -> list[float]:
@@ -136,7 +136,7 @@ def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
         ValueError: the task is an exercise, which has no position to follow.
     """
     must_give_a_position(station)
-    inverse = _inverse(Nominal(station.model), station.task.actuator)
+    inverse = _inverse(ModelKey(station.model), station.task.actuator)
     parts, span = inverse.parts(station.period), station.task.protocol.span
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
     planned = begun_late(_sampled(reference, station, parts), first)
@@ -178,7 +178,7 @@ class _Aim:
 
 
 @lru_cache(maxsize=8)
-def _inverse(nominal: Nominal, actuator: str) -> Inverse:
+def _inverse(nominal: ModelKey, actuator: str) -> Inverse:
     return inverse_of(nominal.model, actuator)
 
 

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from controllers.models.local_model import SENSORS, Stroke, stroke_models
-from controllers.models.model_key import Nominal
+from controllers.models.model_key import ModelKey
 from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 from pma_gym.plant.plant import Plant
@@ -27,7 +27,7 @@ def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
     contracts, relaxes = (rises, falls) if task.actuator == "regulator" else (falls, rises)
     directions = ("relaxing",) * relaxes + ("contracting",) * contracts
     return _stroke(
-        Nominal(station.model),
+        ModelKey(station.model),
         *(task.protocol.quantity, task.actuator),
         rest_voltages(station),
         station.period,
@@ -38,7 +38,7 @@ def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
 
 @lru_cache(maxsize=STROKES_KEPT)
 def _stroke(
-    nominal: Nominal,
+    nominal: ModelKey,
     quantity: str,
     actuator: str,
     rest: tuple[float, float],

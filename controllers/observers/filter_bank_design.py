@@ -70,7 +70,7 @@ class BankDesign(NamedTuple):
         drift: d, shape (M, steps, n).
         sensors: C: extension, rotation, pressure, shape (3, n).
         gain: K, shape (M, trial + 1, n, 3).
-        variance: of what the task's own sensor says against what was foreseen, shape
+        variance: of what the task's own sensor says against what was predicted, shape
             (M, trial + 1).
         ahead: position m = 0 ... N periods after k by x[k], shape (M, trial, N + 1, n).
         carried: what the drift adds to it, shape (M, trial, N + 1).
@@ -189,7 +189,7 @@ def _gains(
     sensor: np.ndarray,
     own: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """K and the variance of the own sensor's surprise at the begin and after each period."""
+    """K and the variance of the own sensor's innovation at the begin and after each period."""
     bank, steps, n = step.shape[:3]
     gain, variance = np.zeros((bank, steps + 1, n, len(seen))), np.zeros((bank, steps + 1))
     covariance = np.zeros((bank, n, n))
@@ -200,9 +200,9 @@ def _gains(
             covariance = a @ covariance @ a.transpose(0, 2, 1)
             covariance += np.diag(noise[k - 1]) + jolted @ jolted.transpose(0, 2, 1)
         shared = covariance @ seen.T
-        surprise = seen @ shared + np.diag(sensor)
-        gain[:, k] = shared @ np.linalg.inv(surprise)
-        variance[:, k] = surprise[:, own, own]
+        innovation = seen @ shared + np.diag(sensor)
+        gain[:, k] = shared @ np.linalg.inv(innovation)
+        variance[:, k] = innovation[:, own, own]
         covariance -= gain[:, k] @ shared.transpose(0, 2, 1)
         # Rounding must not make it lopsided: that grows.
         covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))

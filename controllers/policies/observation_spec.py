@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.controller import Reference
-from controllers.policies.scales import FINE_SHARE, Scales, heard_rows, share_of
+from controllers.policies.scales import FINE_SHARE, Scales, delayed_rows, share_of
 from pma_gym.engine.observation import BOUND, ObservationTable
 from pma_gym.engine.options import Options
 from pma_gym.envs import Measurement, StationInfo
@@ -24,7 +24,7 @@ PRESSURE_CENTRE, PRESSURE_HALF = 362.5e3, 212.5e3
 
 
 @dataclass(frozen=True)
-class View:
+class ObservationSpec:
     """Which entries a policy is given.
 
     `tracking` is made for small errors: those of both position sensors, the pressure's change since
@@ -56,7 +56,7 @@ class View:
                 )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "View":
+    def of(cls, given: Mapping[str, Any]) -> "ObservationSpec":
         """A view from JSON.
 
         Raises:
@@ -93,7 +93,7 @@ class View:
         ]
         for k in range(self.history + 1):
             before = f", {k} before" if k else ""
-            rows += [(f"{name}{before}", unit) for name, unit in heard_rows(station.task)]
+            rows += [(f"{name}{before}", unit) for name, unit in delayed_rows(station.task)]
         rows += [(f"own action, {k} before", "1") for k in range(1, self.history + 1)]
         rows += [("voltage commanded last", "5 V, -1.0 = 0 V")]
         if base is not None:
@@ -136,8 +136,8 @@ def start_entry(start: Any) -> Any:  # noqa: ANN401
 
 def clipped(entries: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float32]:
     """Entries as a network gets them."""
-    found = np.asarray(entries, np.float32)
-    return np.minimum(np.maximum(found, np.float32(-BOUND)), np.float32(BOUND))
+    clipped_entries = np.asarray(entries, np.float32)
+    return np.minimum(np.maximum(clipped_entries, np.float32(-BOUND)), np.float32(BOUND))
 
 
 def environment_entries(
@@ -150,7 +150,7 @@ def environment_entries(
 
     Args:
         table: the environment's.
-        readings: as heard now and in the steps before, the latest first.
+        readings: as received now and in the steps before, the latest first.
         reference: reference (m or rad) so many steps ahead.
         action: the last one, -1 to 1.
     """

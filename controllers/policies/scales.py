@@ -29,7 +29,7 @@ class Scales:
     """What the entries of a trial are measured by.
 
     Args:
-        station: what controllers are told; its model must be of a station.
+        station: as controllers know it; its model must be of a station.
 
     Attributes:
         fine: error that 1.0 stands for (m or rad).
@@ -54,7 +54,7 @@ class Scales:
         self._gain, self._offset = parameters["drive"].gain, parameters["drive"].offset
         self._held = station.load
 
-    def heard(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
+    def entries(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
         """The four entries of a reading, before they are clipped; of numbers or arrays.
 
         Args:
@@ -91,7 +91,7 @@ class ExerciseScales(Scales):
         self._plan = exercise.prescription
         self._coarse = COARSE_SHARE * self.span
 
-    def heard(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401, ARG002
+    def entries(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401, ARG002
         """The four entries of a reading, before they are clipped; of numbers or arrays.
 
         Args:
@@ -115,7 +115,7 @@ def scales_of(station: StationInfo) -> Scales:
     return ExerciseScales(station) if station.task.exercise else Scales(station)
 
 
-def heard_rows(task: Task) -> list[tuple[str, str]]:
+def delayed_rows(task: Task) -> list[tuple[str, str]]:
     """Names of the four entries of a reading, and what 1.0 stands for, in order."""
     error, fine = "reference less measured position", share_of(task.protocol, FINE_SHARE)
     change, other = (

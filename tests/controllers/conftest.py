@@ -37,7 +37,7 @@ def drive() -> Callable[..., tuple[dict[str, float], np.ndarray]]:
         env = PMAEnv(task, model=model, pressure_kpa=float(pressure_kpa), **options)
         env.reset(seed=seed)
         if isinstance(controller, Oracle):
-            controller.see(env)
+            controller.receive(env)
         controller.reset(env.reference, env.station)
         ended, info = False, {}
         while not ended:

@@ -25,7 +25,7 @@ def voltages(station):
 
 
 def inverted(station):
-    """As the inverse gives them, before they are rehearsed."""
+    """As the inverse gives them, before they are nominal_rollout."""
     inverse, steps = inverse_of(station.model), station.task.steps(1.0 / station.period)
     parts = inverse.parts(station.period)
     times = np.arange(steps * parts + 1) * station.period / parts

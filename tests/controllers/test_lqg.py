@@ -128,7 +128,7 @@ def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
     ways = [0.0] * 3 + [1.2] * 10 + [0.5, 1.2] + [1.2] * 5 + [0.5] * 8
     loads = [0.0] * 3 + [20.0] * 10 + [0.0, 20.0] + [20.0] * 5 + [0.0] * 8
     for reading in readings(where, ways, loads):
-        cable.see(reading)
+        cable.update(reading)
         seen.append((cable.loose, cable.settling))
     assert seen[2] == (True, True)
     assert seen[4] == (False, True) and seen[6] == (False, False)
@@ -143,7 +143,7 @@ def test_pressure_filter_foresees_a_step_of_the_regulator():
     sensor_lag = 1.0 / (2.0 * math.pi * 50.0)
     for k in range(40):
         elapsed = max(0.01 * (k - 20), 0.0)
-        filter_.see(300e3 + 25e3 * -math.expm1(-elapsed / lag))
+        filter_.update(300e3 + 25e3 * -math.expm1(-elapsed / lag))
         if k == 19:
             assert filter_.ahead(0.05, 300e3) == pytest.approx(300e3, abs=50.0)
         if k == 23:
@@ -157,7 +157,7 @@ def test_pressure_filter_keeps_noise_and_a_wrong_zero_away():
     where, generator = station_of(), np.random.default_rng(0)
     filter_, said = PressureFilter(where), []
     for noise in generator.normal(0.0, 330.0, 500).tolist():
-        filter_.see(303e3 + noise)
+        filter_.update(303e3 + noise)
         said.append(filter_.pressure)
         filter_.advance(300e3)
     assert np.std(said) < 150.0

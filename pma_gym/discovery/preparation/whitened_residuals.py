@@ -18,6 +18,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.model import Model
 
@@ -64,7 +65,7 @@ class Pieces:
         return int(self.counts[np.isin(self.trial, trials)].sum())
 
 
-class Evidence(Residuals):
+class WhitenedResiduals(Residuals):
     """Trials beside a model with free parameters, whitened; what a search may lower.
 
     Args:
@@ -76,7 +77,7 @@ class Evidence(Residuals):
             for one that may be anything.
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
-        tolerance, joined, threads: as `Residuals`.
+        tolerance, interpolation, threads: as `Residuals`.
 
     Attributes:
         noise, prior, centre: as given.
@@ -92,10 +93,10 @@ class Evidence(Residuals):
         centre: Array | None = None,
         own: Mapping[str, Sequence[float]] | None = None,
         tolerance: float = DEFAULT_TOLERANCE,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         threads: int = 1,
     ) -> None:
-        super().__init__(model, trials, free, tolerance, joined, threads)
+        super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.

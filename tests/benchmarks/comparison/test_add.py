@@ -165,7 +165,7 @@ import gc, json, sys
 from pathlib import Path
 class Spy:
     name = "spy"
-    def see(self, environment):
+    def receive(self, environment):
         raise AssertionError("it was shown the environment")
     def reset(self, reference, station):
         kinds = [type(each).__name__ for each in gc.get_objects()]

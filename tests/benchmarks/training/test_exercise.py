@@ -23,8 +23,8 @@ from benchmarks.training.stations import Stations
 from benchmarks.training.study.operators import SEED, figures_of, table_of
 from benchmarks.training.validation import measure_of
 from controllers import ConstantPressure
-from controllers.policies.action_mapping import Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import Policy, shipped_policies
 from pma_gym.envs import PMAEnv, PMAVectorEnv
@@ -41,7 +41,7 @@ CASES = {
 
 @pytest.mark.parametrize("task", CASES)
 def test_the_batch_is_the_one_environment(task):
-    view, form = View("tracking", 2, 3), Form("increment", 0.5)
+    view, form = ObservationSpec("tracking", 2, 3), ActionMapping("increment", 0.5)
     options = SLOW | {"pressure_kpa": CASES[task]}
     envs = PilotedVecEnv(COUNT, task, view, form, reward_scale=0.1, **options)
     given = {"kind": "increment", "authority_v": 0.5}

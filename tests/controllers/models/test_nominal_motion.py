@@ -105,8 +105,8 @@ def test_the_nominal_station_reads_what_is_foreseen():
         motion = nominal_motion(env.reference, env.station)
         for _ in range(200):
             said = env.station.position(env.measurement)
-            assert said == pytest.approx(motion.foreseen(env.time), abs=2e-6)
-            turned = motion.foreseen_rotation(env.time)
+            assert said == pytest.approx(motion.predicted(env.time), abs=2e-6)
+            turned = motion.predicted_rotation(env.time)
             assert env.measurement.rotation == pytest.approx(turned, abs=1e-4)
             env.step(env.action(motion.command(env.time)))
 
@@ -135,7 +135,7 @@ def test_another_reference_is_followed_although_the_task_has_its_own():
     where = station_of("displacement", 300)
     slow = nominal_motion(lambda time: 2e-3 * time, where)
     assert slow.planned(2.5) == pytest.approx(5e-3, abs=1e-12)
-    assert slow.foreseen(4.0) == pytest.approx(8e-3, abs=2e-5)
+    assert slow.predicted(4.0) == pytest.approx(8e-3, abs=2e-5)
 
 
 @pytest.mark.parametrize("task", ["displacement_steps", "rotation_steps"])

@@ -3,10 +3,10 @@
 import pytest
 
 from controllers.models.voltage import nominal_offset
-from controllers.policies.action_mapping import Form
-from controllers.policies.adapter import Pilot
-from controllers.policies.observation_spec import View
-from controllers.policies.scales import heard_rows
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
+from controllers.policies.scales import delayed_rows
 from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS, named_task
@@ -18,11 +18,11 @@ DEG = SI_FACTORS["deg"]
 def seen(task, reading, time):
     """Entries of a pilot's first view by name."""
     station = StationInfo(load_model("station"), named_task(task), 400e3, 0.01)
-    view = View("tracking", 1, 0)
-    pilot = Pilot(view, Form("increment", 0.5))
+    view = ObservationSpec("tracking", 1, 0)
+    pilot = PolicyAdapter(view, ActionMapping("increment", 0.5))
     pilot.reset(station.task.protocol.at, station)
     names = [name for name, _ in view.rows(station)]
-    entries = pilot.see(reading, time).tolist()
+    entries = pilot.update(reading, time).tolist()
     # The regulator rests where it holds the trial's pressure.
     assert pilot.volts(0.0) == pytest.approx(nominal_offset(station))
     return dict(zip(names, entries, strict=True))
@@ -52,10 +52,10 @@ def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
 
 
 def test_units_stand_beside_the_names():
-    units = dict(heard_rows(named_task("isokinetic_exercise")))
+    units = dict(delayed_rows(named_task("isokinetic_exercise")))
     assert units["reference less measured position"] == "3.6 deg"
-    assert dict(heard_rows(TASKS["rotation"]))["reference less measured position"] == "0.9 deg"
+    assert dict(delayed_rows(TASKS["rotation"]))["reference less measured position"] == "0.9 deg"
     assert (
-        dict(heard_rows(named_task("isotonic_exercise")))["prescribed less measured moment"]
+        dict(delayed_rows(named_task("isotonic_exercise")))["prescribed less measured moment"]
         == "0.32 N m"
     )

@@ -1,12 +1,13 @@
-"""Every shipped controller can be deep-copied in the middle of a trial and goes on alike."""
+"""What every controller of the registry keeps: its name, its voltages, its copies."""
 
 import copy
+import math
 import pickle
 
 import numpy as np
 import pytest
 
-from controllers import CONTROLLERS
+from controllers import CONTROLLERS, Controller
 from pma_gym.envs import PMAEnv
 
 EXERCISE = "isotonic_exercise"
@@ -30,20 +31,46 @@ def task_for(name):
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
+def test_it_has_the_name_of_its_row_and_a_line_that_says_what_it_does(name):
+    controller = CONTROLLERS[name]()
+    assert isinstance(controller, Controller) and controller.name == name
+    assert (type(controller).__doc__ or "").strip()
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_its_voltages_are_numbers_and_a_reset_begins_anew(name):
+    controller, env, runs = CONTROLLERS[name](), PMAEnv(task_for(name), pressure_kpa=500), []
+    if getattr(controller, "repetitions", 1) > 1:
+        pytest.skip("learns from trial to trial: its second trial differs on purpose")
+    for _ in range(2):
+        env.reset(seed=5)
+        if hasattr(controller, "receive"):
+            controller.receive(env)
+        controller.reset(env.reference, env.station)
+        volts = []
+        for _ in range(3 if hasattr(controller, "receive") else AFTER):
+            volts.append(float(controller.act(env.measurement, env.time)))
+            env.step(env.action(volts[-1]))
+        runs.append(volts)
+    assert all(math.isfinite(value) and 0.0 <= value <= 10.0 for value in runs[0])
+    assert runs[0] == runs[1]
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
 def test_a_copy_in_the_middle_of_a_trial_goes_on_alike_and_alone(name):
     env, controller = PMAEnv(task_for(name), pressure_kpa=500), CONTROLLERS[name]()
     env.reset(seed=3)
-    if hasattr(controller, "see"):
-        controller.see(env)
+    if hasattr(controller, "receive"):
+        controller.receive(env)
     controller.reset(env.reference, env.station)
     for _ in range(BEFORE):
         env.step(env.action(controller.act(env.measurement, env.time)))
     copied = copy.deepcopy(controller)
     readings, given = [], []
-    for _ in range(1 if hasattr(controller, "see") else AFTER):
+    for _ in range(1 if hasattr(controller, "receive") else AFTER):
         readings.append((env.measurement, env.time))
         given.append(float(controller.act(*readings[-1])))
-        if not hasattr(controller, "see"):
+        if not hasattr(controller, "receive"):
             env.step(env.action(given[-1]))
     # The original has gone on by now; its copy stands where it was made.
     assert [float(copied.act(*reading)) for reading in readings] == given
