@@ -90,9 +90,9 @@ def test_an_environment_begins_where_its_option_says_one_or_many():
     assert env.truth["contraction"] == pytest.approx(rest.zero_contraction)
     many = PMAVectorEnv(3, "displacement", memory_at_start=BEGUN, **options)
     many.reset(seed=1)
-    zero = many.engine.state_layout.places["zero_contraction"]
+    zero = many.engine.state_layout.offsets["zero_contraction"]
     assert many.engine.records[0, zero, 0] == pytest.approx(rest.zero_contraction, rel=1e-12)
-    memory = many.engine.state_layout.places["memory_hysteresis"]
+    memory = many.engine.state_layout.offsets["memory_hysteresis"]
     assert many.engine.records[0, memory, 0] == BEGUN
 
 
