@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any
 
 RENAMED_MODULES: Mapping[str, str] = {
+    "pma_gym.discovery.summary": "pma_gym.discovery.report.summary",
     "pma_gym.envs.engine": "pma_gym.engine.engine",
     "pma_gym.envs.snapshot": "pma_gym.engine.snapshot",
     "pma_gym.envs.command": "pma_gym.engine.actions",
@@ -22,6 +23,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.envs.reward_function": "pma_gym.engine.reward_function",
     "pma_gym.envs.cuda": "pma_gym.engine.cuda.engine",
     "pma_gym.envs.knowledge": "pma_gym.envs.station_info",
+    "pma_gym.tasks.human": "pma_gym.tasks.operator",
     "pma_gym.envs.sb3": "pma_gym.sb3.vec_env",
     "pma_gym.envs.sb3_network": "pma_gym.sb3.network",
     "pma_gym.envs.sb3_policy": "pma_gym.sb3.policy",

@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks.bounds.open_loop import open_loop_positions
 from controllers.models.nominal_motion import nominal_motion
 from controllers.oracle import Oracle
-from pma_gym.envs import PMAEnv, Station
+from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
@@ -59,7 +59,7 @@ def _ideal_positions(model: Model, task: str, pressure_kpa: float) -> Iterator[n
     yield from (_under_oracle(model, task, pressure_kpa, rate) for rate in ORACLE_RATES_HZ)
     plant = Plant(model)
     for rate in INVERSE_RATES_HZ:
-        station = Station(plant.model, TASKS[task], 1e3 * pressure_kpa, 1.0 / rate)
+        station = StationInfo(plant.model, TASKS[task], 1e3 * pressure_kpa, 1.0 / rate)
         needed = nominal_motion(station.task.protocol.at, station).volts
         yield from open_loop_positions([plant], station, [needed])
 
@@ -71,10 +71,10 @@ def _under_oracle(model: Model, task: str, pressure_kpa: float, rate: float) -> 
     )
     environment.reset(seed=0)
     oracle, ended = Oracle(), False
-    oracle.see(environment)
+    oracle.receive(environment)
     oracle.reset(environment.reference, environment.station)
     while not ended:
-        voltage = oracle.act(environment.reading, environment.time)
+        voltage = oracle.act(environment.measurement, environment.time)
         _, _, terminated, ended, _ = environment.step(environment.action(voltage))
         ended = ended or terminated
     return environment.trajectory()

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
@@ -15,7 +15,7 @@ VOLTAGE_LIMIT = 10.0
 
 
 def open_loop_positions(
-    plants: Sequence[Plant], station: Station, volts: Sequence[NDArray[np.float64]]
+    plants: Sequence[Plant], station: StationInfo, volts: Sequence[NDArray[np.float64]]
 ) -> list[NDArray[np.float64]]:
     """True positions of trials that begin settled with no load.
 
@@ -42,7 +42,7 @@ def open_loop_positions(
             time,
             np.clip(own, 0.0, VOLTAGE_LIMIT)[row],
             np.full(len(time), plant.regulator_voltage(station.pressure)),
-            False,
+            "zoh",
             plant.table,
             rests[id(plant)].state,
             rests[id(plant)].zero_contraction,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from benchmarks.budget.causes import OpenLoop, causes_of
 from benchmarks.budget.trial import PERIOD_S, simulated_errors
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import RANDOMISATIONS, TASKS
@@ -68,7 +68,7 @@ def contest(
         model: the nominal one, which both are computed for.
     """
     nominal = Plant(load_model(model))
-    station = Station(nominal.model, TASKS[task], 1e3 * pressure_kpa, PERIOD_S)
+    station = StationInfo(nominal.model, TASKS[task], 1e3 * pressure_kpa, PERIOD_S)
     open_loop = OpenLoop(nominal, station)
     faulty = open_loop.voltages(frozenset(causes_of(task)))
     plants, found = [nominal, *drawn], {}

@@ -100,7 +100,7 @@ def _rows(order: Order, environment: PMAEnv) -> Iterator[tuple[str, ...]]:
     for step in range(task.steps(order.rate_hz) + 1):
         # Open loop: the reading at rest is all it could ever have seen.
         if step < task.steps(order.rate_hz):
-            volts = min(max(controller.act(environment.reading, step * period), 0.0), 10.0)
+            volts = min(max(controller.act(environment.measurement, step * period), 0.0), 10.0)
             if task.actuator == "motor":
                 motor = volts
             else:

@@ -26,7 +26,7 @@ from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import held_against
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
-from pma_gym.discovery.journal import digest
+from pma_gym.discovery.fitting.journal import digest
 from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model
 from pma_gym.terminal import SafeConsole

@@ -16,8 +16,8 @@ from benchmarks.runner.provenance import check_run, finished_rows, read_run
 from benchmarks.suites.frozen import Entry, FrozenSuite
 from benchmarks.suites.reproduction import SuiteError
 from controllers import CONTROLLERS
-from pma_gym.envs import Station
-from pma_gym.tasks import ISOTONIC, TASKS, obstacle
+from pma_gym.envs import StationInfo
+from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
 
 LOOP_TASKS = (*TASKS, *ISOTONIC)
 """Tasks whose loops are shown, the motor's and the regulator's. Unseen references have those of the
@@ -122,7 +122,7 @@ class Leaderboard:
         """Why the nominal actuator cannot follow, by task and pressure (kPa), where it cannot."""
         trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
         model = self.suite.nominal
-        known = {(t, kpa): obstacle(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
+        known = {(t, kpa): infeasibility_reason(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
         return {trial: why for trial, why in known.items() if why is not None}
 
     @cached_property
@@ -136,13 +136,15 @@ class Leaderboard:
                 found[task] = conditions(own, self._told(task))
         return found
 
-    def _told(self, task: str) -> list[Station]:
+    def _told(self, task: str) -> list[StationInfo]:
         """What controllers are told at three pressures of a task."""
         suite, environment = self.suite, self.suite.environment
         kpa = sorted({e.pressure_kpa for e in suite.episodes if e.task == task})
         delays = [environment.get(f"{name}_delay_s", 0.0) for name in ("action", "observation")]
         return [
-            Station(suite.nominal, task_of(task), 1e3 * each, 1.0 / suite.control_rate_hz, *delays)
+            StationInfo(
+                suite.nominal, task_of(task), 1e3 * each, 1.0 / suite.control_rate_hz, *delays
+            )
             for each in dict.fromkeys((kpa[0], kpa[len(kpa) // 2], kpa[-1]))
         ]
 

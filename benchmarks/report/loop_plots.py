@@ -18,7 +18,7 @@ from benchmarks.report.margins import (
 )
 from benchmarks.report.plot_style import Style
 from benchmarks.report.tables import NONE, Labels, capital, figure
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.pages.document import TextTable
 from pma_gym.pages.figures import legend_below, picture, png
 from pma_gym.units import SI_FACTORS
@@ -43,7 +43,7 @@ def loop_title(found: Sequence[Condition]) -> str:
     >>> from pma_gym.tasks import EVERY_TASK
     >>> nominal = load_model("station")
     >>> for name in ("rotation", "triangle_low"):
-    ...     print(loop_title([Condition(Station(nominal, EVERY_TASK[name], 3e5, 0.01), [])]))
+    ...     print(loop_title([Condition(StationInfo(nominal, EVERY_TASK[name], 3e5, 0.01), [])]))
     Rotation
     Triangle low, against 150 N
     """
@@ -120,7 +120,7 @@ def loop_plot(found: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
         return png(canvas)
 
 
-def _draw(axes: Any, loop: Loop, station: Station, style: Style) -> None:  # noqa: ANN401
+def _draw(axes: Any, loop: Loop, station: StationInfo, style: Style) -> None:  # noqa: ANN401
     """Gain, phase, reference step and load step of a loop."""
     line = {"color": style.color, "linestyle": style.line}
     frequencies = frequencies_of(station.period)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from benchmarks.tuning.plant import STROKES, Place, linearised, sampled
 from controllers.controller import Controller, LinearController
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 
 FREQUENCIES = 600
 """Points of a frequency response, evenly spaced in the logarithm up to half the control rate."""
@@ -83,7 +83,7 @@ class Condition(NamedTuple):
         everywhere: loops at all places of the stroke.
     """
 
-    station: Station
+    station: StationInfo
     everywhere: list[Loop]
 
     @property
@@ -98,7 +98,9 @@ class Condition(NamedTuple):
         return [loop for loop in found if loop.direction == found[0].direction]
 
 
-def conditions(controllers: Sequence[Controller], stations: Sequence[Station]) -> list[Condition]:
+def conditions(
+    controllers: Sequence[Controller], stations: Sequence[StationInfo]
+) -> list[Condition]:
     """Loops of controllers at several pressures."""
     return [Condition(station, loops(controllers, station)) for station in stations]
 
@@ -109,7 +111,7 @@ def is_linear(controller: Controller) -> bool:
 
 
 def loops(
-    controllers: Iterable[Controller], station: Station, shares: Iterable[float] = STROKES
+    controllers: Iterable[Controller], station: StationInfo, shares: Iterable[float] = STROKES
 ) -> list[Loop]:
     """Loops of linear controllers at places of the stroke, in the task's directions of motion.
 

@@ -11,7 +11,7 @@ from benchmarks.runner.figures import figures
 from benchmarks.runner.isolated_controller import Isolated, driver
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import Entry, Episode, FrozenSuite, frozen_suite
-from pma_gym.engine.options import told_model
+from pma_gym.engine.options import nominal_model
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import Model
 
@@ -87,7 +87,7 @@ def run_case(case: Case, model: Model | None = None) -> Row:
         **suite.environment,
     )
     controller = driver(contender, environment.options.period)
-    told = told_model(environment.task, suite.nominal)
+    told = nominal_model(environment.task, suite.nominal)
     seed = suite.seed_of(case.episode)
     done = rollout(environment, controller, seed, told, reveal=contender.is_bound)
     if isinstance(controller, Isolated):

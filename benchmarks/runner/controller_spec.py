@@ -59,7 +59,7 @@ class Contender:
     @property
     def is_bound(self) -> bool:
         """Whether it is the project's own bound, which alone is shown the environment."""
-        return not self.path and hasattr(CONTROLLERS.get(self.name), "see")
+        return not self.path and hasattr(CONTROLLERS.get(self.name), "receive")
 
     @property
     def kinds(self) -> frozenset[str]:

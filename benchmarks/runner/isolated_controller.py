@@ -15,9 +15,9 @@ from typing import Any
 from benchmarks.runner.controller_process import ControllerProcess
 from benchmarks.runner.controller_spec import Contender
 from benchmarks.runner.rollout import checked_volts
-from benchmarks.runner.user_controller import ACT_S, MAKE_S, RESET_S, Guarded
+from benchmarks.runner.user_controller import MAKE_S, RESET_S, Guarded
 from controllers.controller import Controller, Reference
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 def driver(contender: Contender, period: float, keep_pace: bool = True) -> Controller:
@@ -62,14 +62,14 @@ class Isolated:
         making = f"importing and making {contender.name}"
         self.name, self.repetitions = self._ask(make, making, MAKE_S)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`."""
         self.act_seconds.clear()
         self._ask(partial(_reset, reference, station), "reset", RESET_S)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`."""
-        volts, seconds = self._ask(partial(_act, observation, time), "act", ACT_S)
+        volts, seconds = self._ask(partial(_act, measurement, time))
         self.act_seconds.append(seconds)
         return volts
 
@@ -114,11 +114,11 @@ def _make(contender: Contender, period: float, keep_pace: bool) -> tuple[str, in
     return _controller.name, int(getattr(_controller, "repetitions", 1))
 
 
-def _reset(reference: Reference, station: Station) -> None:
+def _reset(reference: Reference, station: StationInfo) -> None:
     _controller.reset(reference, station)
 
 
-def _act(observation: Reading, now: float) -> tuple[float, float]:
+def _act(measurement: Measurement, now: float) -> tuple[float, float]:
     began = time.perf_counter()
-    answer = _controller.act(observation, now)
+    answer = _controller.act(measurement, now)
     return checked_volts(answer, now), time.perf_counter() - began

@@ -16,7 +16,7 @@ from benchmarks.runner.controller_spec import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
+from pma_gym.envs import ENVIRONMENTS, Measurement, PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
@@ -127,8 +127,8 @@ def rollout(
         controller: who drives; reset first.
         seed: seed of the episode.
         nominal: model that the controller receives, if the environment has another.
-        reveal: hand the environment to the controller's method `see` before each reset; only for
-            the oracle, which is no rival but the bound that rivals are measured by.
+        reveal: hand the environment to the controller's method `receive` before each reset; only
+            for the oracle, which is no rival but the bound that rivals are measured by.
     Returns:
         What happened, to the last scored sample or to where a physical limit ended it.
     Raises:
@@ -155,18 +155,18 @@ class _Log:
     def __init__(self) -> None:
         self.asked: list[float] = []
         self.commands: list[tuple[float, float]] = []
-        self.readings: list[Reading] = []
+        self.readings: list[Measurement] = []
         self.truths: list[tuple[float, float, float]] = []
         self.act_seconds: list[float] = []
         self.step_seconds = 0.0
         self.start = 0.0
 
-    def see(self, environment: PMAEnv) -> None:
+    def record(self, environment: PMAEnv) -> None:
         """Write down where the station stands."""
         truth = environment.truth
         if not self.readings:
             self.start = truth["contraction"] + truth["extension"]
-        self.readings.append(environment.reading)
+        self.readings.append(environment.measurement)
         self.truths.append((truth["contraction"], truth["load"], truth["pressure"]))
 
     def rollout(self, environment: PMAEnv) -> Rollout:
@@ -194,7 +194,7 @@ def _begin(
     """Reset the environment and the controller."""
     environment.reset(seed=seed)
     if reveal:
-        controller.see(environment)  # type: ignore[attr-defined]
+        controller.receive(environment)  # type: ignore[attr-defined]
     station = environment.station
     if nominal is not None:
         # A copy: whatever the controller does to it, the next case receives the same model.
@@ -204,7 +204,7 @@ def _begin(
 
 def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
     """Run an episode to its end."""
-    log.see(environment)
+    log.record(environment)
     clock, ended = time.perf_counter, False
     while not ended:
         now, reading = environment.time, log.readings[-1]
@@ -219,7 +219,7 @@ def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
         log.asked.append(volts)
         log.act_seconds.append(answered - asked)
         log.commands.append((environment.motor_voltage, environment.regulator_voltage))
-        log.see(environment)
+        log.record(environment)
         ended = terminated or truncated
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from benchmarks.runner.controller_spec import Contender, ControllerError, raised_at
 from controllers.controller import Reference
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 MAKE_S, RESET_S, ACT_S = 60.0, 60.0, 2.0
 """How long importing and making a controller, its `reset` and its `act` may take before its
@@ -46,7 +46,7 @@ class Guarded:
     def __getattr__(self, name: str) -> object:
         return getattr(self._controller, name)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`.
 
         Raises:
@@ -58,7 +58,8 @@ class Guarded:
         except (Exception, SystemExit) as error:
             raise self._error("reset", error, "before the trial") from error
 
-    def act(self, observation: Reading, time: float) -> float:
+    # Written out: a context manager would cost as much as a simple controller takes.
+    def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`.
 
         Raises:
@@ -67,7 +68,7 @@ class Guarded:
         """
         began = _clock()
         try:
-            answer = self._controller.act(observation, time)
+            answer = self._controller.act(measurement, time)
         except (Exception, SystemExit) as error:
             raise self._error("act", error, f"at {time:.4g} s") from error
         self._latest.append(_clock() - began)

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from benchmarks.training.reward import bounded
-from controllers.policies.action_mapping import HIGHEST_V, Form
-from controllers.policies.batch_adapter import Pilots
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import HIGHEST_V, ActionMapping
+from controllers.policies.batch_adapter import BatchPolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.engine.observation import BOUND
-from pma_gym.envs import PMAVectorEnv, Station
+from pma_gym.envs import PMAVectorEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.sb3 import EngineVecEnv
 
@@ -41,8 +41,8 @@ class PilotedVecEnv(EngineVecEnv):
         self,
         count: int,
         task: str,
-        view: View,
-        form: Form,
+        view: ObservationSpec,
+        form: ActionMapping,
         told: str = "station",
         staggered: bool = False,
         reward_scale: float = 1.0,
@@ -52,11 +52,11 @@ class PilotedVecEnv(EngineVecEnv):
         self.envs = PMAVectorEnv(count, task, autoreset_mode=AutoresetMode.DISABLED, **options)
         chosen, model = self.envs.options, load_model(told)
 
-        def station(pressure: float) -> Station:
+        def station(pressure: float) -> StationInfo:
             late = chosen.action_delay * chosen.period, chosen.observation_delay * chosen.period
-            return Station(model, self.envs.task, pressure, chosen.period, *late)
+            return StationInfo(model, self.envs.task, pressure, chosen.period, *late)
 
-        self.pilots = Pilots(count, view, form, station)
+        self.pilots = BatchPolicyAdapter(count, view, form, station)
         self._staggered, self._scale = staggered, reward_scale
         self._length = self.envs.task.steps(chosen.control_rate_hz)
         self._left = np.zeros(count, np.int64)
@@ -80,7 +80,7 @@ class PilotedVecEnv(EngineVecEnv):
         self._reset_seeds()
         self._returns[:] = 0.0
         self.pilots.begin(self._all, self.envs.pressures)
-        return self.pilots.see(self.envs.readings(), self._all)
+        return self.pilots.update(self.envs.measurements(), self._all)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Keep the actions of the next step."""
@@ -93,7 +93,7 @@ class PilotedVecEnv(EngineVecEnv):
         _, rewards, terminated, truncated, info = self.envs.step(commands)
         self._returns += rewards
         self._left -= 1
-        entries = self.pilots.see(self.envs.readings())
+        entries = self.pilots.update(self.envs.measurements())
         learned = bounded(rewards, terminated, self._scale)
         over = terminated | truncated | (self._left == 0)
         infos = self._nothing.copy()
@@ -102,7 +102,7 @@ class PilotedVecEnv(EngineVecEnv):
             for i in which.tolist():
                 infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
             self._begin_again(which, over)
-            entries[which] = self.pilots.see(self.envs.readings(), which)
+            entries[which] = self.pilots.update(self.envs.measurements(), which)
         return entries, learned.astype(np.float32), over, infos
 
     def _last(

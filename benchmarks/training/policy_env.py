@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from benchmarks.training.reward import bounded
 from benchmarks.training.stations import Stations
-from controllers.policies.action_mapping import Form
-from controllers.policies.adapter import Pilot
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAEnv
 
@@ -23,8 +23,8 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
     Args:
         env: an environment of pma_gym; with `stations` or `options` it is made anew, inside the
             same wrappers (the zoo's Monitor is one).
-        view: arguments of the View.
-        form: arguments of the Form.
+        view: arguments of the ObservationSpec.
+        form: arguments of the ActionMapping.
         stations: suite whose training stations episodes are on; empty for the environment's own.
         options: options in place of the environment's.
         reward_scale: factor on the bounded rewards.
@@ -58,7 +58,9 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
             env, rig = _exchanged(env, rig, made), made
         super().__init__(env)
         self.rig, self._scale = rig, reward_scale
-        self.pilot = Pilot(View.of(view), Form.of({"base": None} | dict(form)))
+        self.pilot = PolicyAdapter(
+            ObservationSpec.of(view), ActionMapping.of({"base": None} | dict(form))
+        )
         told = rig.station
         entries = len(self.pilot.view.rows(told, self.pilot.form.base))
         self.observation_space = spaces.Box(-BOUND, BOUND, (entries,), np.float32)
@@ -70,7 +72,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         """Begin a trial."""
         _, info = self.env.reset(seed=seed, options=options)
         self.pilot.reset(self.rig.reference, self.rig.station)
-        return self.pilot.see(self.rig.reading, self.rig.time), info
+        return self.pilot.update(self.rig.measurement, self.rig.time), info
 
     def step(
         self, action: NDArray[Any]
@@ -79,7 +81,7 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         volts = self.pilot.volts(float(np.asarray(action).reshape(-1)[0]))
         command: Any = self.rig.action(volts)
         _, reward, terminated, truncated, info = self.env.step(command)
-        entries = self.pilot.see(self.rig.reading, self.rig.time)
+        entries = self.pilot.update(self.rig.measurement, self.rig.time)
         return entries, float(bounded(reward, terminated, self._scale)), terminated, truncated, info
 
 

@@ -66,7 +66,9 @@ def simulate(
     plant = Plant(load_model(model))
     given = read(commands)
     try:
-        trial = plant.simulate(given, noise, seed, joined=hold is Hold.LINEAR)
+        trial = plant.simulate(
+            given, noise, seed, interpolation="foh" if hold is Hold.LINEAR else "zoh"
+        )
     except SampleError as error:
         raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:

@@ -18,6 +18,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
+from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.equilibrium import solver
@@ -77,7 +78,8 @@ class Residuals:
         trials: the trials, which need measurements.
         free: paths of the free parameters.
         tolerance: of the integrator, as `Plant`.
-        joined: whether commands are joined linearly; else each is held until the next.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
+            held until the next).
         threads: how many threads share the work; the results' bits do not depend on it.
 
     Attributes:
@@ -98,10 +100,12 @@ class Residuals:
         trials: Sequence[Trial],
         free: Sequence[str],
         tolerance: float = DEFAULT_TOLERANCE,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         threads: int = 1,
     ) -> None:
-        self.plant, self.joined, self.threads = Plant(model, tolerance), joined, threads
+        check_interpolation(interpolation)
+        self.plant, self.threads = Plant(model, tolerance), threads
+        self.interpolation: Interpolation = interpolation
         self.free = _free(self.plant.model, free)
         places = [parameter.place for parameter in self.free]
         self._factors = np.array([parameter.quantity.factor for parameter in self.free])
@@ -221,7 +225,7 @@ class Residuals:
             runs, spaces = [], self._spaces(block, count)
             for i, space in zip(block, spaces, strict=True):
                 logged = self._trials[i]
-                columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
                 runs += [
                     Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
                     for k in range(count)

@@ -15,7 +15,7 @@ from pma_gym.plant.model import load_model
 RIVALS = [
     make
     for make in CONTROLLERS.values()
-    if not hasattr(make, "see") and "rotation" in getattr(make, "kinds", ["rotation"])
+    if not hasattr(make, "receive") and "rotation" in getattr(make, "kinds", ["rotation"])
 ]
 
 bound_of = lru_cache(achievable_bound)

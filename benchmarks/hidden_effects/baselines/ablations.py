@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery import bursts, diagnose, leftovers, selection, workflow
-from pma_gym.discovery.noise import Whitening, white_noise
-from pma_gym.discovery.parameters import Own
-from pma_gym.discovery.screening import Look
+from pma_gym.discovery import diagnose, workflow
+from pma_gym.discovery.fitting.free_parameters import FreeParameters
+from pma_gym.discovery.preparation.noise import Whitening, white_noise
+from pma_gym.discovery.screening import residuals, scan_statistic
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.selection import forward_selection
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -34,21 +36,21 @@ def ours(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 def no_whitening(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the noise's memory: what a fit leaves counts as white noise of its variance."""
     with (
-        _instead(leftovers, "autoregression", _no_memory),
-        _instead(bursts, "autoregression", _no_memory),
+        _instead(residuals, "autoregression", _no_memory),
+        _instead(scan_statistic, "autoregression", _no_memory),
     ):
         return ours(dataset, seed, jobs)
 
 
 def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without a refit: the model's own parameters stay as given, zeros of sensors are free."""
-    own = workflow.own_parameters
+    own = workflow.free_parameters
 
-    def held(model: Model) -> Own:
+    def held(model: Model) -> FreeParameters:
         found = own(model)
         return replace(found, prior=HELD * found.prior)
 
-    with _instead(workflow, "own_parameters", held):
+    with _instead(workflow, "free_parameters", held):
         found = ours(dataset, seed, jobs)
     # Parameters that were not free are neither off nor undetermined.
     return {**found, "parameters": {}, "not_identifiable": {}}
@@ -56,12 +58,12 @@ def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the simulated chance: every effect passes that changes enough, as if sure."""
-    whole = selection.look
+    whole = forward_selection.screen
 
-    def sure(*args: Any, **options: Any) -> list[Look]:  # noqa: ANN401
+    def sure(*args: Any, **options: Any) -> list[ScreeningScore]:  # noqa: ANN401
         return [replace(each, p_value=0.0) for each in whole(*args, **options)]
 
-    with _instead(selection, "look", sure):
+    with _instead(forward_selection, "screen", sure):
         return ours(dataset, seed, jobs)
 
 

@@ -14,7 +14,7 @@ from scipy.signal import lfilter
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
 from benchmarks.hidden_effects.baselines.signatures import SLACK_N
-from pma_gym.discovery.suspects import PERIODS
+from pma_gym.discovery.screening.candidates import PERIODS
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
@@ -49,7 +49,7 @@ class Balance:
 
 def balances(ready: Prepared) -> list[Balance]:
     """The station's balances at what was measured."""
-    parts = [_of_trial(ready, logged, k) for k, logged in enumerate(ready.evidence.logged)]
+    parts = [_of_trial(ready, logged, k) for k, logged in enumerate(ready.whitened.logged)]
     return [_joined([part[k] for part in parts]) for k in range(4)]
 
 

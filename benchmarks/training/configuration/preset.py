@@ -20,9 +20,9 @@ from benchmarks.training.configuration.settings import (
     whole,
 )
 from benchmarks.training.stations import training_recipe
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.adapter import base_of
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import is_file, read_yaml
 from pma_gym.engine.options import parse_options, parse_task
 from pma_gym.envs import ENVIRONMENTS
@@ -74,8 +74,8 @@ class Preset:
     name: str
     algorithm: str
     environment: str
-    view: View
-    form: Form
+    view: ObservationSpec
+    form: ActionMapping
     stations: str
     options: Mapping[str, Any]
     environments: int
@@ -191,8 +191,8 @@ def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Prese
         name,
         algorithm,
         environment,
-        View.of(mapping("view", wrapper["view"])),
-        Form.of({"base": None} | mapping("form", wrapper["form"])),
+        ObservationSpec.of(mapping("view", wrapper["view"])),
+        ActionMapping.of({"base": None} | mapping("form", wrapper["form"])),
         str(wrapper.get("stations", "")),
         mapping("options", wrapper.get("options", {})),
         environments,

@@ -7,9 +7,9 @@ import numpy as np
 from gymnasium import spaces
 
 from benchmarks.training.policy_export.agreement import ExportError, check_agreement
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.network import Layer, Scaling, Weights
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyFile
 
 if TYPE_CHECKING:
@@ -40,8 +40,8 @@ def policy_from_sb3(
     title: str,
     task: str,
     environment: Mapping[str, Any],
-    view: View,
-    form: Form,
+    view: ObservationSpec,
+    form: ActionMapping,
     observation: Sequence[tuple[str, str]],
     training: Mapping[str, Any],
     statistics: "VecNormalize | None" = None,

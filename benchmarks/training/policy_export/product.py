@@ -10,13 +10,13 @@ from benchmarks.training.run import Order, Trained
 from benchmarks.training.validation import unit_of
 from controllers.design.designs import loop_name, task_kind
 from controllers.policies.policy_file import PolicyFile
-from pma_gym.envs import PMAEnv, Station
+from pma_gym.envs import PMAEnv, StationInfo
 
 TITLES = {"ppo": "PPO", "sac": "SAC", "td3": "TD3", "tqc": "TQC"}
 """How algorithms are called."""
 
 
-def station_of(preset: Preset) -> Station:
+def station_of(preset: Preset) -> StationInfo:
     """The station of a preset as controllers are told of it."""
     options = {key: value for key, value in preset.options.items() if key != "task"}
     options.setdefault("pressure_kpa", pressures_kpa(preset)[0])
@@ -52,7 +52,7 @@ def policy_of(order: Order, trained: Trained) -> PolicyFile:
     )
 
 
-def _kwargs(preset: Preset, station: Station) -> dict[str, Any]:
+def _kwargs(preset: Preset, station: StationInfo) -> dict[str, Any]:
     return dict(preset.options) | {
         "control_rate_hz": 1.0 / station.period,
         "action_delay_s": station.action_delay,

@@ -12,8 +12,8 @@ import gymnasium as gym
 from benchmarks.training.policy_export.from_sb3 import ExportError, policy_from_sb3
 from benchmarks.training.policy_export.onnx_file import onnx_bytes
 from controllers.design.designs import task_kind
-from controllers.policies.action_mapping import MIDDLE_V, Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import MIDDLE_V, ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyFile, policy_pair, save_policy_file
 from pma_gym.documents import parse_json
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
@@ -131,7 +131,10 @@ def _policy(order: Order, name: str) -> PolicyFile:
     model = _loaded(order.model, algorithm)
     _check_spaces(order, model, env)
     options, station = env.options, env.station
-    view, form = View("environment", options.preview, options.history), Form("direct", MIDDLE_V)
+    view, form = (
+        ObservationSpec("environment", options.preview, options.history),
+        ActionMapping("direct", MIDDLE_V),
+    )
     used = {key: getattr(options, key) for key in LOOP} | {"model": str(options.model)}
     return policy_from_sb3(
         model,

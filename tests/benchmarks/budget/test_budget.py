@@ -18,14 +18,14 @@ from benchmarks.budget.trial import Budget, trial_budget
 from benchmarks.runner.rollout import make_environment, rollout
 from controllers import SerresFeedforward
 from pma_gym.effects.muscle.hysteresis import hysteresis_force
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.studies.position_voltage import printed_quadratics
 from pma_gym.tasks import TASKS
 
-AT_REST = Reading(0.0, 0.0, 0.0, 0.0, 300e3)
+AT_REST = Measurement(0.0, 0.0, 0.0, 0.0, 300e3)
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +39,7 @@ def budgets():
 
 
 def open_loop(plant, task, pressure_kpa=300.0):
-    return OpenLoop(plant, Station(plant.model, TASKS[task], 1e3 * pressure_kpa, 0.01))
+    return OpenLoop(plant, StationInfo(plant.model, TASKS[task], 1e3 * pressure_kpa, 0.01))
 
 
 # -- the controller --------------------------------------------------------------------------------

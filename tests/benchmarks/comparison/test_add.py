@@ -150,7 +150,7 @@ import gc, json, sys
 from pathlib import Path
 class Spy:
     name = "spy"
-    def see(self, environment):
+    def receive(self, environment):
         raise AssertionError("it was shown the environment")
     def reset(self, reference, station):
         kinds = [type(each).__name__ for each in gc.get_objects()]
@@ -170,7 +170,7 @@ def test_a_controller_from_a_file_finds_no_environment_and_its_clipping_is_count
     path.write_text(SPY)
     row = guarded(Contender("Spy", path=str(path)))
     kinds = json.loads(path.with_suffix(".json").read_text())
-    assert "Station" in kinds and not {"PMAEnv", "PMAVectorEnv", "Engine"} & set(kinds)
+    assert "StationInfo" in kinds and not {"PMAEnv", "PMAVectorEnv", "Engine"} & set(kinds)
     assert row["clipped_share"] == pytest.approx(150 / 501) and row["clipped_v"] == 1.0
     with (tmp_path / "terminal.txt").open("w") as terminal:
         print_clipping([row], Console(file=terminal, width=200))

@@ -15,7 +15,7 @@ from benchmarks.exercise.safety_layer.episodes import SETS, measure
 from benchmarks.exercise.safety_layer.job import read_safety, run_safety, safety_words
 from pma_gym.tasks import EXERCISES, PACED, PACING
 from pma_gym.tasks.exercise import SAFE_MOMENT
-from pma_gym.tasks.guard import GUARD_PACED, GUARD_PACING, let_through
+from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING, filtered_pressure
 
 SAFE = {"safe_moment": 24.0, "safe_speed": 1.0}
 CALM = {"pressure": 300e3, "moment": 8.0, "slow": 8.0, "speed": 0.0, "angle": 0.8}
@@ -65,18 +65,22 @@ def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():
         assert more[name].peak_speed_deg_s >= tally.peak_speed_deg_s
 
 
-@pytest.mark.parametrize("guard", [GUARD_PACED, GUARD_PACING])
-def test_what_changes_nothing_is_let_through(guard):
-    assert let_through(300e3, **CALM, **SAFE, guard=guard) == 300e3
+@pytest.mark.parametrize("safety_filter", [FILTER_PACED, FILTER_PACING])
+def test_what_changes_nothing_is_let_through(safety_filter):
+    assert filtered_pressure(300e3, **CALM, **SAFE, safety_filter=safety_filter) == 300e3
 
 
-@pytest.mark.parametrize("guard", [GUARD_PACED, GUARD_PACING])
-def test_the_faster_the_joint_the_less_is_let_through_that_way(guard):
+@pytest.mark.parametrize("safety_filter", [FILTER_PACED, FILTER_PACING])
+def test_the_faster_the_joint_the_less_is_let_through_that_way(safety_filter):
     def lowest(speed: float) -> float:
-        return let_through(0.0, **(CALM | {"speed": speed}), **SAFE, guard=guard)
+        return filtered_pressure(
+            0.0, **(CALM | {"speed": speed}), **SAFE, safety_filter=safety_filter
+        )
 
     def highest(speed: float) -> float:
-        return let_through(1e6, **(CALM | {"speed": speed}), **SAFE, guard=guard)
+        return filtered_pressure(
+            1e6, **(CALM | {"speed": speed}), **SAFE, safety_filter=safety_filter
+        )
 
     speeds = np.linspace(-0.9, 0.9, 19)
     assert all(np.diff([lowest(s) for s in speeds]) >= 0.0)
@@ -85,9 +89,11 @@ def test_the_faster_the_joint_the_less_is_let_through_that_way(guard):
     assert lowest(0.9) > 300e3 > highest(-0.9)
 
 
-@pytest.mark.parametrize("guard", [GUARD_PACED, GUARD_PACING])
-def test_near_the_safe_moment_the_pressure_falls_whatever_is_asked(guard):
-    held = let_through(1e6, **(CALM | {"moment": 23.0, "slow": 23.0}), **SAFE, guard=guard)
+@pytest.mark.parametrize("safety_filter", [FILTER_PACED, FILTER_PACING])
+def test_near_the_safe_moment_the_pressure_falls_whatever_is_asked(safety_filter):
+    held = filtered_pressure(
+        1e6, **(CALM | {"moment": 23.0, "slow": 23.0}), **SAFE, safety_filter=safety_filter
+    )
     assert held < 300e3
 
 

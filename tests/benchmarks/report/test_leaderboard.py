@@ -50,7 +50,7 @@ INFO = {
 @pytest.fixture(autouse=True)
 def bounds(monkeypatch):
     """An oracle that may see, and a bound of phase III that takes no time."""
-    monkeypatch.setitem(CONTROLLERS, "oracle", type("Seer", (), {"see": None}))
+    monkeypatch.setitem(CONTROLLERS, "oracle", type("Seer", (), {"receive": None}))
     monkeypatch.setattr(module, "achievable_bound", lambda *given: {"III": 0.02})
 
 

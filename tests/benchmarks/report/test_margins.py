@@ -22,7 +22,7 @@ from controllers.design.gains import Gains
 from controllers.feedforward_pid import FeedforwardPID
 from controllers.improved_feedforward import ImprovedFeedforward
 from controllers.pid import PID, linear_law
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS
 
@@ -31,7 +31,7 @@ GAINS = Gains(60.0, 900.0, 0.5, 0.005)
 
 
 def station(task="displacement", pressure=300e3, **more):
-    return Station(load_model("station"), TASKS[task], pressure, PERIOD, **more)
+    return StationInfo(load_model("station"), TASKS[task], pressure, PERIOD, **more)
 
 
 def sampled_integrator(gain):
@@ -101,7 +101,7 @@ def test_law_is_what_the_pid_does():
     errors = 1e-4 * (1.5 + np.sin(0.7 * np.arange(40)))
     pid.reset(lambda time: 0.0, where)
     said = [
-        pid.act(Reading(PERIOD * k, -error, 0.0, 0.0, 300e3), PERIOD * k)
+        pid.act(Measurement(PERIOD * k, -error, 0.0, 0.0, 300e3), PERIOD * k)
         for k, error in enumerate(errors)
     ]
     system = control.StateSpace(*linear_law(GAINS, PERIOD), PERIOD)

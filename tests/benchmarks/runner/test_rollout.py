@@ -201,7 +201,7 @@ class Learns(Returns):
         super().__init__(2.0)
         self.told, self.heard = [], []
 
-    def see(self, environment):
+    def receive(self, environment):
         self.told.append((environment.time, environment.condition.zero_contraction))
 
     def reset(self, reference, station):

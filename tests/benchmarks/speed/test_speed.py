@@ -23,7 +23,7 @@ from benchmarks.speed.rows import Row, all_rows, select
 ROOT = Path(__file__).parents[3]
 
 
-class StandIn:
+class CpuDevice:
     """Measures nothing: rates by key, numbered calls."""
 
     versions = {"python": "3"}
@@ -46,8 +46,8 @@ class StandIn:
         self.ended += 1
 
 
-def stand_in(monkeypatch, rates, **options):
-    made = StandIn(rates, **options)
+def cpu_library(monkeypatch, rates, **options):
+    made = CpuDevice(rates, **options)
     monkeypatch.setattr(measure, "client_of", lambda peer: made)
     return made
 
@@ -56,7 +56,7 @@ def test_every_round_measures_every_row_once_in_another_order():
     rows = [Row(f"single/{name}", name, "own", "one") for name in "abcdef"]
     orders = []
     for _ in range(2):
-        made = StandIn({row.key: 1.0 for row in rows})
+        made = CpuDevice({row.key: 1.0 for row in rows})
         measurement = Measurement(rows, Plan(3, 0.0), lambda peer, made=made: made)
         done = []
         measurement.run(done.append)
@@ -72,7 +72,7 @@ def test_rows_that_belong_together_are_measured_one_after_the_other():
     rows = [Row(f"single/{name}", name, "own", "one") for name in "abcdefgh"]
     keys = [row.key for row in rows]
     groups = [keys[1:3], keys[4:7]]
-    made = StandIn(dict.fromkeys(keys, 1.0))
+    made = CpuDevice(dict.fromkeys(keys, 1.0))
     Measurement(rows, Plan(20, 0.0), lambda peer: made, groups).run()
     rounds = [made.calls[i : i + 8] for i in range(0, 160, 8)]
     found = set()
@@ -92,7 +92,7 @@ def test_single_environments_are_measured_in_a_new_process_each_round():
     workers = []
 
     def client(peer):
-        workers.append(StandIn(dict.fromkeys(keys, 1.0)))
+        workers.append(CpuDevice(dict.fromkeys(keys, 1.0)))
         return workers[-1]
 
     rows = [row for row in all_rows() if row.key in keys]
@@ -119,7 +119,7 @@ def test_missing_peers_are_named(tmp_path, monkeypatch):
 def test_rows_that_need_more_cores_are_left_out_and_excused(monkeypatch):
     monkeypatch.setattr(os, "cpu_count", lambda: 1)
     rates = {"batch/own/1024": 9.0, "single/own": 1.0, "single/own_kernel": 1.0}
-    stand_in(monkeypatch, rates)
+    cpu_library(monkeypatch, rates)
     assert run.run_speed(check=True, quick=True, console=Console(quiet=True)) == 0
 
 
@@ -145,7 +145,7 @@ def test_rows_that_do_not_exist_are_refused(monkeypatch):
 
 
 def test_a_run_is_written_whole(tmp_path, monkeypatch):
-    stand_in(monkeypatch, {"single/own": 180.0, "single/CartPole": 100.0})
+    cpu_library(monkeypatch, {"single/own": 180.0, "single/CartPole": 100.0})
     path = tmp_path / "speed.json"
     done = speed("--quick", "--only", "single", "--json", path)
     assert done.exit_code == 0, done.output
@@ -162,7 +162,7 @@ def test_a_run_is_written_whole(tmp_path, monkeypatch):
 
 def test_an_interrupt_tells_what_was_measured_and_leaves_the_last_whole_run(tmp_path, monkeypatch):
     rates = {"single/own": 180.0, "single/CartPole": 100.0}
-    made = stand_in(monkeypatch, rates, interrupt_after=3)
+    made = cpu_library(monkeypatch, rates, interrupt_after=3)
     path = tmp_path / "speed.json"
     path.write_text("earlier")
     done = speed("--quick", "--only", "single", "--json", path)
@@ -226,14 +226,14 @@ def test_a_check_fails_where_a_ratio_falls_short_or_is_not_measured(
     monkeypatch, capsys, rates, code, message
 ):
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    stand_in(monkeypatch, {"single/own_kernel": 25, "single/own": 10} | rates)
+    cpu_library(monkeypatch, {"single/own_kernel": 25, "single/own": 10} | rates)
     assert run.run_speed(check=True, quick=True, console=Console(quiet=True)) == code
     errors = capsys.readouterr().err
     assert message in errors and errors.count("failed:") == code
 
 
 def test_the_page_takes_its_figures_from_a_whole_run(tmp_path, monkeypatch):
-    stand_in(monkeypatch, {"single/own": 180.0, "single/CartPole": 100.0})
+    cpu_library(monkeypatch, {"single/own": 180.0, "single/CartPole": 100.0})
     path = tmp_path / "speed.json"
     assert speed("--quick", "--only", "single", "--json", path).exit_code == 0
     with pytest.raises(page.RunError, match="no whole run"):

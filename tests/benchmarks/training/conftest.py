@@ -10,8 +10,8 @@ import torch
 
 from benchmarks.training import environments
 from benchmarks.training.configuration.preset import Preset
-from controllers.policies.action_mapping import Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 
 SMALL = {
     "ppo": {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
@@ -41,8 +41,8 @@ def preset(monkeypatch) -> Callable[..., Preset]:
             name="small",
             algorithm=algorithm,
             environment="pma_gym/IsokineticDisplacement-v0",
-            view=View("tracking", 2, 2),
-            form=Form("increment", 0.5),
+            view=ObservationSpec("tracking", 2, 2),
+            form=ActionMapping("increment", 0.5),
             stations="",
             options={"control_rate_hz": 10.0, "pressure_kpa": 300.0},
             environments=4,

@@ -23,8 +23,8 @@ from benchmarks.training.stations import Stations
 from benchmarks.training.study.operators import SEED, figures_of, table_of
 from benchmarks.training.validation import measure_of
 from controllers import ConstantPressure
-from controllers.policies.action_mapping import Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import Policy, shipped_policies
 from pma_gym.envs import PMAEnv, PMAVectorEnv
@@ -41,7 +41,7 @@ CASES = {
 
 @pytest.mark.parametrize("task", CASES)
 def test_the_batch_is_the_one_environment(task):
-    view, form = View("tracking", 2, 3), Form("increment", 0.5)
+    view, form = ObservationSpec("tracking", 2, 3), ActionMapping("increment", 0.5)
     options = SLOW | {"pressure_kpa": CASES[task]}
     envs = PilotedVecEnv(COUNT, task, view, form, reward_scale=0.1, **options)
     given = {"kind": "increment", "authority_v": 0.5}
@@ -92,7 +92,7 @@ def test_a_training_leaves_a_policy_that_drives_an_exercise(
     env.reset(seed=1)
     driven.reset(env.reference, env.station)
     for _ in range(20):
-        _, _, terminated, *_ = env.step(env.action(driven.act(env.reading, env.time)))
+        _, _, terminated, *_ = env.step(env.action(driven.act(env.measurement, env.time)))
         assert not terminated
 
 
@@ -171,7 +171,7 @@ def driven(env, controller, seed):
     controller.reset(env.reference, env.station)
     ended = False
     while not ended:
-        *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
     return list(info["rmse_by_phase_deg"].values())
 
 

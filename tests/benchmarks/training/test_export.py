@@ -25,12 +25,12 @@ from benchmarks.training.policy_export.agreement import AGREEMENT, ExportError, 
 from benchmarks.training.policy_export.from_sb3 import weights_from_sb3
 from benchmarks.training.policy_export.onnx_file import onnx_bytes
 from benchmarks.training.policy_export.users_model import algorithm_of
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.network import Network
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import Policy
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.sb3.policy import LeanMlpPolicy
 from pma_gym.sb3.ppo import LeanPPO
@@ -189,8 +189,8 @@ def test_onnx_computes_the_same(activation, output, scaled):
     from onnx.reference import ReferenceEvaluator
 
     parts = {"activation": activation, "output": output, "scaled": scaled}
-    station = Station(load_model("station"), TASKS["displacement"], 3e5, 0.01)
-    policy = drawn_policy(station, view=View(), form=Form(), **parts)
+    station = StationInfo(load_model("station"), TASKS["displacement"], 3e5, 0.01)
+    policy = drawn_policy(station, view=ObservationSpec(), form=ActionMapping(), **parts)
     content = onnx_bytes(policy)
     rows = np.random.default_rng(3).normal(size=(20, len(policy.observation)))
     rows = rows.astype(np.float32)
@@ -199,8 +199,8 @@ def test_onnx_computes_the_same(activation, output, scaled):
     np.testing.assert_allclose(actions, Network(policy.weights).many(rows), atol=AGREEMENT)
     words = {entry.key: entry.value for entry in onnx.load_from_string(content).metadata_props}
     assert words["task"] == "displacement"
-    assert View.of(json.loads(words["view"])) == policy.view
-    assert Form.of(json.loads(words["form"])) == policy.form
+    assert ObservationSpec.of(json.loads(words["view"])) == policy.view
+    assert ActionMapping.of(json.loads(words["form"])) == policy.form
     assert [tuple(row) for row in json.loads(words["observation"])] == list(policy.observation)
     assert onnx_bytes(policy) == content
 
@@ -233,7 +233,10 @@ def test_a_users_own_model_drives_as_a_policy_as_it_did_as_an_agent(saved, tmp_p
     assert done.stdout.split() == [f"{out}.json", f"{out}.safetensors"]
     policy = Policy(out)
     file = policy.file
-    assert (file.view, file.form) == (View("environment", 2, 0), Form("direct", 5.0))
+    assert (file.view, file.form) == (
+        ObservationSpec("environment", 2, 0),
+        ActionMapping("direct", 5.0),
+    )
     assert (file.training["algorithm"], file.training["steps"], file.task) == (
         "ppo",
         64,
@@ -244,7 +247,7 @@ def test_a_users_own_model_drives_as_a_policy_as_it_did_as_an_agent(saved, tmp_p
     policy.reset(env.reference, env.station)
     for _ in range(100):
         action, _ = model.predict(observation, deterministic=True)
-        volts = policy.act(env.reading, env.time)
+        volts = policy.act(env.measurement, env.time)
         assert abs(volts - (5.0 + 5.0 * float(action[0]))) < 1e-5
         observation, *_ = env.step(action)
 

@@ -9,8 +9,8 @@ import gymnasium as gym
 
 from benchmarks.training.policy_batch import PilotedVecEnv
 from benchmarks.training.policy_env import PilotedEnv
-from controllers.policies.action_mapping import Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.plant.model import load_model
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -18,16 +18,16 @@ COUNT = 3
 SLOW = {"control_rate_hz": 20.0, "pressure_kpa": [200.0, 300.0, 400.0]}
 LATE = SLOW | {"action_delay_s": 0.05, "observation_delay_s": 0.1}
 CASES = {
-    "increment": (View("tracking", 2, 3), Form("increment", 0.5), SLOW),
-    "direct, late": (View("tracking", 0, 0), Form("direct", 5.0), LATE),
+    "increment": (ObservationSpec("tracking", 2, 3), ActionMapping("increment", 0.5), SLOW),
+    "direct, late": (ObservationSpec("tracking", 0, 0), ActionMapping("direct", 5.0), LATE),
     "residual, late, disturbed": (
-        View("tracking", 1, 2),
-        Form("residual", 0.3, "feedforward_pid"),
+        ObservationSpec("tracking", 1, 2),
+        ActionMapping("residual", 0.3, "feedforward_pid"),
         LATE | {"disturbances": "regulator_and_operator", "pressure_kpa": [200.0, 400.0]},
     ),
     "another model": (
-        View("tracking", 1, 1),
-        Form("residual", 0.3, "feedforward_pid"),
+        ObservationSpec("tracking", 1, 1),
+        ActionMapping("residual", 0.3, "feedforward_pid"),
         SLOW | {"model": "serres2008"},
     ),
 }
@@ -132,8 +132,8 @@ def test_a_cut_trials_last_view_is_its_own():
 def test_a_broken_limit_is_no_time_limit():
     fragile = load_model("serres2008").replace({"limits.tension_n": 300.0})
     envs = PilotedVecEnv(
-        COUNT, "displacement", View("tracking", 1, 1), Form("direct", 5.0), "serres2008",
-        model=fragile, pressure_kpa=300.0, control_rate_hz=20.0,
+        COUNT, "displacement", ObservationSpec("tracking", 1, 1), ActionMapping("direct", 5.0),
+        "serres2008", model=fragile, pressure_kpa=300.0, control_rate_hz=20.0,
     )  # fmt: skip
     envs.seed(1)
     envs.reset()

@@ -26,7 +26,7 @@ from benchmarks.training.job import ordered
 from benchmarks.training.learner import learner
 from benchmarks.training.policy_env import PilotedEnv
 from benchmarks.training.policy_export.product import station_of
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.envs import ENVIRONMENTS
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -96,7 +96,9 @@ def test_the_zoo_makes_the_same_environment():
     arguments = yaml.safe_load(text)[DISPLACEMENT]["env_wrapper"][0][WRAPPER]
     env = PilotedEnv(gym.make(DISPLACEMENT), **(arguments | {"stations": ""}))
     preset = load_preset("increment", "ppo", DISPLACEMENT)
-    assert env.observation_space.shape == (len(View(preview=6, history=6).rows(env.rig.station)),)
+    assert env.observation_space.shape == (
+        len(ObservationSpec(preview=6, history=6).rows(env.rig.station)),
+    )
     assert env.pilot.view == preset.view and env.pilot.form == preset.form
 
 

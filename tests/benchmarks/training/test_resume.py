@@ -105,12 +105,13 @@ PROCESS = """
 import hashlib, sys, pathlib
 from benchmarks.training import environments, run
 from benchmarks.training.configuration.preset import Preset
-from controllers.policies.action_mapping import Form
-from controllers.policies.observation_spec import View
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
 environments.VALIDATION = 1
-preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", View("tracking", 2, 2),
-    Form("increment", 0.5), "", {"control_rate_hz": 10.0, "pressure_kpa": 300.0}, 4, 480, 0.5,
-    {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
+preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", ObservationSpec("tracking", 2,
+2),
+    ActionMapping("increment", 0.5), "", {"control_rate_hz": 10.0, "pressure_kpa": 300.0}, 4, 480,
+    0.5, {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
     {"net_arch": [16]})
 run.EPISODES = run.EVALUATIONS = 2
 found = run.train(run.Order(preset, 3), pathlib.Path(sys.argv[1]), lambda steps, point: None)

@@ -15,7 +15,7 @@ from benchmarks.suites.frozen import frozen_suite
 from controllers import CONTROLLERS
 from controllers.models.operating_range import rest_voltages
 from controllers.models.voltage import nominal_offset
-from pma_gym.envs import PMAEnv, Station
+from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import ISOTONIC
@@ -41,7 +41,7 @@ def swings(environment, law, factor):
     station, state, volts = environment.station, np.zeros(law.nstates), []
     rest = nominal_offset(station)
     while environment.time < 4.0:
-        error = -station.position(environment.reading)
+        error = -station.position(environment.measurement)
         wanted = float(law.C[0] @ state + law.D[0, 0] * error)
         state = law.A @ state + law.B[:, 0] * error
         kick = 0.0 if volts else KICK_V
@@ -63,7 +63,7 @@ def test_station_swings_just_beyond_the_gain_margin_and_calms_down_just_below(
         control_rate_hz=rate,
         action_delay_s=delay,
     )
-    station = Station(smooth, TASK, 250e3, 1.0 / rate, delay)
+    station = StationInfo(smooth, TASK, 250e3, 1.0 / rate, delay)
     (loop,) = loops([CONTROLLERS[name]()], station, [0.0])
     assert loop.margins.stable
     below, beyond = (
@@ -75,7 +75,7 @@ def test_station_swings_just_beyond_the_gain_margin_and_calms_down_just_below(
 
 
 def test_load_step_without_a_controller_ends_where_the_station_rests():
-    station = Station(load_model("station"), TASK, 250e3, 0.01)
+    station = StationInfo(load_model("station"), TASK, 250e3, 0.01)
     (loop,) = loops([CONTROLLERS["pid"]()], station, [0.0])
     free = loop._replace(law=control.ss([], [], [], [[0.0]], station.period))
     _, position = load_step(free, 3.0)
@@ -89,7 +89,7 @@ def test_load_step_without_a_controller_ends_where_the_station_rests():
 
 
 def test_regulator_takes_a_load_away():
-    station = Station(load_model("station"), TASK, 250e3, 0.01)
+    station = StationInfo(load_model("station"), TASK, 250e3, 0.01)
     (loop,) = loops([CONTROLLERS["pid"]()], station, [0.5])
     _, position = load_step(loop, 3.0)
     # A volt of the motor pulls the muscle longer before the regulator raises the pressure.
