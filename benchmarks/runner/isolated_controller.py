@@ -15,7 +15,7 @@ from typing import Any
 from benchmarks.runner.controller_process import ControllerProcess
 from benchmarks.runner.controller_spec import Contender
 from benchmarks.runner.rollout import checked_volts
-from benchmarks.runner.user_controller import MAKE_S, RESET_S, Guarded
+from benchmarks.runner.user_controller import ACT_S, MAKE_S, RESET_S, Guarded
 from controllers.controller import Controller, Reference
 from pma_gym.envs import Measurement, StationInfo
 
@@ -69,7 +69,7 @@ class Isolated:
 
     def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`."""
-        volts, seconds = self._ask(partial(_act, measurement, time))
+        volts, seconds = self._ask(partial(_act, measurement, time), "act", ACT_S)
         self.act_seconds.append(seconds)
         return volts
 

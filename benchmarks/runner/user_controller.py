@@ -58,7 +58,6 @@ class Guarded:
         except (Exception, SystemExit) as error:
             raise self._error("reset", error, "before the trial") from error
 
-    # Written out: a context manager would cost as much as a simple controller takes.
     def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`.
 
