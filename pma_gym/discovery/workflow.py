@@ -179,7 +179,7 @@ class _Work:
         if not asked.trials:
             raise TrialError("a diagnosis needs at least one trial; give measured trials")
         model = load_model(self.wanted or asked.model or DEFAULT_MODEL)
-        if model.plant not in ("station", "slide"):
+        if not model.rig.is_diagnosable:
             raise ModelError(
                 f"model {model.name} is a {model.plant}; a diagnosis needs a station or a slide, "
                 "the balance of forces that effects act on; give serres2008, station or one made "

@@ -34,7 +34,7 @@ from pma_gym.integrator.integration import memory
 from pma_gym.integrator.system import System, rates, step_start_values
 from pma_gym.integrator.trial_kernel import write_simulate
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 from pma_gym.plant.system import static_force, system
 
 FIRST_S = 7e-4
@@ -108,7 +108,7 @@ class Program:
     def equations(self) -> PlantEquations:
         """The equations with commands held, without the arithmetic of a step."""
         equations = PlantEquations(self.model.effects, self.model.parameters)
-        PLANTS[self.model.plant].write_equations(equations)
+        self.model.rig.write_equations(equations)
         return equations
 
     @cached_property
@@ -122,7 +122,7 @@ class Program:
         self.table = get("table", [pointer, pointer])
         self.derivative = get("derivative", [whole, *[pointer] * 3, whole, pointer])
         self.observe = get("observe", [whole, pointer, real, pointer, pointer])
-        if self.model.plant == "station":
+        if self.model.rig.balances_loads:
             self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
         self.table_size = int(get("table_size", [], whole)())
 
@@ -131,7 +131,7 @@ class Program:
         self._table(module)
         self._derivative(module)
         self._observe(module)
-        if self.model.plant == "station":
+        if self.model.rig.balances_loads:
             self._balance(module)
         return module
 

@@ -230,7 +230,7 @@ def _use_effect(diagnosis: Diagnosis) -> list[str]:
     # The environments' tasks are a muscle's.
     steps[0] += (
         ': `gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
-        if diagnosis.model.plant == "station"
+        if diagnosis.model.rig.balances_loads
         else ': `Plant(load_model("model.toml")).simulate(trial)`.'
     )
     for effect in diagnosis.effects:

@@ -104,4 +104,4 @@ def burst_of(bench: Bench, fit: Fitted) -> Bursts:
 
 def _tells(bench: Bench) -> bool:
     """Whether a residual tells of itself what is noise."""
-    return not bench.coarse and bench.given.plant != "slide"
+    return not bench.coarse and not bench.given.rig.is_free

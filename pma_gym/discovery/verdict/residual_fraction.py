@@ -45,7 +45,7 @@ def leftover(found: Findings) -> Left:
     # What may be chance before has no share afterwards. Of a few readings no memory is known, and
     # a slide's starts are taken from readings, whose noise it remembers.
     seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
-    free = found.given.plant == "slide"
+    free = found.given.rig.is_free
     there = (before[1] > 0.0) | np.array(seldom) | free
     shares = [
         float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0

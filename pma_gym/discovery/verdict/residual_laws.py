@@ -57,7 +57,7 @@ def drawn_laws(bench: Bench, refitted: Fitted) -> list[Drawn]:
 
     They are laws of a muscle and of a drive that only pulls.
     """
-    if bench.given.plant == "slide":
+    if not bench.given.rig.has_muscle:
         return []
     before = bench.evidence(refitted.model).sums(refitted.values, np.empty(0)).chi_square
     ranges = _ranges(bench, refitted)
