@@ -5,7 +5,7 @@ as a vector when they run. So a drawn station, or a fit's next guess, compiles n
 """
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -72,10 +72,13 @@ class Program:
         model: the model it was made for.
         states: names of states and memories, in the order of the state vector.
         outputs: names of the true outputs.
+        places: where a model's vector has which number; the tolerance comes first.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
+        names = ["tolerance", *parameter_names(model)]
+        self.places: Mapping[str, int] = {name: i for i, name in enumerate(names)}
         # Briefly: a candidate of a diagnosis is compiled for a second or two of simulation.
         key = ["plant", *self.key()]
         self.library = compiled(key, self._build, f"plant {model.name}", brief=True)
@@ -88,11 +91,6 @@ class Program:
     def key(self) -> list[str]:
         """What the compiled functions depend on, beside this package's text."""
         return structure(self.model)
-
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """Where a model's vector has which number; the tolerance comes first."""
-        return {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
 
     @cached_property
     def zero_order_hold(self) -> System:
