@@ -39,7 +39,7 @@ from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
 from pma_gym.renamed_names import renamed_attribute
-from pma_gym.tasks import Events, Human, Task
+from pma_gym.tasks import Events, Operator, Task
 
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
@@ -71,8 +71,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
     begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
     drive needs for it; contraction counts from there. In an exercise the motor plays an operator
-    (`pma_gym.tasks.human`) with a leg on the lever, and the regulator resists him; a moment other
-    than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
+    (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists him; a moment
+    other than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
     `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
     `pma_gym.tasks.following` makes of a function, can be given instead of a name.
 
@@ -493,11 +493,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return truth[self.task.protocol.quantity]
 
     @property
-    def human(self) -> Human | None:
+    def human(self) -> Operator | None:
         """The operator of this exercise; None without one, or before. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
-        return Human(*(self._number(f"human_{name}") for name in Human._fields))
+        return Operator(*(self._number(f"human_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:

@@ -486,7 +486,9 @@ class PMAVectorEnv(
     def close_extras(self, **kwargs: Any) -> None:
         """Free the picture and end the threads."""
         self._picture = None
-        self.engine.close()
+        # Gymnasium 1.1 closes a batch whose options were refused too.
+        if hasattr(self, "engine"):
+            self.engine.close()
 
 
 def _few(indices: NDArray[np.int64]) -> str:

@@ -73,7 +73,7 @@ def random_forest(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     order = np.argsort(-votes, kind="stable")
     first = str(forest.classes_[order[0]])
     shares = {str(forest.classes_[k]): float(votes[k]) for k in order[:5]}
-    parameters = moved(ready.bench, ready.refitted)
+    parameters = moved(ready.problem, ready.refitted)
     if first == NOTHING:
         return answer("parameters" if ready.moved else "agrees", (), parameters, votes=shares)
     near = [name for name, share in shares.items() if share >= CONFUSED * shares[first]]

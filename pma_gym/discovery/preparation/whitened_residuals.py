@@ -65,7 +65,7 @@ class Pieces:
         return int(self.counts[np.isin(self.trial, trials)].sum())
 
 
-class Evidence(Residuals):
+class WhitenedResiduals(Residuals):
     """Trials beside a model with free parameters, whitened; what a search may lower.
 
     Args:
