@@ -222,7 +222,7 @@ def _rounded(value: float) -> float:
 
 
 def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, Any]:
-    """Gains at the door by loop, kind of task and controller."""
+    """Gains in file units by loop, kind of task and controller."""
     tables: dict[str, Any] = {}
     for job, (gains, cost) in zip(jobs, results, strict=True):
         kinds = tables.setdefault(job.loop, {}).setdefault(job.kind, {})
