@@ -14,15 +14,18 @@ proportion to r, which holds near the case's own r alone: what a delay and a lag
 the square of their size.
 """
 
+import itertools
 import json
 import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.runner.damaged_results import say_damaged
 from pma_gym.cli.options import StrictTyper
 from pma_gym.document_shape import check_shape
@@ -267,9 +270,13 @@ def main(
     missing = [name for name in names if not _is_kept(kept / f"{name}.json")]
     begun = time.monotonic()
     print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
-    for done, name in enumerate(_bounds(cases, missing, jobs), 1):
+    done = itertools.count(1)
+
+    def tell(_: int, name: str) -> None:
         took = time.monotonic() - begun
-        print(f"{done}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
+        print(f"{next(done)}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
+
+    run_or_raise([partial(_bound_one, cases, name) for name in missing], local(jobs), tell)
     found = [json.loads((kept / f"{name}.json").read_text("utf-8")) for name in names]
     by_effect = {
         effect: curves([each for each in found if each["effect"] == effect])
@@ -302,15 +309,6 @@ def _bound_one(folder: Path, case: str) -> str:
     text = json.dumps(bounded(folder, case), indent=1) + "\n"
     replace_file(folder / "bounds" / f"{case}.json", text.encode())
     return case
-
-
-def _bounds(folder: Path, missing: Sequence[str], jobs: int):  # noqa: ANN202
-    if jobs == 1:
-        yield from (_bound_one(folder, name) for name in missing)
-        return
-    with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_bound_one, folder, name) for name in missing]
-        yield from (future.result() for future in as_completed(futures))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, TypeGuard
+from typing import Any, Self, TypedDict, TypeGuard
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
@@ -147,6 +147,28 @@ class Options:
         """Control steps after which an episode of a task is truncated."""
         whole = task.steps(self.control_rate_hz)
         return whole if self.max_episode_steps is None else min(whole, self.max_episode_steps)
+
+
+class EnvironmentOptions(TypedDict, total=False):
+    """Types of the keyword arguments of environments, for editors; see `Options` for each."""
+
+    pressure_kpa: Pressure
+    model: str | Path | Model
+    control_rate_hz: float
+    preview: int
+    noise: bool
+    action_delay_s: float
+    observation_delay_s: float
+    history: int
+    reward: str | RewardFunction
+    reward_scale: float
+    randomisation: str | Randomisation
+    regulator_action: bool
+    disturbances: str
+    human: str | Operator
+    safety: bool
+    tolerance: float
+    max_episode_steps: int | None
 
 
 def parse_options(

@@ -133,7 +133,7 @@ def test_the_forest_learns_from_no_judged_case(folder, tmp_path):
 
 
 def test_a_table_of_signatures_names_what_is_lacking(tmp_path):
-    with pytest.raises(FileNotFoundError, match="ways train"):
+    with pytest.raises(FileNotFoundError, match="baselines train"):
         forest.read_table(tmp_path / "none.csv")
 
 
