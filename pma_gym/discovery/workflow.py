@@ -103,7 +103,7 @@ def refit(
 
     Arguments and errors as `diagnose`. The verdict is `parameters` or `agrees` where the residual
     of readings left out is noise, `unknown` where parameters alone do not explain the readings, and
-    `undecidable` where the trials cannot tell.
+    `undecidable` where the trials do not decide.
     """
     with linear_algebra_alone():
         return _Work(trials, model, seed, jobs, journal, progress, checks=checks).run(search=False)

@@ -43,7 +43,7 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
         if len(pieces) > len(kept):
             words.append(
                 f"nothing holds this slide, so its {len(kept)} trials are taken as {len(pieces)} "
-                f"pieces of up to {PIECE_S:g} s, each with a start of its own"
+                f"pieces of up to {PIECE_S:g} s, each with its own start"
             )
         kept = pieces
     elif stretches(trials):

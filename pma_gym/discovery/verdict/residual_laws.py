@@ -122,7 +122,7 @@ def words(at: Array, law: Array, errors: Array, variable: str) -> str:
 
 
 def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, float]]:
-    """Where the data of each law's variable begin and end, at the door."""
+    """Where the data of each law's variable begin and end, in file units."""
     whitened = problem.whitened_residuals(refitted.model)
     readings = whitened.readings(refitted.values)
     assert readings is not None
