@@ -28,6 +28,7 @@ def follow(page: str, copy: Path) -> list[str]:
             path.write_text(patched(path.read_text(encoding="utf-8"), content), encoding="utf-8")
         else:
             assert not path.exists(), f"{name} is there already: the page must add a file"
+            path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(content, encoding="utf-8")
     return [name for _, name, _ in blocks]
 

@@ -18,3 +18,24 @@ def test_a_controller_is_three_files(tmp_path):
     after = run_pytest(copy, *contract)
     assert after.returncode == 0, after.stdout + after.stderr
     assert "3 passed" in after.stdout
+
+
+def test_an_effect_is_three_files(tmp_path):
+    copy = copied(
+        tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
+        "tests/effects/test_catalogue.py",
+    )  # fmt: skip
+    assert len(set(follow("add-an-effect.md", copy))) == 3
+    done = run_pytest(copy, "tests/effects", "-k", "guide_lubricant or lubricant_force")
+    assert done.returncode == 0, done.stdout + done.stderr
+    # The page's own test, and more than as many contracts of the catalogue.
+    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 8
+
+
+def test_a_task_is_three_files(tmp_path):
+    copy = copied(tmp_path, "pma_gym", "pyproject.toml", "tests/test_tasks.py")
+    assert len(set(follow("add-a-task.md", copy))) == 3
+    done = run_pytest(copy, "tests/test_tasks.py", "tests/tasks", "-k", "smooth_step")
+    assert done.returncode == 0, done.stdout + done.stderr
+    # The page's own test, and those that loop over every task.
+    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 4

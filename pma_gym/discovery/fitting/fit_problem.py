@@ -1,4 +1,4 @@
-"""Fits of a model, alone or with suspects in it, to whitened trials."""
+"""Fit a model, with or without candidate effects, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.free_parameters import Own, values
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.preparation.noise import Whitening
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.estimation.fitting import Search
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
@@ -39,9 +39,9 @@ class Fitted:
 
     Attributes:
         model: the model with its parameters.
-        names: the suspects in it.
+        names: the candidates in it.
         paths: its free parameters.
-        values: their values at the door, shape (p,).
+        values: their values in file units, shape (p,).
         covariance: theirs, from the whitened readings and the prior, shape (p, p).
         chi_square: of the whitened readings, with what the prior adds.
         steps: moves of the parameters that their derivatives were taken with.
@@ -58,7 +58,7 @@ class Fitted:
     converged: bool
 
     def estimate(self, path: str) -> tuple[float, float]:
-        """A parameter's value and its standard error, at the door."""
+        """A parameter's value and its standard error, in file units."""
         at = self.paths.index(path)
         return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
 
@@ -68,7 +68,7 @@ def _chi_square(fit: Fitted) -> float:
 
 
 @dataclass(frozen=True)
-class Bench:
+class FitProblem:
     """What all fits share.
 
     Attributes:
@@ -83,28 +83,31 @@ class Bench:
 
     trials: Sequence[Trial]
     given: Model
-    own: Own
+    own: FreeParameters
     noise: tuple[Whitening, ...]
     threads: int = 1
     coarse: bool = False
     files: tuple[str, ...] = ()
 
-    def evidence(
-        self, model: Model, extra: Sequence[Suspect] = (), trials: Sequence[int] | None = None
-    ) -> Evidence:
-        """Trials beside a model with suspects in it; its own parameters and theirs are free."""
+    def whitened_residuals(
+        self,
+        model: Model,
+        extra: Sequence[CandidateEffect] = (),
+        trials: Sequence[int] | None = None,
+    ) -> WhitenedResiduals:
+        """Trials beside a model with candidates in it; its own parameters and theirs are free."""
         paths, own = list(self.own.free), {}
-        for suspect in extra:
+        for candidate in extra:
             paths += [
-                path for path, free in zip(suspect.paths, suspect.fitted, strict=True) if free
+                path for path, free in zip(candidate.paths, candidate.fitted, strict=True) if free
             ]
-            own |= suspect.own
+            own |= candidate.own
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
         chosen = range(len(self.trials)) if trials is None else trials
         centre = values(model, paths)
         centre[: len(self.own.free)] = values(self.given, self.own.free)
-        return Evidence(
+        return WhitenedResiduals(
             model,
             [self.trials[i] for i in chosen],
             paths,
@@ -115,31 +118,31 @@ class Bench:
             threads=self.threads,
         )
 
-    def probed(self, model: Model, suspect: Suspect) -> Evidence:
-        """Trials beside a model with one suspect in it, all of whose parameters are free."""
-        return Evidence(
-            suspect.beside(model),
+    def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:
+        """Trials beside a model with one candidate in it, all of whose parameters are free."""
+        return WhitenedResiduals(
+            candidate.beside(model),
             self.trials,
-            suspect.paths,
+            candidate.paths,
             self.noise,
-            np.full(len(suspect.paths), np.inf),
-            own=suspect.own,
+            np.full(len(candidate.paths), np.inf),
+            own=candidate.own,
             threads=self.threads,
         )
 
     @cached_property
     def count(self) -> int:
         """How many readings there are."""
-        return self.evidence(self.given).count
+        return self.whitened_residuals(self.given).count
 
-    def sum_of_squares(self, model: Model, extra: Sequence[Suspect] = ()) -> float:
+    def sum_of_squares(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> float:
         """Whitened sum of squares of all readings, without what the prior adds.
 
         Infinite where the model cannot be simulated.
         """
-        evidence = self.evidence(model, extra)
-        at = values(model, [free.path for free in evidence.free])
-        pieces = evidence.pieces(at, np.empty(0))
+        whitened = self.whitened_residuals(model, extra)
+        at = values(model, [free.path for free in whitened.free])
+        pieces = whitened.pieces(at, np.empty(0))
         return np.inf if pieces is None else float(pieces.total()[0, 0])
 
     def left(self, fit: Fitted) -> float:
@@ -147,16 +150,16 @@ class Bench:
         return float(np.sqrt(fit.chi_square / self.count))
 
     def far(self, fit: Fitted) -> bool:
-        """Whether a fit is so far from the trials that it may have been caught."""
+        """Whether a fit is so far from the trials that it may be in a local minimum."""
         return self.left(fit) > CAUGHT
 
-    def careful_fit(self, model: Model, extra: Sequence[Suspect] = ()) -> Fitted | None:
-        """Fit a model with suspects in it, whose parameters may be far off.
+    def careful_fit(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
+        """Fit a model with candidates in it, whose parameters may be far off.
 
-        A cable that slackens makes chi-square rugged, and a search that begins far away can end in
-        a hollow. With the noise taken for larger, what parameters may be holds them on their way.
-        The rotor rings on the cable, at a frequency that a search finds from nearby only: where
-        much is left, fits begin from other stiffnesses too. The best of all is returned.
+        A cable that slackens makes chi-square rugged, and a search that starts far away can end in
+        a local minimum. With the noise assumed larger, the prior keeps parameters from going
+        astray. The rotor oscillates on the cable, at a frequency that a search finds from nearby
+        only: where much is left, fits start from other stiffnesses too. The best is returned.
         """
         begun = self._eased(model, extra, LARGER)
         fits = [self.fit(begun, extra), self.fit(model, extra)]
@@ -170,11 +173,11 @@ class Bench:
                 fits.append(self.fit(self._eased(away, extra, LARGER[-1:]), extra))
         return min(filter(None, fits), key=_chi_square)
 
-    def led_out(self, fit: Fitted, extra: Sequence[Suspect] = ()) -> Fitted:
-        """A fit, or a better one where it was caught far from the trials.
+    def continuation(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
+        """A fit, or a better one where it was in a local minimum far from the trials.
 
-        With the noise taken for as large as what is left, and then for ever less, slopes are those
-        of long moves, which lead out of a hollow.
+        The noise is assumed as large as the residual, then ever smaller: a continuation, whose
+        derivatives are those of long steps, which leave a local minimum.
         """
         if not self.far(fit):
             return fit
@@ -183,7 +186,9 @@ class Bench:
         found = self.fit(self._eased(fit.model, extra, ever_less), extra)
         return min(filter(None, (fit, found)), key=_chi_square)
 
-    def _eased(self, model: Model, extra: Sequence[Suspect], larger: Sequence[float]) -> Model:
+    def _eased(
+        self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
+    ) -> Model:
         """A model fitted to larger noise, ever less of it."""
         for factor in larger:
             noise = tuple(
@@ -197,35 +202,35 @@ class Bench:
     def fit(
         self,
         model: Model,
-        extra: Sequence[Suspect] = (),
+        extra: Sequence[CandidateEffect] = (),
         starts: Mapping[str, Array] | None = None,
         trials: Sequence[int] | None = None,
     ) -> Fitted | None:
-        """Fit a model with suspects in it.
+        """Fit a model with candidates in it.
 
         Args:
             model: where its own parameters begin.
-            extra: the suspects.
+            extra: the candidates.
             starts: values of all their `paths`, by name; where they are in the model if not given.
             trials: which trials; all if not given.
         Returns:
             The fit, or None where the model cannot be simulated.
         """
-        for suspect in extra:
-            model = suspect.beside(model)
-            if starts is not None and suspect.name in starts:
-                begun = dict(zip(suspect.paths, map(float, starts[suspect.name]), strict=True))
+        for candidate in extra:
+            model = candidate.beside(model)
+            if starts is not None and candidate.name in starts:
+                begun = dict(zip(candidate.paths, map(float, starts[candidate.name]), strict=True))
                 model = model.replace(begun)
-        evidence = self.evidence(model, extra, trials)
+        whitened = self.whitened_residuals(model, extra, trials)
         try:
-            search = Search(evidence, False, 1.0)
+            search = Search(whitened, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
         found = dict(zip(search.named(search.values), search.values, strict=True))
         return Fitted(
             model.replace({path: float(value) for path, value in found.items()}),
-            tuple(suspect.name for suspect in extra),
+            tuple(candidate.name for candidate in extra),
             tuple(found),
             search.values,
             inverse(search.best.curvature),

@@ -192,7 +192,7 @@ def _confusion_blocks(diagnosis: Diagnosis) -> list[Block]:
         return []
     text = (
         "In trials like these the following effects, each refitted together with the model's own "
-        "parameters, leave residuals that cannot be told apart: what one does, another does too."
+        "parameters, leave the same residuals: these data do not identify which of them it is."
     )
     blocks: list[Block] = [Heading("What else it could be"), Paragraph(text)]
     blocks.append(confusion_table(diagnosis.effects))
@@ -209,7 +209,7 @@ def _next_blocks(diagnosis: Diagnosis) -> list[Block]:
     following = diagnosis.next_experiment
     if following is None:
         return []
-    text = f"{capitalised(following.protocol)}."
+    text = f"{capitalised(following.excitation)}."
     if len(following.separates) > 1:
         text += (
             f" It tells {effect_names(following.separates)} apart: expected odds "

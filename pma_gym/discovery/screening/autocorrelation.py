@@ -1,8 +1,8 @@
-"""Whether a residual remembers itself for longer than noise does: then something is missing.
+"""Test the residual for autocorrelation beyond the correlation time of the noise.
 
-No candidate is asked. Sensors' noise has forgotten itself after some hundredths of a second; what a
-wrong model leaves goes on, or rings. The largest autocorrelation beyond that is set against
-Bartlett's standard error.
+The test needs no candidate. The noise of sensors is uncorrelated after some hundredths of a second;
+what a wrong model leaves is correlated for longer, or oscillates. The largest autocorrelation
+beyond that lag is compared with Bartlett's standard error.
 """
 
 from collections.abc import Sequence
@@ -22,16 +22,16 @@ SURE = 6.0
 """Standard errors of the largest autocorrelation that chance does not reach, over all lags."""
 
 LEAST = 0.025
-"""Autocorrelation below which what remembers itself is smaller than 0.16 of the noise."""
+"""Autocorrelation below which the autocorrelated part is smaller than 0.16 of the noise."""
 
 SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
 """A tone's least frequency (Hz), for slower than that every trial is one swing; half its width as a
-share of it; the least share of what a residual remembers that is a tone."""
+share of it; the least share of the autocorrelation that makes a tone."""
 
 
 @dataclass(frozen=True)
-class Memory:
-    """What a signal's residual remembers of itself.
+class AutocorrelationTest:
+    """The largest autocorrelation of a signal's residual beyond that of noise.
 
     Attributes:
         share: largest autocorrelation, either sign, at lags that noise does not reach.
@@ -49,8 +49,8 @@ class Memory:
         return self.share > LEAST and self.score > SURE
 
 
-def memory(parts: Sequence[Array], rate_hz: float) -> Memory:
-    """What one signal's residual remembers of itself.
+def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> AutocorrelationTest:
+    """Test the residual of one signal for autocorrelation beyond that of noise.
 
     Args:
         parts: of each trial (SI), NaN where there is none.
@@ -66,18 +66,20 @@ def memory(parts: Sequence[Array], rate_hz: float) -> Memory:
             sums[lag] += values[:size] @ values[lag:]
             counts[lag] += known[:size] @ known[lag:]
     if counts[0] < ENOUGH or sums[0] <= 0.0:
-        return Memory(0.0, 0.0, 0.0)
+        return AutocorrelationTest(0.0, 0.0, 0.0)
     variance = sums[0] / counts[0]
     enough = counts >= 0.5 * ENOUGH
     shares = np.where(enough, sums / np.maximum(counts, 1.0) / variance, 0.0)
     own = 1.0 + 2.0 * float(np.sum(shares[1:first] ** 2))
     scores = np.abs(shares[first:]) * np.sqrt(counts[first:] / own)
-    return Memory(float(np.abs(shares[first:]).max()), float(scores.max()), float(variance))
+    return AutocorrelationTest(
+        float(np.abs(shares[first:]).max()), float(scores.max()), float(variance)
+    )
 
 
 @dataclass(frozen=True)
 class Tone:
-    """A frequency at which a residual rings.
+    """A frequency at which a residual oscillates.
 
     Attributes:
         hertz: the frequency (Hz).
@@ -89,13 +91,13 @@ class Tone:
 
 
 def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
-    """The frequency at which a residual rings; None where it is noise or remembers otherwise.
+    """The frequency at which a residual oscillates; None where it is noise or has no peak.
 
     Args:
         parts: of each trial (SI), NaN where there is none.
         rate_hz: readings a second.
     """
-    kept = memory(parts, rate_hz)
+    kept = autocorrelation_test(parts, rate_hz)
     if not kept.sure:
         return None
     size = max(len(part) for part in parts)
