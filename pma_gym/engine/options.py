@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, TypedDict, TypeGuard
 
+import numpy as np
+
 from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
@@ -37,6 +39,9 @@ HIGHEST_PRESSURE_KPA = 575.0
 
 class DefaultSteps(int):
     """A number of steps that follows from the options, not one that a user asked for."""
+
+    # Gymnasium 1.1 takes it as a bound of a Box only if NumPy knows it as an integer.
+    dtype = np.dtype(np.int64)
 
 
 OPERATORS = ("random", "typical")
