@@ -55,6 +55,9 @@ class Effect:
         memory_scale: what an error of the memory is counted against, roughly its range.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
+        replaces: what it is one of several forms of, so that it stands in place of another effect
+            and not beside it: a model's force law or damping (compare such models as models), a
+            person, or a law of free shape. A diagnosis proposes none of these as missing.
     """
 
     name: str
@@ -70,6 +73,7 @@ class Effect:
     memory_scale: float = 1.0
     memories: int = 1
     held: tuple[str, ...] = ()
+    replaces: str = ""
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:
