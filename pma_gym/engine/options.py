@@ -8,6 +8,8 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Self, TypedDict, TypeGuard
 
+import numpy as np
+
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
@@ -35,6 +37,9 @@ HIGHEST_PRESSURE_KPA = 575.0
 
 class DefaultSteps(int):
     """A number of steps that follows from the options, not one that a user asked for."""
+
+    # Gymnasium 1.1 takes it as a bound of a Box only if NumPy knows it as an integer.
+    dtype = np.dtype(np.int64)
 
 
 OPERATORS = ("random", "typical")
