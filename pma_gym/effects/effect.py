@@ -57,6 +57,9 @@ class Effect:
             where it begins at 0.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
+        replaces: what it is one of several forms of, so that it stands in place of another effect
+            and not beside it: a model's force law or damping (compare such models as models), a
+            person, or a law of free shape. A diagnosis proposes none of these as missing.
     """
 
     name: str
@@ -73,6 +76,7 @@ class Effect:
     memories: int = 1
     memory_start: str = ""
     held: tuple[str, ...] = ()
+    replaces: str = ""
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:

@@ -45,6 +45,7 @@ def contractile_force(pressure, p):
 
 CONTRACTILE_FORCE = Effect(
     name="contractile_force",
+    replaces="force law",
     port="muscle_force",
     parameters=ContractileForce,
     law=contractile_force,

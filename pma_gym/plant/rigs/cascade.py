@@ -17,9 +17,10 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.muscle.contractile_force import contractile_force
 from pma_gym.effects.muscle.stiffness import spring_stiffness
+from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-from pma_gym.plant.rigs.rig import Port, Rig
+from pma_gym.plant.rigs.rig import Rig
 
 PORTS: dict[str, Port] = {
     "muscle_force": Port(
@@ -33,7 +34,7 @@ PORTS: dict[str, Port] = {
     "servo": Port("rate of the motor's displacement (m/s)", least=1, most=1),
     "servo_inertia": Port("acceleration of the motor's displacement (m/s^2)", most=1),
     "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
-    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
+    "regulator_delay": Port("pressure command that has reached the regulator (Pa)", most=1),
     "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
     "regulator_pace": Port("factor on the regulator's rate, multiplied"),
 }
