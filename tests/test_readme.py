@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 import benchmarks.__main__
 import pma_gym.cli
 from benchmarks import readme_table
-from benchmarks.hidden_effects.readme import KEPT
+from benchmarks.hidden_effects.evaluation.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
-from benchmarks.score import PHASES, measured_score
-from benchmarks.suite import load_suite
+from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.suites.reproduction import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -39,6 +39,7 @@ def run(*command, cwd):
     return done.stdout
 
 
+@pytest.mark.example
 def test_ten_lines_print_the_rmse_of_a_pid(tmp_path):
     (code,) = (block for block in blocks("python") if "gym.make" in block)
     printed = run("-c", code, cwd=tmp_path)
@@ -50,6 +51,7 @@ def test_example_of_a_controller_is_the_file():
     assert EXAMPLE.read_text(encoding="utf-8").rstrip() in blocks("python")
 
 
+@pytest.mark.example
 def test_example_of_a_controller_is_scored(tmp_path):
     (command,) = (block for block in blocks("bash") if "integral.py:Integral --out" in block)
     _, controllers, _, out = command.split("-m benchmarks ")[1].split()

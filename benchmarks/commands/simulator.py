@@ -1,4 +1,4 @@
-"""The commands about the simulator: `accuracy`, `integrators` and `speed`."""
+"""The commands about the simulator: `accuracy` and `speed`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,22 +11,14 @@ from benchmarks.commands.options import OptionalOut, refuse
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command()(accuracy)
-    app.command()(integrators)
     app.command()(speed)
 
 
 def accuracy(out: OptionalOut = None) -> None:
     """Measure the integrator's accuracy; exit code 1 if the default step misses a limit."""
-    from benchmarks.accuracy import run_accuracy
+    from benchmarks.accuracy.job import run_accuracy
 
     raise typer.Exit(0 if run_accuracy(out=out) else 1)
-
-
-def integrators(out: OptionalOut = None) -> None:
-    """Compare methods of integration at equal error; --out takes their curves as CSV."""
-    from benchmarks.integrators import run_integrators
-
-    run_integrators(out=out)
 
 
 def speed(

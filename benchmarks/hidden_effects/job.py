@@ -5,23 +5,23 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.comparison.fingerprint import code_digest_with
-from benchmarks.damaged import UNREADABLE, reason, say_damaged
+from benchmarks.executors.executor import Executor, ThisProcess, run_all
 from benchmarks.files import write_text
-from benchmarks.hidden_effects import records, scoring
-from benchmarks.hidden_effects.asking import Judge, diagnosed
-from benchmarks.hidden_effects.blocks import Block
-from benchmarks.hidden_effects.one_case import Work
-from benchmarks.hidden_effects.records import Record
-from benchmarks.hidden_effects.tables import percent, table
-from benchmarks.hidden_effects.targets import RATES
-from benchmarks.hidden_effects.undecidable import BLOCKS
-from benchmarks.hidden_effects.verdicts import Outcome
-from benchmarks.processes import run_all
+from benchmarks.hidden_effects.evaluation import records, scoring
+from benchmarks.hidden_effects.evaluation.diagnosis import Judge, diagnosed
+from benchmarks.hidden_effects.evaluation.one_case import Work
+from benchmarks.hidden_effects.evaluation.records import Record
+from benchmarks.hidden_effects.evaluation.tables import percent, table
+from benchmarks.hidden_effects.evaluation.targets import RATES
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome
+from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.undecidable import BLOCKS
+from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
+from benchmarks.runner.fingerprint import code_digest_with
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json
 
@@ -48,7 +48,7 @@ class Order:
         count: how many cases.
         seed: of the set.
         folder: of its records.
-        jobs: processes.
+        executor: where cases are drawn and diagnosed.
         keep: keep the trials too.
         again: anew what other code made.
         judge: makes the answers.
@@ -58,7 +58,7 @@ class Order:
     count: int
     seed: int
     folder: Path
-    jobs: int = 1
+    executor: Executor = field(default_factory=ThisProcess)
     keep: bool = False
     again: bool = False
     judge: Judge = diagnosed
@@ -108,13 +108,14 @@ def run_block(order: Order) -> dict[str, Any] | None:
 
     def on_done(index: int, result: object) -> None:
         if isinstance(result, Record):
+            records.write(result, order.folder)
             done[result.number] = result
             progress.tell(result)
         else:
             failures.append(f"case {missing[index]}: {type(result).__name__}: {result}")
             _tell(failures[-1])
 
-    if not run_all(works, order.jobs, on_done):
+    if not run_all(works, order.executor, on_done):
         _tell(
             f"Interrupted: {len(done)} of {order.count} cases of {order.block.name} are done and "
             f"stay in {order.folder}; the same command goes on from there."
@@ -202,7 +203,8 @@ def json_text(document: dict[str, Any]) -> str:
 def fingerprint() -> str:
     """Of all code that a record depends on: the package's and the generator's."""
     here = Path(__file__).parent
-    return code_digest_with(sorted([*here.glob("*.py"), *(here / "physics").glob("*.py")]))
+    folders = (here, here / "generation", here / "physics", here / "evaluation")
+    return code_digest_with([file for folder in folders for file in sorted(folder.glob("*.py"))])
 
 
 class Progress:
@@ -263,7 +265,8 @@ def _claimed(path: Path) -> dict[str, Any] | None:
 
 def _greeting(order: Order, done: dict[int, Record], code: str) -> str:
     words = (
-        f"Block {order.block.name}, seed {order.seed}: {order.count} cases, {order.jobs} at a time"
+        f"Block {order.block.name}, seed {order.seed}: {order.count} cases, "
+        f"{order.executor.jobs} at a time"
     )
     if done:
         words += f"; {len(done)} are done in {order.folder}"

@@ -3,27 +3,30 @@
 Each measured phase of each trial is known by three numbers: slope and intercept of a line, and the
 mean square about it. Beside a simulation under the printed voltages they leave three residuals, in
 what they make of the position (rms, mm at the muscle): the slope's, the mid-phase position's and
-the roughness's. Every suspect of the station is fitted to all of them at once; what is left at a
+the roughness's. Every candidate of the station is fitted to all of them at once; what is left at a
 pressure is then foretold from the others, by the fit's own derivatives.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from benchmarks.score import PHASES, measured_score
+from benchmarks.reproduction.rotation_reading import reading
+from benchmarks.reproduction.score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import prior, values
-from pma_gym.discovery.suspects import Suspect, bounds, suspects
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.free_parameters import prior, values
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.metrics import PHASE_DURATION, regression
 from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.memory_start import memory_at_start
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
@@ -56,6 +59,11 @@ GAIN = 0.9
 
 NOTHING = "nothing added"
 
+READ_THROUGH_A_GAP = "potentiometer gain and dead gap (a hypothesis)"
+GAINS = tuple(0.86 + 0.01 * k for k in range(19))
+GAPS_DEG = tuple(float(gap) for gap in range(31))
+"""Gains and gaps (deg) that are tried beside the other explanations."""
+
 
 @dataclass(frozen=True)
 class Explanation:
@@ -63,11 +71,13 @@ class Explanation:
 
     Attributes:
         name: the effect, or the parameter.
-        values: fitted values at the door, by path.
+        values: fitted values in file units, by path.
         fitted_mm: rms left where all pressures were fitted (mm at the muscle).
         left_out_mm: at pressures left out.
         displacement_mm: of that, in the displacement trials.
         rotation_mm: in the rotation trials.
+        hypothesis: whether it was thought of when these tables had been seen; it counts as none of
+            the model's, and no further explanation is built on it.
     """
 
     name: str
@@ -76,6 +86,7 @@ class Explanation:
     left_out_mm: float
     displacement_mm: float
     rotation_mm: float
+    hypothesis: bool = False
 
 
 def explanations(
@@ -86,25 +97,50 @@ def explanations(
     The first in the list that adds nothing is the model as it is.
     """
     summary = Summary.measured(model)
-    every = [each for each in suspects(model) if _reaches(each)]
+    every = [each for each in candidate_effects(model) if _reaches(each)]
     found = [summary.explained(NOTHING, model, (), np.empty((1, 0)))]
     total = len(every) + len(PARAMETERS)
-    for number, suspect in enumerate(every):
+    for number, candidate in enumerate(every):
         if progress is not None:
             progress(number, total)
-        free = np.flatnonzero(suspect.fitted)
-        some = suspect.probes[_spread(len(suspect.probes))]
-        switched = suspect.model.replace(
-            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        free = np.flatnonzero(candidate.fitted)
+        some = candidate.probes[_spread(len(candidate.probes))]
+        switched = candidate.model.replace(
+            dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
-        paths = tuple(np.array(suspect.paths)[free].tolist())
-        found.append(summary.explained(suspect.name, switched, paths, some[:, free]))
+        paths = tuple(np.array(candidate.paths)[free].tolist())
+        found.append(summary.explained(candidate.name, switched, paths, some[:, free]))
     for number, path in enumerate(PARAMETERS):
         if progress is not None:
             progress(len(every) + number, total)
         here = values(model, [path])
         found.append(summary.explained(path, model, (path,), here[None] + 0.5 * prior(model, path)))
+    found.append(read_through_a_gap(summary, model))
     return sorted(found, key=lambda each: each.left_out_mm)
+
+
+def read_through_a_gap(summary: "Summary", model: Model) -> Explanation:
+    """The rotation trials read with another gain and a dead gap (`rotation_reading`).
+
+    No motion depends on it, so every gain and gap of a grid is tried, and at each pressure that is
+    left out those count that fit the others best: a fit of the others, not a step towards one.
+    """
+    free = ("drive.offset_n",)
+    held = summary.beside(model, free).readings(values(model, free))
+    parts = model.parameters
+    slack, radius = parts["cable"].slack, parts["rotor"].radius
+    grid = [(gain, gap) for gain in GAINS for gap in GAPS_DEG]
+    reads = [partial(reading(*pair, slack).of, radius=radius) for pair in grid]
+    left = np.array([summary.left(held, read) for read in reads])
+    foretold = np.empty(left.shape[1])
+    for pressure in np.unique(summary.pressure):
+        there = summary.pressure == pressure
+        best = int(np.argmin(np.sum(left[:, ~there] ** 2, axis=1)))
+        foretold[there] = left[best, there]
+    best = int(np.argmin(np.sum(left**2, axis=1)))
+    fitted = dict(zip(("gain", "gap_deg"), grid[best], strict=True))
+    found = summary.explanation(READ_THROUGH_A_GAP, fitted, left[best], foretold)
+    return replace(found, hypothesis=True)
 
 
 def searched(
@@ -118,6 +154,7 @@ def searched(
     while len(found) < most:
         every = explanations(model, progress)
         found.append(every)
+        every = [each for each in every if not each.hypothesis]
         before = next(each.left_out_mm for each in every if each.name == NOTHING)
         if every[0].left_out_mm > GAIN * before:
             break
@@ -127,11 +164,11 @@ def searched(
 
 def _with(model: Model, found: Explanation) -> Model:
     """The model with an explanation in it."""
-    lacking = {each.name: each for each in suspects(model)}
+    lacking = {each.name: each for each in candidate_effects(model)}
     if found.name in lacking:
-        suspect = lacking[found.name]
-        model = suspect.model.replace(
-            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        candidate = lacking[found.name]
+        model = candidate.model.replace(
+            dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
     return model.replace(found.values)
 
@@ -142,11 +179,11 @@ def alike(found: Sequence[Explanation]) -> list[Explanation]:
     return [each for each in found if each.left_out_mm <= LIKE * least]
 
 
-def _reaches(suspect: Suspect) -> bool:
+def _reaches(candidate: CandidateEffect) -> bool:
     """Whether an effect is in the true motion, which alone is known, and has a size."""
-    sensed = suspect.model.effects[suspect.effect].port.startswith(("sensor", "part"))
-    lag = suspect.name.endswith("_lag") and suspect.effect != "drive_lag"
-    return bool(suspect.fitted.any()) and not sensed and not lag
+    sensed = candidate.model.effects[candidate.effect].port.startswith(("sensor", "part"))
+    lag = candidate.name.endswith("_lag") and candidate.effect != "drive_lag"
+    return bool(candidate.fitted.any()) and not sensed and not lag
 
 
 def _spread(count: int) -> list[int]:
@@ -175,7 +212,7 @@ class Summary:
     @classmethod
     def measured(cls, model: Model) -> "Summary":
         """From the tables; the regulator's voltage is what the model makes the pressure with."""
-        plant = Plant(model)
+        plant, begun = Plant(model), memory_at_start(model)
         trials, tasks, pressures, rotation, figures = [], [], [], [], []
         for number in range(4, 21):
             table = load_table(f"I{number}")
@@ -189,6 +226,8 @@ class Summary:
                     time,
                     {"motor_voltage": volts, "regulator_voltage": np.full(len(time), pressed)},
                     {"contraction": np.zeros(len(time))},
+                    # Its readings are none, so nothing but the model says where it begins.
+                    memory_at_start=begun,
                 )
             )
             tasks.append(task)
@@ -204,9 +243,24 @@ class Summary:
                 rotation += 3 * [task == "rotation"]
         return cls(trials, tasks, np.array(pressures), np.array(rotation), np.array(figures))
 
-    def residuals(self, evidence: Evidence, at: Array) -> Array:
+    def residuals(self, whitened: WhitenedResiduals, at: Array) -> Array:
         """Simulated less measured at parameters, shape (n,) in mm; infinite where it is lost."""
-        held = evidence.readings(at)
+        return self.left(whitened.readings(at))
+
+    def beside(self, model: Model, free: Sequence[str]) -> WhitenedResiduals:
+        """The trials beside a model, as one that simulates them at parameters."""
+        noise = tuple(white_noise(1.0) for _ in OUTPUTS)
+        return WhitenedResiduals(model, self.trials, free, noise, np.full(len(free), np.inf))
+
+    def left(
+        self, held: list[Array] | None, read: Callable[[Array], Array] = lambda angle: angle
+    ) -> Array:
+        """Simulated less measured, shape (n,) in mm; infinite where it is lost.
+
+        Args:
+            held: what the sensors hold in each trial, from `WhitenedResiduals.readings`.
+            read: what is read at true angles (rad).
+        """
         if held is None or not all(np.isfinite(part).all() for part in held):
             return np.full(self.figures.shape, 1e3)
         found = []
@@ -215,7 +269,7 @@ class Summary:
             position = (
                 (contraction[0] - contraction) * 1e3
                 if task == "displacement"
-                else signals[OUTPUTS.index("rotation")] * pulley() * 1e3
+                else read(signals[OUTPUTS.index("rotation")]) * pulley() * 1e3
             )
             for number in range(len(PHASES[task])):
                 begin = PHASE_DURATION * number
@@ -232,21 +286,15 @@ class Summary:
         """Fit parameters of a model, from the best of some beginnings, shape (starts, p)."""
         # A reading of every parameter keeps the zero free; one that does nothing is always there.
         free = tuple(paths) or ("drive.offset_n",)
-        evidence = Evidence(
-            model,
-            self.trials,
-            free,
-            tuple(white_noise(1.0) for _ in OUTPUTS),
-            np.full(len(free), np.inf),
-        )
+        whitened = self.beside(model, free)
         if not paths:
-            left = self.residuals(evidence, values(model, free))
-            return self._explanation(name, {}, left, left)
-        first = min(begun, key=lambda row: float(np.sum(self.residuals(evidence, row) ** 2)))
+            left = self.residuals(whitened, values(model, free))
+            return self.explanation(name, {}, left, left)
+        first = min(begun, key=lambda row: float(np.sum(self.residuals(whitened, row) ** 2)))
         lower, upper = bounds(paths)
         inside = np.clip(first, lower + 1e-9, upper - 1e-9)
         fit = least_squares(
-            lambda at: self.residuals(evidence, at),
+            lambda at: self.residuals(whitened, at),
             inside,
             bounds=(lower, upper),
             x_scale=np.maximum(np.abs(inside), 1e-3),
@@ -254,9 +302,9 @@ class Summary:
             max_nfev=25,
         )
         fitted = dict(zip(paths, map(float, fit.x), strict=True))
-        return self._explanation(name, fitted, fit.fun, self._foretold(evidence, fit))
+        return self.explanation(name, fitted, fit.fun, self._foretold(whitened, fit))
 
-    def _foretold(self, evidence: Evidence, fit: OptimizeResult) -> Array:
+    def _foretold(self, whitened: WhitenedResiduals, fit: OptimizeResult) -> Array:
         """What is left at each pressure by a fit to the others: one step from the fit of all.
 
         The step is simulated, and not taken where it does not help at the others.
@@ -265,15 +313,16 @@ class Summary:
         for pressure in np.unique(self.pressure):
             there = self.pressure == pressure
             step, *_ = np.linalg.lstsq(fit.jac[~there], -left[~there], rcond=1e-8)
-            at = np.clip(fit.x + step, evidence.lower, evidence.upper)
-            moved = self.residuals(evidence, at)
+            at = np.clip(fit.x + step, whitened.lower, whitened.upper)
+            moved = self.residuals(whitened, at)
             if np.sum(moved[~there] ** 2) <= np.sum(left[~there] ** 2):
                 found[there] = moved[there]
         return found
 
-    def _explanation(
+    def explanation(
         self, name: str, fitted: dict[str, float], left: Array, foretold: Array
     ) -> Explanation:
+        """An explanation by what it leaves where it is fitted and where it is foretold."""
         return Explanation(
             name,
             fitted,

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from pma_gym.renamed_names import renamed_names
+
 FormKind = Literal["direct", "increment", "residual"]
 FORM_KINDS: tuple[FormKind, ...] = ("direct", "increment", "residual")
 
@@ -12,7 +14,7 @@ MIDDLE_V, HIGHEST_V = 5.0, 10.0
 
 
 @dataclass(frozen=True)
-class Form:
+class ActionMapping:
     """What an action of -1 to 1 does to the voltage, which is held to 0-10 V.
 
         direct     V = 5 + 5 a
@@ -50,7 +52,7 @@ class Form:
             )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "Form":
+    def of(cls, given: Mapping[str, Any]) -> "ActionMapping":
         """A form from JSON.
 
         Raises:
@@ -76,3 +78,6 @@ class Form:
         if self.kind == "direct":
             return MIDDLE_V + MIDDLE_V * action
         return (before if self.kind == "increment" else base) + self.authority_v * action
+
+
+__getattr__ = renamed_names(__name__, {"Form": ActionMapping})

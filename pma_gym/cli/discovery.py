@@ -83,27 +83,27 @@ def diagnose(
     results.check(force, resume)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
-    from pma_gym.discovery.proposed_file import proposed_file
-    from pma_gym.discovery.report import report_page
-    from pma_gym.discovery.trial_states import dump_states
+    from pma_gym.discovery.experiments.command_file import proposed_file
+    from pma_gym.discovery.fitting.trial_states import dump_states
+    from pma_gym.discovery.report.page import report_page
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
-        found = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
+        diagnosis = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
         files = {
-            "diagnosis.json": found.text().encode(),
-            "model.toml": dump_model(found.model).encode(),
-            "trials.toml": dump_states(found.states).encode(),
+            "diagnosis.json": diagnosis.text().encode(),
+            "model.toml": dump_model(diagnosis.model).encode(),
+            "trials.toml": dump_states(diagnosis.states).encode(),
             "report.html": report_page(
-                found, trials.title, _origin(dataset, trials, seed)
+                diagnosis, trials.title, _origin(dataset, trials, seed)
             ).encode(),
         }
-        if found.next_experiment:
-            files["next.csv"] = proposed_file(found.next_experiment.trial, trials, given)
+        if diagnosis.next_experiment:
+            files["next.csv"] = proposed_file(diagnosis.next_experiment.trial, trials, given)
         results.write(files)
-    from pma_gym.discovery.summary import diagnosis_summary
+    from pma_gym.discovery.report.summary import diagnosis_summary
 
-    print(diagnosis_summary(found))
+    print(diagnosis_summary(diagnosis))
     _print_files(results)
 
 
@@ -123,23 +123,23 @@ def fit(
     results.check(force)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
-    from pma_gym.discovery.trial_states import dump_states
+    from pma_gym.discovery.fitting.trial_states import dump_states
 
     with results.opened():
         arguments = {"seed": seed, "jobs": jobs}
-        found = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
-        document = found.document()
+        refitted = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
+        document = refitted.document()
         kept = {key: document[key] for key in _FITTED}
         results.write(
             {
                 "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
-                "model.toml": dump_model(found.model).encode(),
-                "trials.toml": dump_states(found.states).encode(),
+                "model.toml": dump_model(refitted.model).encode(),
+                "trials.toml": dump_states(refitted.states).encode(),
             }
         )
-    from pma_gym.discovery.summary import print_fit
+    from pma_gym.discovery.report.summary import print_fit
 
-    print_fit(found)
+    print_fit(refitted)
     _print_files(results)
 
 
@@ -168,8 +168,8 @@ def _inputs(
 
         load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)
-    if given.plant in ("station", "slide"):
-        from pma_gym.discovery.data_checks import check_dataset
+    if given.rig.is_diagnosable:
+        from pma_gym.discovery.preparation.data_checks import check_dataset
 
         trials = check_dataset(trials, given, stop=checks)
         for words in trials.checked or ():
@@ -187,7 +187,7 @@ def _run(
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
-        from pma_gym.discovery.journal import JournalWarning
+        from pma_gym.discovery.fitting.journal import JournalWarning
 
         with StepProgress(time_left) as progress, warnings_said_at_once(JournalWarning):
             return function(trials, model, progress=progress, **arguments)
@@ -211,5 +211,5 @@ def _origin(folder: Path, trials: Dataset, seed: int) -> dict[str, str]:
 
 
 def _print_files(results: Results) -> None:
-    found = [name for name in reversed(results.names) if (results.folder / name).exists()]
-    print(f"Written to {results.folder}: {', '.join(found)}")
+    written = [name for name in reversed(results.names) if (results.folder / name).exists()]
+    print(f"Written to {results.folder}: {', '.join(written)}")

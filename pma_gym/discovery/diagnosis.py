@@ -1,6 +1,7 @@
 """What a diagnosis says: verdict, where, which effects, how large, what gap they close."""
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -15,6 +16,16 @@ SCHEMA = 1
 """Version of `diagnosis.json`."""
 
 Array = NDArray[np.float64]
+
+
+def _renamed(of: object, old: str, new: str) -> Any:  # noqa: ANN401 - whatever it is
+    """The attribute by its new name, with a warning that says it."""
+    warnings.warn(
+        f"{type(of).__name__}.{old} is now {new}; read it by that name",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return getattr(of, new)
 
 
 @dataclass(frozen=True)
@@ -33,7 +44,7 @@ class TrialState:
 Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
 """`effect`: the catalogue has what is missing. `parameters`: known parameters were off. `agrees`:
 nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
-`undecidable`: these data cannot tell."""
+`undecidable`: these data do not decide."""
 
 ADDED = "added to the model"
 """Why a candidate is where it is, if it is in the proposed model."""
@@ -41,7 +52,7 @@ ADDED = "added to the model"
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value with its 95 % interval, in its unit at the door.
+    """A parameter's value with its 95 % interval, in its file unit.
 
     Attributes:
         value: the value.
@@ -80,7 +91,7 @@ class Place:
     """Where simulation and data disagree, before anything was refitted but parameters.
 
     Attributes:
-        signal: name of the measurement at the door, `contraction_mm`.
+        signal: column name of the measurement, `contraction_mm`.
         region: where, in words.
         share_of_gap: share of the signal's unexplained mean square that lies there.
         p_value: of so much there by chance, adjusted for all regions that were looked at.
@@ -100,7 +111,7 @@ class NamedEffect:
         name: its name in the catalogue.
         confused_with: other candidates that explain these data as well.
         p_value: family-wise over the whole catalogue.
-        parameters: estimates by name at the door.
+        parameters: estimates by column name.
     """
 
     name: str
@@ -111,7 +122,7 @@ class NamedEffect:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far simulation and measurement of one signal lie apart (root mean square, at the door).
+    """How far simulation and measurement of one signal lie apart (root mean square, file units).
 
     Attributes:
         before: the model as it was given.
@@ -169,18 +180,23 @@ class NextExperiment:
     """What to measure next.
 
     Attributes:
-        protocol: its name and settings in words.
+        excitation: its name and settings in words.
         separates: candidates that it tells apart.
         expected_odds: likelihood ratio to expect between the two that are hardest to tell.
         minutes: how long it takes.
         trial: its commands.
     """
 
-    protocol: str
+    excitation: str
     separates: tuple[str, ...]
     expected_odds: float
     minutes: float
     trial: Trial
+
+    @property
+    def protocol(self) -> str:
+        """Old name of `excitation`."""
+        return _renamed(self, "protocol", "excitation")
 
 
 @dataclass(frozen=True)
@@ -217,7 +233,7 @@ class TrialRecord:
         before: simulated by the model as it was given.
         parameters: by the model with its parameters refitted.
         after: by the amended model; from a fit that had not seen the trial where `held_out`.
-        gaps: by signal at the door.
+        gaps: by column name.
         held_out: see `after`.
         file: the log that it is a piece of, or its own name.
     """
@@ -238,7 +254,7 @@ class Map:
     """A signal's residual over two conditions, for the report.
 
     Attributes:
-        signal: at the door.
+        signal: column name.
         x_name: what runs along x, with unit.
         y_name: along y.
         x_edges: shape (n + 1,).
@@ -260,10 +276,10 @@ class Floor:
     """The noise of one signal and where it is known from.
 
     Attributes:
-        value: standard deviation at the door.
+        value: standard deviation in file units.
         source: `repeats`, `rest segments`, `autoregression` or `the model's sensor`.
         by_source: what each source that there was says.
-        step: smallest step between readings (quantisation), at the door; 0 if none shows.
+        step: smallest step between readings (quantisation), in file units; 0 if none shows.
         memory: coefficients of the autoregression that whitens it.
     """
 
@@ -308,17 +324,17 @@ class Diagnosis:
         effects: what is missing; empty unless the verdict is `effect`.
         parameters: the model's own parameters that moved, by path; where nothing but parameters is
             off, only those that are named.
-        gap: by signal at the door, over all trials.
+        gap: by column name, over all trials.
         candidates: the whole catalogue, the likeliest first.
         next_experiment: what to measure next, where that would tell more.
         model: the amended model.
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
-        blind: effects that would not have shown in these data even at their usual size.
+        not_detectable: effects that these data would not have shown at their usual size.
         law: the residual law, where the verdict is `unknown` and one explains enough.
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
-            rings, for those that do.
-        floors: noise by signal at the door.
+            oscillates, for those that do.
+        floors: noise by column name.
         adequacy: what is left of each signal, by its column.
         states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
         written: misfit of the amended model with these, over all trials, by column in its unit:
@@ -344,7 +360,7 @@ class Diagnosis:
     model: Model
     given: Model
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
-    blind: tuple[str, ...] = ()
+    not_detectable: tuple[str, ...] = ()
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
@@ -358,6 +374,11 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     converged: bool = True
     worsened: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Old name of `not_detectable`."""
+        return _renamed(self, "blind", "not_detectable")
 
     def document(self) -> dict[str, Any]:
         """The content of `diagnosis.json`."""
@@ -395,14 +416,14 @@ class Diagnosis:
             "candidates": [vars(candidate) for candidate in self.candidates],
             "next_experiment": following
             and {
-                "protocol": following.protocol,
+                "protocol": following.excitation,
                 "separates": list(following.separates),
                 "expected_odds": following.expected_odds,
                 "minutes": following.minutes,
                 "file": "next.csv",
             },
             "not_identifiable": dict(self.not_identifiable),
-            "blind": list(self.blind),
+            "blind": list(self.not_detectable),
             "written": dict(self.written),
             "converged": self.converged,
             "worsened": {"signals": list(self.worsened[0]), "trials": list(self.worsened[1])},

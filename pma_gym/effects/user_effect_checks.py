@@ -9,7 +9,7 @@ from types import CodeType, FunctionType, ModuleType
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Effect, signals
-from pma_gym.effects.ports import EVERYTHING, PLACES, STATES, example
+from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, STATES, example
 from pma_gym.units import with_unit
 
 
@@ -28,9 +28,9 @@ def numbers(law: Callable) -> Iterator[tuple[str, object]]:
 
 
 def _port(effect: Effect, _module: ModuleType) -> str:
-    if effect.port in PLACES:
+    if effect.port in OPEN_PORTS:
         return ""
-    return f"acts at port {effect.port!r}; effects can be added at {', '.join(PLACES)}"
+    return f"acts at port {effect.port!r}; effects can be added at {', '.join(OPEN_PORTS)}"
 
 
 def _parameters(effect: Effect, _module: ModuleType) -> str:
@@ -66,8 +66,8 @@ def _parameters(effect: Effect, _module: ModuleType) -> str:
 def _functions(effect: Effect, module: ModuleType) -> str:
     if effect.law is None:
         return "has no law; give law=, a function"
-    if effect.rate and effect.path:
-        return "has a rate and a path; its memory can have one of them"
+    if effect.rate and effect.rate_independent_law:
+        return "has a rate and a rate_independent_law; its memory can have one of them"
     for law in effect.laws():
         if not isinstance(law, FunctionType):
             return f"has {law!r} for a law; write a plain function with def"
@@ -83,15 +83,15 @@ def _functions(effect: Effect, module: ModuleType) -> str:
 
 
 def _arguments(effect: Effect, _module: ModuleType) -> str:
-    memory = ("memory",) if effect.rate or effect.path else ()
-    place, path = PLACES[effect.port].signals, ("memory", "travel", "direction")
+    memory = ("memory",) if effect.rate or effect.rate_independent_law else ()
+    place, path = OPEN_PORTS[effect.port].signals, ("memory", "travel", "direction")
     known = [
         (effect.law, (*place, *memory)),
         (effect.rate, (*EVERYTHING, "memory")),
-        (effect.path, path),
-        (effect.path_bend, ("memory", "direction")),
-        (effect.switch, (*STATES, "stretch")),
-        (effect.bend, (*STATES, "stretch")),
+        (effect.rate_independent_law, path),
+        (effect.path_breakpoint, ("memory", "direction")),
+        (effect.event, (*STATES, "stretch")),
+        (effect.breakpoint, (*STATES, "stretch")),
     ]
     for law, names in known:
         unknown = [name for name in signals(law) if name not in (*names, "p")] if law else []
@@ -142,7 +142,7 @@ def _memories(effect: Effect, make: Callable) -> object:
 
 
 def _absence(effect: Effect, _module: ModuleType) -> str:
-    law, absent = effect.law, PLACES[effect.port].absent
+    law, absent = effect.law, OPEN_PORTS[effect.port].absent
     assert law is not None
     for share in (1.0, -0.5):
         known = {name: share * example(name) for name in signals(law)}

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.machine import arrays
 from pma_gym.codegen.machine.builtin import builtin
-from pma_gym.codegen.threads.thread_pool import Crew
+from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
 from pma_gym.engine.options import Options, Pressure
@@ -29,7 +29,7 @@ BEGUN_PARTS = 8
 """Parts of a thread's share of these."""
 
 _BEGINNING = 1
-"""The crew's second work; the first is a step."""
+"""The pool's second work; the first is a step."""
 
 
 class ActionError(ValueError):
@@ -47,16 +47,16 @@ class Engine(Episodes):
         options: the options, the same for all.
         count: how many environments.
         threads: how many threads step them.
-        single: march in single precision: faster, see `PMAVectorEnv`.
+        single: integrate in single precision: faster, see `PMAVectorEnv`.
         pressures: pressure of each, if they differ: as the option `pressure_kpa`, one each.
 
     Attributes:
         count: how many environments.
         threads: how many threads step them.
-        record: places of an environment's numbers.
+        state_layout: places of an environment's numbers.
         table: the observation's entries.
         width: environments that share a block, one lane each.
-        told: the nominal model that controllers are told.
+        nominal_model: the nominal model that controllers receive.
         nominal: the Plant of the nominal model, with what `disturbances` need.
         models: the Model of every environment's episode.
         pressures: gauge pressure that every episode began at (Pa), shape (n,).
@@ -66,8 +66,8 @@ class Engine(Episodes):
         terminated: of the last step, bool, shape (n,).
         truncated: of the last step, bool, shape (n,).
         trace: true position at k / 384 s of a single environment (m or rad).
-        voltages: voltage of the task's actuator that a single environment's station heard in every
-            step (V).
+        voltages: voltage of the task's actuator that a single environment's station received in
+            every step (V).
         rest_motor: motor voltage that episodes begin at (V): it holds the load of a regulator's
             task, by the nominal drive.
     """
@@ -84,11 +84,11 @@ class Engine(Episodes):
         """Compile, make room, and send threads to work."""
         super().__init__(task, options, count, single, pressures)
         self.threads = threads = max(1, min(threads, self.blocks))
-        self._beginnings = np.tile(self._beginning, (threads * BEGUN_PARTS, 1))
+        self._beginnings = np.tile(self._reset_arguments, (threads * BEGUN_PARTS, 1))
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._steps = self._parts(threads)
-        self._crew = Crew((address("step"), self._steps), (address("begin"), shares))
+        self._crew = ThreadPool((address("step"), self._steps), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -162,7 +162,7 @@ class Engine(Episodes):
             truncated. With nothing done it gives BAD_ACTION for an action that is not finite, and
             NOT_READ for one that is no array of as many numbers in single or double precision.
         """
-        keys, known = self.record.info, arrays.are_known()
+        keys, known = self.state_layout.info, arrays.are_known()
         bound = {
             "arguments": self._address,
             "infos": dict.fromkeys(keys),
@@ -192,9 +192,9 @@ def _halves(first: int, last: int) -> list[tuple[int, int]]:
     >>> _halves(0, 16)
     [(0, 8), (8, 12), (12, 14), (14, 16)]
     """
-    found = []
+    halves = []
     while last - first >= 2 * LEAST_BLOCKS:
         middle = (first + last) // 2
-        found.append((first, middle))
+        halves.append((first, middle))
         first = middle
-    return [*found, (first, last)]
+    return [*halves, (first, last)]

@@ -6,23 +6,27 @@ import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, TypeGuard
+from typing import Any, Self, TypedDict, TypeGuard
 
+import numpy as np
+
+from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
+from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,
-    HUMAN_BOUNDS,
     LOWEST_RATE_HZ,
+    OPERATOR_BOUNDS,
     RANDOMISATIONS,
     REWARDS,
     Disturbances,
-    Human,
+    Operator,
     Randomisation,
     Task,
     named_task,
@@ -36,8 +40,11 @@ HIGHEST_PRESSURE_KPA = 575.0
 class DefaultSteps(int):
     """A number of steps that follows from the options, not one that a user asked for."""
 
+    # Gymnasium 1.1 takes it as a bound of a Box only if NumPy knows it as an integer.
+    dtype = np.dtype(np.int64)
 
-HUMANS = ("random", "typical")
+
+OPERATORS = ("random", "typical")
 """Operators by name."""
 
 Pressure = float | Sequence[float] | str
@@ -54,11 +61,15 @@ class Options:
         pressure_kpa: gauge pressure of the episodes (kPa): a number, several to draw from (a list,
             a range, an array), or "random" for any that the task's trials begin at.
         model: name of a shipped model, path of a TOML file, or a Model.
+        memory_at_start: where the muscle's hysteresis stands as an episode begins, -1 to 1 (1: it
+            was filled and has contracted); None: as the model says, or where a randomisation draws
+            it, as drawn. A model without hysteresis has nothing to begin with.
         control_rate_hz: control steps a second (Hz).
         preview: how many future references the observation holds, one a control step.
         noise: sensor noise and quantisation; the sensors' lag stays either way.
-        action_delay_s: how late an action reaches the drive (s), whole control steps.
-        observation_delay_s: how late the sensors are heard (s), whole control steps.
+        action_delay_s: time from an action to the drive (s), whole control steps.
+        observation_delay_s: age of the sensors' values when the agent receives them (s), whole
+            control steps.
         history: how many earlier readings of the position the observation holds.
         reward: name of a reward in `pma_gym.tasks.REWARDS`; or a function of four numbers, which
             is called after every step: the true error in percent of the range, the largest change
@@ -71,7 +82,7 @@ class Options:
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
         human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
-            `pma_gym.tasks.Human` (which does not survive JSON).
+            `pma_gym.tasks.Operator` (which does not survive JSON).
         safety: whether an exercise has its safety layer between agent and regulator.
         tolerance: largest error of an internal step of the integrator, as a share of what the
             plant's states are counted against (`Plant`); a larger one is faster, a smaller one
@@ -82,6 +93,7 @@ class Options:
 
     pressure_kpa: Pressure = "random"
     model: str | Path | Model = "station"
+    memory_at_start: float | None = None
     control_rate_hz: float = 100.0
     preview: int = 0
     noise: bool = True
@@ -93,7 +105,7 @@ class Options:
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
-    human: str | Human = "random"
+    human: str | Operator = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
     max_episode_steps: int | None = None
@@ -129,12 +141,12 @@ class Options:
 
     @property
     def action_delay(self) -> int:
-        """How late an action reaches the drive, in control steps."""
+        """Time from an action to the drive, in control steps."""
         return round(self.action_delay_s * self.control_rate_hz)
 
     @property
     def observation_delay(self) -> int:
-        """How late the sensors are heard, in control steps."""
+        """Age of the sensors' values when the agent receives them, in control steps."""
         return round(self.observation_delay_s * self.control_rate_hz)
 
     @property
@@ -142,10 +154,41 @@ class Options:
         """Name of the reward; "function" for a user's, whatever it is."""
         return self.reward if isinstance(self.reward, str) else "function"
 
+    @property
+    def nominal(self) -> Model:
+        """The model as it is read, with memories where episodes shall begin.
+
+        Raises:
+            ModelError: no such model, or one that cannot be used.
+        """
+        return begun_at(load_model(self.model), self.memory_at_start)
+
     def horizon(self, task: Task) -> int:
         """Control steps after which an episode of a task is truncated."""
         whole = task.steps(self.control_rate_hz)
         return whole if self.max_episode_steps is None else min(whole, self.max_episode_steps)
+
+
+class EnvironmentOptions(TypedDict, total=False):
+    """Types of the keyword arguments of environments, for editors; see `Options` for each."""
+
+    pressure_kpa: Pressure
+    model: str | Path | Model
+    control_rate_hz: float
+    preview: int
+    noise: bool
+    action_delay_s: float
+    observation_delay_s: float
+    history: int
+    reward: str | RewardFunction
+    reward_scale: float
+    randomisation: str | Randomisation
+    regulator_action: bool
+    disturbances: str
+    human: str | Operator
+    safety: bool
+    tolerance: float
+    max_episode_steps: int | None
 
 
 def parse_options(
@@ -168,6 +211,7 @@ def parse_options(
         given = {**given, "max_episode_steps": None}
     options = Options(**plain_options(given))
     _check_model(options.model)
+    check_memory_at_start(options.memory_at_start, "episodes")
     _check_rate_and_delays(options)
     for name in ("preview", "history"):
         _check_whole(name, getattr(options, name))
@@ -187,11 +231,11 @@ def parse_options(
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
-    if isinstance(options.human, Human):
-        check_human(options.human)
-    elif options.human not in HUMANS:
+    if isinstance(options.human, Operator):
+        check_operator(options.human)
+    elif options.human not in OPERATORS:
         raise ValueError(
-            f"human must be one of {', '.join(HUMANS)} or a pma_gym.tasks.Human, got "
+            f"human must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
             f"{options.human!r}"
         )
     check_pressure(options.pressure_kpa)
@@ -249,14 +293,14 @@ def rig_model(task: Task, options: Options) -> Model:
         ModelError: no such model, or one that cannot be used.
         ValueError: a cascade where there must be a station.
     """
-    model = load_model(options.model)
-    if model.plant == "slide":
+    model = options.nominal
+    if not model.rig.has_muscle:
         raise ValueError(
             f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
             "which has no muscle; take station or serres2008"
         )
     operated = options.disturbing.operator_force != 0.0
-    if model.plant != "station" and (operated or task.load or task.exercise):
+    if not model.rig.balances_loads and (operated or task.load or task.exercise):
         what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
         held = "plays an operator" if task.exercise else "holds a load"
         why = "somebody pulls at its slide" if operated else f"the motor {held}"
@@ -264,15 +308,15 @@ def rig_model(task: Task, options: Options) -> Model:
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"
         )
-    model = told_model(task, model)
+    model = nominal_model(task, model)
     if not operated or "operator" in model.parameters:
         return model
     return model.with_effects({"operator": {"share": 1.0}})
 
 
-def told_model(task: Task, model: Model) -> Model:
-    """The nominal model that controllers are told: with a leg on its lever in an exercise."""
-    if task.exercise is None or "leg" in model.parameters or model.plant != "station":
+def nominal_model(task: Task, model: Model) -> Model:
+    """The nominal model that controllers receive: with a leg on its lever in an exercise."""
+    if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
         return model
     leg = CATALOGUE["leg"]
     usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}
@@ -353,14 +397,14 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
         raise _unknown(what, value, names)
 
 
-def check_human(human: Human) -> None:
+def check_operator(human: Operator) -> None:
     """Refuse an operator whom nobody could be.
 
     Raises:
         ValueError: names the number, its range and unit, and what came.
     """
     for name, value in human._asdict().items():
-        lower, upper, unit = HUMAN_BOUNDS[name]
+        lower, upper, unit = OPERATOR_BOUNDS[name]
         _check_number(f"human.{name}", value, lower, upper, unit)
 
 

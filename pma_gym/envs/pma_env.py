@@ -4,7 +4,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +16,7 @@ from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.cpu.step_writer import BAD_ACTION
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import (
+    EnvironmentOptions,
     Pressure,
     check_known,
     check_named,
@@ -29,19 +30,25 @@ from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
 from pma_gym.envs.rendering.history import History
+from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
+from pma_gym.envs.rendering.window import Window
 from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.station_info import Reading, Reference, Station, detached_task
+from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
-from pma_gym.tasks import Events, Human, Task
+from pma_gym.renamed_names import renamed_attribute
+from pma_gym.tasks import Events, Operator, Task
 
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
+
+OWN = ("task", "render_mode", "render_width")
+"""Keyword arguments of an environment beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa",)
 NOT_BEGUN = "no episode has begun"
@@ -70,8 +77,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
     begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
     drive needs for it; contraction counts from there. In an exercise the motor plays an operator
-    (`pma_gym.tasks.human`) with a leg on the lever, and the regulator resists him; a moment other
-    than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
+    (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists him; a moment
+    other than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
     `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
     `pma_gym.tasks.following` makes of a function, can be given instead of a name.
 
@@ -89,7 +96,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     A float32 Box, each entry clipped to -5 to 5. "Position" is the quantity that the task asks
     for, and its range 25 mm, 90 deg, or the contraction's stroke. Extension and rotation count from
     the trial's beginning, so that extension is negative while a regulator's task contracts the
-    muscle. With `observation_delay_s` everything measured is so old.
+    muscle. `observation_delay_s` is the age of everything measured.
 
     | index | entry | 1.0 = |
     |---|---|---|
@@ -139,8 +146,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | pressure | 600 kPa |
 
     An exercise also ends where moment (24 N m) or speed of the joint (60 deg/s) are not safe. Its
-    safety layer (`safety`, on by default; `pma_gym.tasks.guard`) holds the regulator's command
-    away from there.
+    safety layer (`safety`, on by default; `pma_gym.tasks.safety_filter`) holds the regulator's
+    command away from there.
 
     `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
     is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
@@ -157,7 +164,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | `operator` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
     | `regulator_and_operator` | both |
 
-    A jump is volts that the regulator hears beside its command, by the nominal line and as far as
+    A jump adds volts to the regulator's command, by the nominal line and as far as
     0-10 V go; the operator's force adds to the muscle's at the slide. Both come with the control
     step after their time. `env.disturbance` and `env.events` tell, but not controllers.
 
@@ -166,10 +173,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     |---|---|---|
     | `time_s` | since the trial began | s |
     | `extension_mm`, `rotation_deg` or `contraction_mm` | true position | mm, deg |
-    | `measured_` and the same | as heard by the agent | mm, deg |
+    | `measured_` and the same | as the agent receives it | mm, deg |
     | `reference_mm` or `reference_deg` | reference now | mm, deg |
     | `error_mm` or `error_deg` | true position less reference | mm, deg |
-    | `motor_voltage_v`, `regulator_voltage_v` | as heard by the station in this step | V |
+    | `motor_voltage_v`, `regulator_voltage_v` | as the station receives it in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
     | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
     | of an exercise: `moment_nm`, `operator_nm` | at the joint; that the operator means | N m |
@@ -189,7 +196,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     Args:
         task: name of a task, or a Task.
-        render_mode: None or `rgb_array`.
+        render_mode: None; `rgb_array`: `render` returns a picture; or `human`: a window (pygame,
+            extra `view`) shows `reset` and every step at real time, until its user closes it.
+        render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: keyword arguments, see `Options`.
 
     Attributes:
@@ -211,19 +220,25 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         (0.01, 2.0, 0.91)
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
 
+    _window: Window | None = None
     _index = 0
     """Its number in the engine."""
 
     def __init__(
-        self, task: str | Task = "displacement", render_mode: str | None = None, **options: Any
+        self,
+        task: str | Task = "displacement",
+        render_mode: str | None = None,
+        render_width: int = USUAL_WIDTH,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
         """Check the options and compile the plant."""
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.options = parse_options(options, "PMAEnv.__init__()", ("task", "render_mode"))
+        self.render_width = check_render_width(render_width)
+        self.options = parse_options(options, "PMAEnv.__init__()", OWN)
         self.task = parse_task(task, self.options)
         self._engine = Engine(self.task, self.options)
         self.observation_space = self._engine.table.space
@@ -236,8 +251,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._attach()
 
     _ATTACHED = frozenset(
-        {"nominal_plant", "table", "plant", "_places", "_row", "_heard", "_observed", "_given"}
-        | {"_made", "_datum", "_picture", "_advance"}
+        {"nominal_plant", "table", "plant", "_offsets", "_row", "_measured", "_observed", "_given"}
+        | {"_made", "_datum", "_picture", "_window", "_advance"}
     )
 
     def _attach(self) -> None:
@@ -245,21 +260,25 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self.nominal_plant = self._engine.nominal
         self.table = self._engine.table
         self._row = self._engine.records[0, :, 0]
-        self._find_places()
+        self._find_offsets()
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         self._made = self._engine.advance(self._observed.copy, self._given)
         if callable(self.options.reward):
             self._made = self._rewarded(self._made)
         self._picture: Picture | None = None
+        self._window = None
+        if self.render_mode == "human":
+            self._window = Window(self.task.title)
+            self._made = self._watched(self._made)
         self._wait(self._idle)
 
-    def _find_places(self) -> None:
-        self._places = self._engine.record.places
+    def _find_offsets(self) -> None:
+        self._offsets = self._engine.state_layout.offsets
         # The record holds a reading's parts side by side.
-        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._heard = slice(heard, heard + len(PARTS))
-        self._datum = START if START in self._places else "zero_contraction"
+        first = self._offsets[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._measured = slice(first, first + len(PARTS))
+        self._datum = START if START in self._offsets else "zero_contraction"
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -286,12 +305,16 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(None)
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
+        if self._window is not None:
+            self._show(self._window)
+            # Drawing for the first time takes a while.
+            self._window.start()
         return self._observed.copy(), self._info()
 
     def step(
         self, action: NDArray[np.floating]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Command the station, let one control step pass, look what came of it.
+        """Command the station, let one control step pass, return its result.
 
         Raises:
             ValueError: an action of the wrong shape, or not finite.
@@ -316,6 +339,30 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
         return advance
 
+    def _watched(self, made: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """A step that the window shows; that of an episode's end `_last` shows."""
+        window = self._window
+        assert window is not None
+
+        def advance(action: object) -> Any:  # noqa: ANN401 - as `Engine.advance` has it
+            result = made(action)
+            if type(result) is tuple and window.wait(self.time):
+                self._show(window)
+            return result
+
+        return advance
+
+    def _show(self, window: Window) -> None:
+        """Draw in the window, once the clock has come to the simulated time."""
+        window.wait(self.time)
+        if not window.closed:
+            window.show(self.picture())
+
+    @property
+    def window_closed(self) -> bool:
+        """Whether the window of `render_mode="human"` was closed, by its user or by `close`."""
+        return self._window is not None and self._window.closed
+
     def _otherwise(
         self, action: NDArray[np.floating], code: int
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -339,6 +386,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(f"the episode ended at {self.time:g} s")
         info = last_info(self._engine, 0)
         self.ended_by = info["ended_by"]
+        if self._window is not None:
+            self._show(self._window)
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 
     def _info(self) -> dict[str, Any]:
@@ -360,7 +409,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self.options.pressure_kpa
 
     def _number(self, name: str) -> float:
-        return float(self._row[self._places[name]])
+        return float(self._row[self._offsets[name]])
 
     # -- states ------------------------------------------------------------------------------------
 
@@ -455,7 +504,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     @property
     def _count(self) -> int:
         """Control steps so far."""
-        return int(self._row.view(np.int64)[self._places["count"]])
+        return int(self._row.view(np.int64)[self._offsets["count"]])
 
     @property
     def time(self) -> float:
@@ -463,10 +512,12 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._count * self.options.period
 
     @property
-    def reading(self) -> Reading:
-        """What the sensors say now, as late as `observation_delay_s` makes them."""
+    def measurement(self) -> Measurement:
+        """What the sensors say, `observation_delay_s` ago."""
         taken = max(self._count - self.options.observation_delay, 0) * self.options.period
-        return Reading(taken, *self._row[self._heard].tolist())
+        return Measurement(taken, *self._row[self._measured].tolist())
+
+    reading = renamed_attribute("reading", "measurement")
 
     @property
     def truth(self) -> dict[str, float]:
@@ -490,21 +541,21 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return truth[self.task.protocol.quantity]
 
     @property
-    def human(self) -> Human | None:
+    def human(self) -> Operator | None:
         """The operator of this exercise; None without one, or before. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
-        return Human(*(self._number(f"human_{name}") for name in Human._fields))
+        return Operator(*(self._number(f"human_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
         """What disturbed the last step: the regulator's jump (V) and the operator's force (N)."""
-        jumps = [name for name in self._places if name.startswith("jump_step_")]
+        jumps = [name for name in self._offsets if name.startswith("jump_step_")]
         count = self._count - 1
         volts = [
             self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
         ]
-        force = self._number(OPERATOR) if OPERATOR in self._places else 0.0
+        force = self._number(OPERATOR) if OPERATOR in self._offsets else 0.0
         return sum(volts), force
 
     @property
@@ -513,11 +564,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._engine.events(self._index)
 
     @property
-    def station(self) -> Station:
+    def station(self) -> StationInfo:
         """What a controller may know, in copies: what it was designed with, how it is driven."""
         options = self.options
-        return Station(
-            copy.copy(self._engine.told),
+        return StationInfo(
+            copy.copy(self._engine.nominal_model),
             self._detached_task,
             self.pressure,
             options.period,
@@ -537,17 +588,17 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     @property
     def motor_voltage(self) -> float:
-        """Motor voltage that the station heard in the last step (V)."""
+        """Motor voltage that the station received in the last step (V)."""
         return self._number("motor_voltage")
 
     @property
     def regulator_voltage(self) -> float:
-        """Regulator voltage that the station heard in the last step (V)."""
+        """Regulator voltage that the station received in the last step (V)."""
         return self._number("regulator_voltage")
 
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
-        """Motor voltage that the station heard in every step so far (V), shape (steps,).
+        """Motor voltage that the station received in every step so far (V), shape (steps,).
 
         Raises:
             AttributeError: in an exercise, whose operator is not written down step by step.
@@ -563,7 +614,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     @property
     def voltages(self) -> NDArray[np.float64]:
-        """Voltage of the task's actuator that the station heard in every step so far (V)."""
+        """Voltage of the task's actuator that the station received in every step so far (V)."""
         return self._engine.voltages[: self._count].copy()
 
     @property
@@ -605,7 +656,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return episode_summary(self._engine, self._index)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """A picture of the station and of the trial so far, shape (400, 800, 3).
+        """A picture of the station and of the trial so far, RGB.
+
+        Returns:
+            Shape (render_width / 2, render_width, 3); None where a window shows it
+            (`render_mode="human"`).
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has begun.
@@ -615,6 +670,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
                 "render() draws nothing without a render mode; make the environment with "
                 'render_mode="rgb_array"'
             )
+            return None
+        if self._window is not None:
+            if self._idle == NOT_BEGUN:
+                raise self._needs_reset("render()")
+            self._show(self._window)
             return None
         return self.picture()
 
@@ -633,12 +693,14 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.rendering.picture import Picture
 
-            self._picture = Picture(self.task)
+            self._picture = Picture(self.task, self.render_width)
         return self._picture
 
     def close(self) -> None:
-        """Free the picture."""
+        """Free the picture and close the window."""
         self._picture = None
+        if self._window is not None:
+            self._window.close()
 
 
 def _no_step(_: object) -> int:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -17,6 +17,7 @@ from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import ActionError, Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import (
+    EnvironmentOptions,
     Pressure,
     check_count,
     check_known,
@@ -33,17 +34,22 @@ from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.history import RecordingEngine
+from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
 from pma_gym.envs.seeding import SeededByReset, own_seeds
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Task, limit_in_words
 
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
 
-OWN = ("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa", "render_mode")
+OWN = (
+    *("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa"),
+    *("render_mode", "render_width"),
+)
 """Keyword arguments of a batch beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
@@ -72,6 +78,7 @@ class PMAVectorEnv(
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
         render_mode: None or `rgb_array`; a batch that renders keeps the course of every episode.
+        render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
@@ -102,7 +109,8 @@ class PMAVectorEnv(
         precision: str = "double",
         pressures_kpa: Sequence[Pressure] | None = None,
         render_mode: str | None = None,
-        **options: Any,
+        render_width: int = USUAL_WIDTH,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
         """Check the options and compile."""
         num_envs, threads = plain_scalar(num_envs), plain_scalar(threads)
@@ -114,6 +122,7 @@ class PMAVectorEnv(
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
+        self.render_width = check_render_width(render_width)
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.options = parse_options(options, "PMAVectorEnv.__init__()", OWN)
@@ -275,7 +284,7 @@ class PMAVectorEnv(
         NDArray[np.bool_],
         dict[str, Any],
     ]:
-        """Command every station, let one control step pass, look what came of it.
+        """Command every station, let one control step pass, return its result.
 
         Args:
             actions: shape (num_envs, entries of an action).
@@ -351,7 +360,7 @@ class PMAVectorEnv(
         return engine.observations.copy(), rewards, terminated, truncated, info
 
     def _final(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[Any, Any]:
-        """What is told of episodes that end before the next ones begin in the same step."""
+        """The info of episodes that end before the next ones begin in the same step."""
         final = np.full(self.num_envs, None, object)
         for i in indices.tolist():
             final[i] = self.engine.observations[i].copy()
@@ -409,34 +418,36 @@ class PMAVectorEnv(
         """Last infos of the episodes that ended, in Gymnasium's form: arrays with masks."""
         engine, task = self.engine, self.task
         columns = engine.rows(indices).T
-        numbers = {name: columns[place] for name, place in engine.record.places.items()}
+        numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
         sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
-        found: dict[str, Any] = {name: numbers[name] for name in engine.record.info}
-        found |= {name: found[name] != 0.0 for name in TRUTHS}
-        found |= summaries(task, sums, numbers["sample"])
+        columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
+        columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
+        columns_by_name |= summaries(task, sums, numbers["sample"])
         if task.exercise:
             counts = engine.counts()[indices]
-            found |= exercise_summaries(numbers, counts, self.options.period)
+            columns_by_name |= exercise_summaries(numbers, counts, self.options.period)
         pairs = zip(indices.tolist(), numbers["ended"].tolist(), strict=True)
         limits = [limit_in_words(engine.models[i], code, task.exercise) for i, code in pairs]
-        found["ended_by"] = np.array(limits, object)
-        return spread(found, over, indices)
+        columns_by_name["ended_by"] = np.array(limits, object)
+        return spread(columns_by_name, over, indices)
 
     def station_info(self) -> dict[str, NDArray[Any]]:
         """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
-        found: dict[str, NDArray[Any]] = {
-            name: self.engine.numbers(name) for name in self.engine.record.info
+        info: dict[str, NDArray[Any]] = {
+            name: self.engine.numbers(name) for name in self.engine.state_layout.info
         }
-        return found | {name: found[name] != 0.0 for name in TRUTHS}
+        return info | {name: info[name] != 0.0 for name in TRUTHS}
 
-    def readings(self) -> NDArray[np.float64]:
-        """What the sensors say now, as controllers hear it (SI), shape (4, num_envs).
+    def measurements(self) -> NDArray[np.float64]:
+        """What the sensors say, `observation_delay_s` ago (SI), shape (4, num_envs).
 
-        Extension (m), rotation (rad), load (N), pressure (Pa), as late as `observation_delay_s`
-        makes them: of each environment what `PMAEnv.reading` has.
+        Extension (m), rotation (rad), load (N), pressure (Pa): of each environment what
+        `PMAEnv.measurement` has.
         """
         late = self.options.observation_delay
         return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
+
+    readings = renamed_attribute("readings", "measurements")
 
     @property
     def pressures(self) -> NDArray[np.float64]:
@@ -459,7 +470,10 @@ class PMAVectorEnv(
         return BatchMember(self, index % self.num_envs)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
-        """A picture of every station and of its trial so far, shape (400, 800, 3) each.
+        """A picture of every station and of its trial so far, RGB.
+
+        Returns:
+            Shape (render_width / 2, render_width, 3) each.
 
         Raises:
             gymnasium.error.ResetNeeded: an environment has no episode yet.
@@ -477,13 +491,15 @@ class PMAVectorEnv(
             # Imported here: environments without pictures need no matplotlib.
             from pma_gym.envs.rendering.picture import Picture
 
-            self._picture = Picture(self.task)
+            self._picture = Picture(self.task, self.render_width)
         return self._picture
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free the picture and end the threads."""
         self._picture = None
-        self.engine.close()
+        # Gymnasium 1.1 closes a batch whose options were refused too.
+        if hasattr(self, "engine"):
+            self.engine.close()
 
 
 def _few(indices: NDArray[np.int64]) -> str:

@@ -18,7 +18,8 @@ from pma_gym.data.trial import Trial
 from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
-from pma_gym.plant import sensors
+from pma_gym.integrator.equations import Interpolation, check_interpolation
+from pma_gym.plant import memory_start, sensors
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model, ModelError
@@ -54,7 +55,7 @@ class Sums:
 
     Attributes:
         chi_square: r.r; infinite where the model cannot be simulated.
-        gradient: J^T r, shape (p,), per unit at the door.
+        gradient: J^T r, shape (p,), per unit in files.
         curvature: J^T J, shape (p, p).
     """
 
@@ -69,7 +70,8 @@ class Residuals:
     A residual is simulated minus measured, in standard deviations: the sensor's noise and the
     rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
     does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
-    begins settled at its first commands; a slide that nothing holds, as fast as fits it best.
+    begins settled at its first commands, memories where they fit it best between 0 and 1 unless the
+    trial says where (`memory_start`); a slide that nothing holds, as fast as fits it best.
 
     Args:
         model: the model; its noise levels weigh the sensors, its drive and its regulator's line
@@ -77,12 +79,13 @@ class Residuals:
         trials: the trials, which need measurements.
         free: paths of the free parameters.
         tolerance: of the integrator, as `Plant`.
-        joined: whether commands are joined linearly; else each is held until the next.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
+            held until the next).
         threads: how many threads share the work; the results' bits do not depend on it.
 
     Attributes:
         free: the free parameters.
-        start: their values in the model, at the door, shape (p,).
+        start: their values in the model, in file units, shape (p,).
         count: number of residuals.
         deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
         trials: number of trials.
@@ -98,10 +101,12 @@ class Residuals:
         trials: Sequence[Trial],
         free: Sequence[str],
         tolerance: float = DEFAULT_TOLERANCE,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         threads: int = 1,
     ) -> None:
-        self.plant, self.joined, self.threads = Plant(model, tolerance), joined, threads
+        check_interpolation(interpolation)
+        self.plant, self.threads = Plant(model, tolerance), threads
+        self.interpolation: Interpolation = interpolation
         self.free = _free(self.plant.model, free)
         places = [parameter.place for parameter in self.free]
         self._factors = np.array([parameter.quantity.factor for parameter in self.free])
@@ -124,16 +129,20 @@ class Residuals:
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
-        if self.plant.model.plant == "slide":
+        if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
             paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
             self._begun = self._places({path: list(row) for path, row in paths.items()})
+        guesses = memory_start.first_guesses(trials)
+        nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
+        self._memories = self._places({path: list(guesses) for path in nuisances})
+        self._reaches = [memory_start.reach(trial) for trial in trials]
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums at parameters, with the Jacobian by finite differences.
 
         Args:
-            values: the parameters at the door, shape (p,).
+            values: the parameters in file units, shape (p,).
             steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
             central: move each both ways, which costs twice as much.
         """
@@ -201,10 +210,11 @@ class Residuals:
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self._factors[column]
-        count, number = len(tried) + bool(self._begun), len(self.plant.states)
+        moved = self._moved_starts()
+        count, number = len(tried) + bool(moved), len(self.plant.states)
         every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
-        if self._begun:
-            every[len(tried) :: count, self._begun[-1][0]] += initial_states.MOVE
+        for place, move in moved:
+            every[len(tried) :: count, place] += move
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
@@ -221,18 +231,50 @@ class Residuals:
             runs, spaces = [], self._spaces(block, count)
             for i, space in zip(block, spaces, strict=True):
                 logged = self._trials[i]
-                columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
                 runs += [
                     Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
                     for k in range(count)
                 ]
             simulate_all(self.plant.program, runs, self.threads)
-            if self._begun:
-                spaces = list(map(self._met, spaces, (self._trials[i] for i in block)))
+            if moved:
+                each = zip(block, spaces, strict=True)
+                spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
             found += work(block, spaces, zeros[block, : len(tried)], vectors)
         return found
 
-    def _met(self, space: Array, logged: Logged) -> Array:
+    def _moved_starts(self) -> list[tuple[int, float]]:
+        """Parameters that say how trials begin, and by how much each is moved once more."""
+        if self._begun:
+            return [(self._begun[-1][0], initial_states.MOVE)]
+        return [(place, memory_start.MOVE) for place, _ in self._memories]
+
+    def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """States of a trial that begins as fits best, shape (tried, rows, states).
+
+        The last of those given is the first with another start; x0 moves with them.
+        """
+        if self._begun:
+            return self._met_slide(space, self._trials[number])
+        shares = self._start_shares(number, space, zeros, vectors)
+        space[:-1] += shares[:, None, None] * (space[-1] - space[0])
+        zeros[:-1] += shares * (zeros[-1] - zeros[0])
+        return space[:-1]
+
+    def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """How many moves bring each simulation nearest to a trial's readings, shape (tried,)."""
+        logged = self._trials[number]
+        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]))
+        left = np.stack(held, axis=1) - logged.measured
+        changes = self._in_noise(logged, left * logged.counts)
+        along = changes[-1] - changes[0]
+        return memory_start.best_shares(changes[:-1], along, self._reaches[number])
+
+    def _in_noise(self, logged: Logged, left: Array) -> Array:
+        """Differences (SI), shape (tried, 4, rows), in units of noise, shape (tried, numbers)."""
+        return (left / self.deviations[:, None]).reshape(len(left), -1)
+
+    def _met_slide(self, space: Array, logged: Logged) -> Array:
         """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
         column = self.plant.sensor_columns[0]
         at = column if column >= 0 else self.plant.states.index("contraction")
@@ -242,7 +284,7 @@ class Residuals:
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
         every = np.tile(vectors, (len(self._trials), 1))
-        for place, values in (*self._begun, *self._own):
+        for place, values in (*self._begun, *self._memories, *self._own):
             every[:, place] = np.repeat(values, len(vectors))
         return every
 

@@ -79,8 +79,9 @@ def linearize_at(
     if "velocity" in plant.states:
         base.state[plant.states.index("velocity")] += _AWAY * DIRECTIONS[direction]
     else:
-        # The cascade's muscle shortens where its motor stands behind it.
-        base.state[plant.states.index("servo")] -= _AWAY * DIRECTIONS[direction]
+        # The cascade's muscle shortens where its motor, or its own contraction, stands behind it.
+        for name in ("servo", "free_contraction"):
+            base.state[plant.states.index(name)] -= _AWAY * DIRECTIONS[direction]
     kept = [
         i
         for i, name in enumerate(plant.states)
@@ -131,7 +132,7 @@ def _holding_voltage(plant: CompiledModel, regulator: float, contraction: float)
 
 def _strongest(plant: CompiledModel, regulator: float) -> float:
     """Highest motor voltage whose load the muscle balances within its stroke."""
-    if plant.model.plant == "cascade":
+    if not plant.model.rig.balances_loads:
         return 10.0
     state = equilibrium_at(plant, 0.0, regulator).state
     most = static_force(plant, state)(-plant.model.parameters["limits"].stretch)

@@ -2,28 +2,43 @@
 
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.substitute import substitute
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.integrator.integration import Layout
-from pma_gym.integrator.step_attempt import attempt
-from pma_gym.integrator.system import System, at_rest
+from pma_gym.integrator.step_attempt import step_attempt
+from pma_gym.integrator.system import System, step_start_values
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 
 
-def system(model: Model, ramped: bool) -> System:
-    """A model's equations and step; with `ramped`, commands change linearly in time."""
-    plant = PLANTS[model.plant]
-    equations = PlantEquations(model.effects, model.parameters, ramped)
-    plant.write_equations(equations)
+def system(model: Model, interpolation: Interpolation) -> System:
+    """A model's equations and step; commands are interpolated by first- or zero-order hold."""
+    equations = PlantEquations(model.effects, model.parameters, interpolation)
+    model.rig.write_equations(equations)
     equations.finish()
-    made = attempt(equations, plant.POSITIONS)
+    made = step_attempt(equations, model.rig.position_tolerances)
     return System(equations, made, Layout.of(made))
 
 
+def memories_at_start(eq: PlantEquations) -> dict[str, Value]:
+    """The memories that do not begin at 0, as values of the model's parameters, by state."""
+    return {
+        name: getattr(eq.parameters[effect.name], effect.memory_start)
+        for effect in eq.effects.values()
+        if effect.memory_start
+        for name in effect.memory_names
+    }
+
+
 def static_force(eq: PlantEquations) -> Value:
-    """Force of the muscle on the slide at rest, without the cable, memories at zero."""
+    """Force of the muscle on the slide at rest, without the cable, memories as trials begin."""
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
-    memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
-    here = at_rest(eq) | {eq["velocity"].id: nothing}
+    begun = memories_at_start(eq)
+    memories = {
+        entry.value.id: begun.get(entry.name, nothing)
+        for entry in eq.remembered
+        if "memory_" in entry.name
+    }
+    here = step_start_values(eq) | {eq["velocity"].id: nothing}
     (first,) = substitute([force], here)
     return substitute([first], memories | {eq["velocity"].id: nothing})[0]

@@ -19,8 +19,8 @@ ROUNDING_N, ROUNDING_V = 1.0, 0.02
 _HALVINGS = 40
 
 
-def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
-    """What keeps the actuator of a station from following a task, in words; None if nothing.
+def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str | None:
+    """Why the actuator of a station cannot follow a task, in words; None if it can.
 
     A jump of the reference; a voltage of less than 0 or more than 10 V; or, where the motor moves,
     a cable that would have to push, on the way back. The muscle's force and damping count; inertia,
@@ -38,20 +38,20 @@ def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
 
     Example:
         >>> from pma_gym.tasks import UNSEEN
-        >>> obstacle(UNSEEN["displacement_speeds"], "station", 300e3) is None
+        >>> infeasibility_reason(UNSEEN["displacement_speeds"], "station", 300e3) is None
         True
-        >>> obstacle(UNSEEN["displacement_steps"], "station", 300e3)
+        >>> infeasibility_reason(UNSEEN["displacement_steps"], "station", 300e3)
         'the reference jumps by ... mm at 0.5 s'
     """
     nominal = load_model(model)
-    if nominal.plant != "station":
+    if not nominal.rig.balances_loads:
         raise ValueError(
             f"model must be of a station, whose forces balance, got {nominal.name}, a "
             f"{nominal.plant}"
         )
-    found = _jump(task)
-    if found is not None or task.exercise:
-        return found
+    reason = _jump(task)
+    if reason is not None or task.exercise:
+        return reason
     balance = _Balance(task, Plant(nominal), pressure)
     return balance.of_motor() if task.actuator == "motor" else balance.of_regulator()
 

@@ -5,7 +5,8 @@ the dissertation's ranges (25 mm, 90 deg) and begin at 0, and an error is given 
 range, so that figures of all of them compare. Sines and their sums are faded in over 2.5 s, without
 a jump of speed. But for the steps, which nothing follows, they are no faster than three times the
 dissertation's own speed, 5 mm/s and 18 deg/s (a sum of sines up to five times while it is faded
-in), and do not go back to where the muscle has no force left to pull the cable out; `obstacle` says
+in), and do not go back to where the muscle has no force left to pull the cable out;
+`infeasibility_reason` says
 what a station lacks for one.
 """
 
@@ -170,8 +171,8 @@ def unseen(name: str) -> Task | None:
     >>> unseen("displacement_speeds_12").name, unseen("displacement_sine_1")
     ('displacement_speeds_12', None)
     """
-    found = re.fullmatch(r"(displacement|rotation)_(multisine|steps|speeds)_(0|[1-9]\d*)", name)
-    if found is None or int(found[3]) >= SEEDS:
+    match = re.fullmatch(r"(displacement|rotation)_(multisine|steps|speeds)_(0|[1-9]\d*)", name)
+    if match is None or int(match[3]) >= SEEDS:
         return None
-    quantity = next(q for q, base in _BASES.items() if base == found[1])
-    return DRAWN[found[2]](quantity, int(found[3]))
+    quantity = next(q for q, base in _BASES.items() if base == match[1])
+    return DRAWN[match[2]](quantity, int(match[3]))

@@ -12,7 +12,7 @@ from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import workflow
-from pma_gym.discovery.selection import Selection
+from pma_gym.discovery.selection.forward_selection import Selection
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.plant.model import dump_model, load_model
 from pma_gym.plant.plant import Plant
@@ -150,8 +150,8 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
     worse = STATION.replace({"drive.gain_n_per_v": 99.0})
     own = workflow._Work._refitted
 
-    def caught(self, bench, journal):
-        fit = own(self, bench, journal)
+    def caught(self, problem, journal):
+        fit = own(self, problem, journal)
         moved = np.array(
             [
                 99.0 if path == "drive.gain_n_per_v" else value
@@ -161,7 +161,9 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
         return replace(fit, model=worse, values=moved)
 
     monkeypatch.setattr(workflow._Work, "_refitted", caught)
-    monkeypatch.setattr(workflow, "_nothing", lambda bench, fit: Selection((), (), fit, bench, fit))
+    monkeypatch.setattr(
+        workflow, "_nothing", lambda problem, fit: Selection((), (), fit, problem, fit)
+    )
     found = refit(laboratory("nothing")[0], STATION)
     assert found.model == STATION and found.parameters == {}
     assert any("a refit was discarded: it raises" in words for words in found.warnings)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pma_gym.codegen.graph import CHANGING, Graph
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.codegen.text import evaluate
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import CATALOGUE
@@ -18,7 +18,7 @@ from pma_gym.effects.effect import signals
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.rigs import cascade, slide, station
+from pma_gym.plant.rigs import RIGS
 
 SIGNALS = {
     "pressure": (0.0, 600e3),
@@ -139,7 +139,7 @@ def traced(law, given):
 def test_one_text_gives_one_number(effect, law):
     given = arguments(effect, law, 64)
     plain = [flat(law(*one_row(given, row))) for row in range(64)]
-    parts = flat(lanes(law)(*given))
+    parts = flat(as_numpy(law)(*given))
     # Compiled code has the bits of the graph: `tests/kernels`.
     for part, found, expected in zip(
         parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True
@@ -182,7 +182,7 @@ def test_every_quantity_has_unit_bounds_and_source(effect):
     doors = effect.names_at_the_door()
     assert len(doors) == len(effect.parameters._fields)
     assert effect.parameters.__doc__
-    ports = {"part", *station.PORTS, *cascade.PORTS, *slide.PORTS}
+    ports = {"part", *(port for rig in RIGS.values() for port in rig.ports)}
     assert effect.port in ports or effect.port.startswith("sensor:")
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pma_gym.codegen.random import normals, philox
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv, PMAVectorEnv
@@ -21,12 +21,12 @@ from pma_gym.tasks import (
     PACE,
     PACED,
     PACING,
-    Human,
-    Mind,
+    Operator,
+    OperatorState,
     moment_exercise,
     phase_rmse,
 )
-from pma_gym.tasks.human import FORESIGHT_S, moved
+from pma_gym.tasks.operator import FORESIGHT_S, operator_step
 
 EXACT = PACED.typical._replace(effort=1.0, unsteadiness=0.0, tremor=0.0, fatigue=0.0, stiffness=0.0)
 """Somebody who gives just what the device takes."""
@@ -63,13 +63,17 @@ def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure
     env = PMAEnv("isokinetic_exercise", noise=False, human=EXACT, pressure_kpa=pressure_kpa)
     env.reset(seed=0)
     infos = held(env)
-    # At rest at 90 deg, but for hysteresis and friction (8 N and 2 N of 600).
+    # At rest at 90 deg, but for friction and hysteresis: the static moment knows neither its force
+    # nor how much less the muscle contracts where it begins on the branch of filling.
     end_of_hold = infos[999]
-    assert end_of_hold["rotation_deg"] == pytest.approx(90.0, abs=3.0)
+    # 32 N of hysteresis and friction hold the muscle short by some 4 deg at the low pressure.
+    assert end_of_hold["rotation_deg"] == pytest.approx(90.0, abs=4.5)
     device = own_device(env.station.model)
     angle = math.radians(end_of_hold["rotation_deg"])
     static = resistive_moment(env.station.model, device, 1e3 * pressure_kpa, angle).moment
-    friction = 10.0 * device.radius
+    part = env.station.model.parameters
+    hysteresis = part["hysteresis"].force * (1.0 + part["hysteresis"].memory_at_start)
+    friction = (hysteresis + part["coulomb_friction"].static) * device.radius
     assert end_of_hold["moment_nm"] == pytest.approx(float(static), abs=friction)
 
 
@@ -93,7 +97,7 @@ def test_the_compiled_operator_is_the_plain_one(name):
         given = resistive_moment(
             env.station.model, own_device(env.station.model), env.pressure, angles
         ).moment
-    mind, key = Mind(exercise.start_moment, 0.0, 1.0), env._engine._keys[0]
+    mind, key = OperatorState(exercise.start_moment, 0.0, 1.0), env._engine._keys[0]
     words = tuple(np.array([int(word)], np.uint64) for word in key)
     zero = np.zeros(1, np.uint64)
     for k in range(400):
@@ -104,7 +108,7 @@ def test_the_compiled_operator_is_the_plain_one(name):
             normals(philox((zero + np.uint64(k), zero, zero + np.uint64(1), zero), words))[0][0]
         )
         speed = env._number("spin")
-        moment, mind = moved(
+        moment, mind = operator_step(
             human,
             mind,
             human.effort * expected,
@@ -236,7 +240,7 @@ def test_many_are_as_one(name, threads):
 @pytest.mark.parametrize("name", ["isokinetic_exercise", "profile_exercise"])
 def test_threads_of_a_device_play_the_same_operators(name):
     task, options = EXERCISES[name], Options(control_rate_hz=50.0)
-    made = DeviceEngine(task, options, 5, "double", StandIn())
+    made = DeviceEngine(task, options, 5, "double", CpuDevice())
     envs = PMAVectorEnv(5, name, control_rate_hz=50.0, autoreset_mode="SameStep")
     np.testing.assert_array_equal(made.reset(seed=7), envs.reset(seed=7)[0])
     for k in range(780):
@@ -313,7 +317,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
     volts = env.regulator_voltage
     for _ in range(300):
         observation, *_ = env.step(env.action(volts))
-    reading, station, span = env.reading, env.station, env.task.protocol.span
+    reading, station, span = env.measurement, env.station, env.task.protocol.span
     plan = env.task.exercise.prescription
     assert observation[4] == pytest.approx(plan.at(reading.rotation) / span, rel=1e-6)
     assert observation[5] == pytest.approx(-station.position(reading) / span, rel=1e-5)
@@ -335,7 +339,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
         (
             "isokinetic_exercise",
             {"human": "strong"},
-            r"human must be one of random, typical or a pma_gym.tasks.Human",
+            r"human must be one of random, typical or a pma_gym.tasks.Operator",
         ),
         ("isokinetic_exercise", {"safety": 1}, "safety must be true or false, got 1"),
         (
@@ -406,4 +410,4 @@ def test_an_id_makes_it():
     env = gym.make("pma_gym/ResistiveExercise-v0", task="isotonic_exercise", pressure_kpa=550)
     _, info = env.reset(seed=1)
     assert info["moment_nm"] == pytest.approx(8.0, abs=1e-9)
-    assert isinstance(env.unwrapped.human, Human)
+    assert isinstance(env.unwrapped.human, Operator)

@@ -3,6 +3,7 @@
 import base64
 import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -248,7 +249,7 @@ def test_damaged_states_are_refused_and_change_nothing(count):
     before = env.get_state()
     numbers = np.frombuffer(before.simulation.numbers).reshape(max(count, 1), -1)
     engine = env.engine if count else env._engine
-    places = engine.record.places
+    offsets = engine.state_layout.offsets
     bad = []
     for name, values in {
         "count": [-1, 10**6, 2**62],
@@ -260,7 +261,7 @@ def test_damaged_states_are_refused_and_change_nothing(count):
         for value in values:
             changed = numbers.copy()
             column = changed.view(np.int64) if isinstance(value, int) else changed
-            column[-1, places[name]] = value
+            column[-1, offsets[name]] = value
             bad.append(damaged(before, "numbers", changed.tobytes()))
     for name in before.simulation._fields[:-1]:
         data = getattr(before.simulation, name)
@@ -347,3 +348,20 @@ def test_a_planner_finds_what_a_search_by_hand_finds(single):
         plain = single({"randomisation": "varied", "noise": True})
         plain.reset(seed=6)
         assert sum((plain.step([action])[1] for action in path), 0.0) == total
+
+
+def test_a_state_that_an_earlier_version_saved_goes_on():
+    """It names `Human`, `Plan` and `Guard`; it was taken after five steps."""
+    options = {"human": "typical", "disturbances": "regulator_and_operator"}
+    options |= {"control_rate_hz": 50.0, "pressure_kpa": 550.0}
+    env, other = PMAEnv("isotonic_exercise", **options), PMAEnv("isotonic_exercise", **options)
+    env.reset(seed=3)
+    for _ in range(5):
+        env.step(env.action(5.0))
+    text = Path(__file__).with_name("state_with_old_names.json").read_text()
+    with pytest.warns(DeprecationWarning, match="names that have changed") as said:
+        state = EnvState.from_json(text)
+    assert len(said) == 1 and said[0].filename == __file__
+    assert state == env.get_state()
+    other.set_state(state)
+    assert repr(other.step(other.action(4.0))) == repr(env.step(env.action(4.0)))

@@ -23,7 +23,9 @@ def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model
     plant = Plant(model)
     regulator = np.full(201, plant.regulator_voltage(300e3))
     rest = plant.settle(0.0, pressure=300e3)
-    expected, _ = plant.run(time, np.append(volts, 0.0), regulator, joined=False, condition=rest)
+    expected, _ = plant.run(
+        time, np.append(volts, 0.0), regulator, interpolation="zoh", condition=rest
+    )
     # The same steps in other compiled code, which rounds in another order.
     scale = np.abs(expected).max(axis=0)
     assert np.all(np.abs(states - expected) <= 1e-10 * scale)
@@ -143,12 +145,12 @@ def test_a_delayed_reading_is_that_of_so_many_steps_before(make, steps):
     late = make(history=2, observation_delay_s=0.01 * steps)
     prompt.reset(seed=3)
     late.reset(seed=3)
-    readings, observations = [prompt.reading], [None]
+    readings, observations = [prompt.measurement], [None]
     for k in range(1, 60):
         observations.append(prompt.step(prompt.action(1.5))[0])
-        readings.append(prompt.reading)
+        readings.append(prompt.measurement)
         observation = late.step(late.action(1.5))[0]
-        assert late.reading == readings[max(k - steps, 0)]
+        assert late.measurement == readings[max(k - steps, 0)]
         if k > steps:
             measured = [0, 1, 2, 3, 7, 8]
             np.testing.assert_array_equal(observation[measured], observations[k - steps][measured])

@@ -1,7 +1,8 @@
 """Traced arithmetic for NVIDIA GPUs, as PTX text, which the GPU's driver compiles.
 
-One thread does one lane: emit with `Lanes(1)`. No CUDA toolkit is needed, for LLVM writes the text.
-Sums and products are written as rounding each, so that a GPU too gives the bits of a processor.
+One thread does one lane: emit with `SimdEmitter(1)`. No CUDA toolkit is needed, for LLVM
+writes the text. Sums and products are written as rounding each, so that a GPU too gives the bits of
+a processor.
 """
 
 from collections.abc import Sequence
@@ -41,6 +42,10 @@ def bounded(builder: Builder, threads: int) -> None:
     """
     # llvmlite's own `add` knows no attributes with a value.
     set.add(builder.function.attributes, f'"nvvm.maxntid"="{threads}"')
+    # LLVM up to version 20 reads the same promise from an annotation.
+    module = builder.module
+    promise = [builder.function, ir.MetaDataString(module, "maxntidx"), INDEX(threads)]
+    module.add_named_metadata("nvvm.annotations", promise)
 
 
 def thread_index(builder: Builder) -> Operand:

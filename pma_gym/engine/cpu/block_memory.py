@@ -19,15 +19,15 @@ from pma_gym.codegen.machine.control import (
     integer,
     offset,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
-from pma_gym.engine.graph.control_step_graph import Circuit
+from pma_gym.engine.graph.control_step_graph import ControlStepGraph
 from pma_gym.engine.graph.scoring import Sampling
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 from pma_gym.integrator.integration import FUSED
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 from pma_gym.plant.program import Program
 
 ARGUMENTS = (
@@ -44,7 +44,7 @@ BEFORE = len(ARGUMENTS)
 """Place, behind them, of the address of those of another part that the same thread took before."""
 
 
-class Plan(Protocol):
+class KernelSpec(Protocol):
     """What a writer needs to know: a `Kernel`, or a kernel for other machines.
 
     Attributes:
@@ -52,7 +52,7 @@ class Plan(Protocol):
     """
 
     program: Program
-    record: Record
+    state_layout: StateLayout
     observed: ObservationTable
     width: int
     abreast: int
@@ -71,53 +71,55 @@ class BlockMemory:
 
     Attributes:
         element: type of a number in the records.
-        places: place of every number that is kept, by name.
+        offsets: offset of every number that is kept, by name.
         fixed: what is computed once for a model, in the order of its table.
     """
 
-    def __init__(self, kernel: Plan) -> None:
+    def __init__(self, kernel: KernelSpec) -> None:
         model: Model = kernel.program.model
-        self.kernel, self.record, self.width = kernel, kernel.record, kernel.width
+        self.kernel, self.state_layout, self.width = kernel, kernel.state_layout, kernel.width
         self.element: ir.Type = DOUBLE
-        self.places = kernel.record.places
+        self.offsets = kernel.state_layout.offsets
         self.eq = PlantEquations(model.effects, model.parameters)
-        PLANTS[model.plant].write_equations(self.eq)
-        self.circuit = Circuit(kernel.record, self.eq)
+        model.rig.write_equations(self.eq)
+        self.step_graph = ControlStepGraph(kernel.state_layout, self.eq)
         self.fixed: list[Value] = []
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
-        found = {}
+        by_name = {}
         numbers = ("first", "last", "count", "table_stride", "settles", "horizon")
         for i, name in enumerate(ARGUMENTS):
             value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
-            found[name] = value if name in numbers else b.inttoptr(value, POINTER)
-        return found
+            by_name[name] = value if name in numbers else b.inttoptr(value, POINTER)
+        return by_name
 
     def _place(
         self, b: Builder, records: Operand, block: Operand, name: str, lane: Operand | int
     ) -> Operand:
         """Address of one environment's number."""
-        row = b.mul(block, integer(self.record.size * self.width))
-        at = b.add(row, integer(self.record.places[name] * self.width))
+        row = b.mul(block, integer(self.state_layout.size * self.width))
+        at = b.add(row, integer(self.state_layout.offsets[name] * self.width))
         return offset(b, records, b.add(at, integer(lane)))
 
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
         """How many numbers of a block lie before those of a place, or before one lane's."""
-        return integer(self.places[name] * self.width + lane)
+        return integer(self.offsets[name] * self.width + lane)
 
     def _cell(self, b: Builder, records: Operand, name: str, lane: Operand | int) -> Operand:
         """Address of a number of one lane of a block."""
         at = b.add(self._row(b, name), integer(lane))
         return offset(b, records, at, self.element)
 
-    def _lanes(self, width: int) -> Lanes:
-        """Lanes for what is not the march."""
-        return Lanes(width, fused=FUSED)
+    def _lanes(self, width: int) -> SimdEmitter:
+        """The emitter for what is not the integration."""
+        return SimdEmitter(width, fused=FUSED)
 
-    def _load(self, b: Builder, lanes: Lanes, where: Operand, kind: Kind) -> Operand:
+    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
         return lanes.load(b, where, 0, kind)
 
-    def _keep(self, b: Builder, lanes: Lanes, number: Operand, where: Operand, kind: Kind) -> None:
+    def _keep(
+        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+    ) -> None:
         lanes.store(b, number, where, 0, kind)
 
     def _count(self, b: Builder, where: Operand) -> Operand:
@@ -127,11 +129,11 @@ class BlockMemory:
     def _exact_times(
         self, b: Builder, one: Sampling, known: dict[int, Operand]
     ) -> dict[int, Operand]:
-        """Times of a sample that are not left to the march's precision."""
+        """Times of a sample that are not left to the integration's precision."""
         return {}
 
     def _fixed(
-        self, b: Builder, lanes: Lanes, tables: Operand, lane: Operand | int
+        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         """The table of a block, or of one lane of it."""
         known = {}
@@ -145,7 +147,7 @@ class BlockMemory:
     def _known(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         values: Sequence[Value],
         records: Operand,
         tables: Operand,
@@ -153,7 +155,7 @@ class BlockMemory:
     ) -> dict[int, Operand]:
         """Inputs and table of a block (or, in scalar code, of one lane of it), as far as used."""
         known: dict[int, Operand] = {}
-        names = {self.circuit.slot(name).id: name for name in self.places}
+        names = {self.step_graph.slot(name).id: name for name in self.offsets}
         alone = lanes.width == 1
         for value in live_inputs(values):
             if value.id in names:
@@ -166,27 +168,29 @@ class BlockMemory:
     def _store(
         self,
         b: Builder,
-        lanes: Lanes,
-        found: dict[int, Operand],
+        lanes: SimdEmitter,
+        emitted: dict[int, Operand],
         values: dict[str, Value],
         records: Operand,
         lane: Operand | int,
     ) -> None:
         alone = lanes.width == 1
         for name, value in values.items():
-            if name not in self.places:
+            if name not in self.offsets:
                 continue
             at = self._row(b, name)
             index = b.add(at, integer(lane)) if alone else at
             where = offset(b, records, index, self.element)
-            self._keep(b, lanes, found[value.id], where, self.record.kind(name))
+            self._keep(b, lanes, emitted[value.id], where, self.state_layout.kind(name))
 
     def _block(self, b: Builder, given: dict[str, Operand], block: Operand) -> tuple[Operand, ...]:
         """Addresses of a block's records and tables."""
-        records = offset(b, given["records"], b.mul(block, integer(self.record.size * self.width)))
+        records = offset(
+            b, given["records"], b.mul(block, integer(self.state_layout.size * self.width))
+        )
         return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
 
-    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
+    def _gathered(self, b: Builder, lanes: SimdEmitter, numbers: Sequence[Operand]) -> Operand:
         if lanes.width == 1:
             return lanes.spread(b, numbers[0])
         vector = ir.Constant(lanes.real, ir.Undefined)
@@ -197,7 +201,7 @@ class BlockMemory:
     def _references(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         given: dict[str, Operand],
         records: Operand,
         lane: Operand | int,
@@ -205,7 +209,7 @@ class BlockMemory:
         later: int,
     ) -> Operand:
         """References so many steps ahead, for a block or one lane."""
-        found = []
+        references = []
         for k in range(lanes.width):
             index = self._row(b, "count", k)
             if lanes.width == 1:
@@ -213,21 +217,21 @@ class BlockMemory:
             steps = self._count(b, offset(b, records, index, self.element))
             row = b.add(steps, integer(ahead + later))
             where = offset(b, given["references"], row, self.element)
-            found.append(b.load(where, typ=self.element))
-        return self._gathered(b, lanes, found)
+            references.append(b.load(where, typ=self.element))
+        return self._gathered(b, lanes, references)
 
     def _put_observation(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         given: dict[str, Operand],
-        found: dict[int, Operand],
+        emitted: dict[int, Operand],
         entries: Sequence[Value],
         first: Operand,
     ) -> None:
         for i, entry in enumerate(entries):
             for k in range(lanes.width):
-                number = lanes.extract(b, found[entry.id], k)
+                number = lanes.extract(b, emitted[entry.id], k)
                 row = b.mul(b.add(first, integer(k)), integer(len(entries)))
                 where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
                 b.store(narrowed(b, number, FLOAT), where)

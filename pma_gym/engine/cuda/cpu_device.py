@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.cuda.kernel import ARGUMENTS, CudaKernel, Name
 
 
-class StandIn:
+class CpuDevice:
     """Runs the threads of a kernel on the processor, one after another: to test without a GPU.
 
     Args:
@@ -40,10 +40,10 @@ class StandIn:
         self, given: object, shape: tuple[int, int], kind: type[np.generic]
     ) -> NDArray[Any]:
         """Actions as an array, checked for shape."""
-        found = np.ascontiguousarray(np.asarray(given), kind)
-        if found.shape != shape:
-            raise ValueError(f"actions must have shape {shape}, got {found.shape}")
-        return found
+        array = np.ascontiguousarray(np.asarray(given), kind)
+        if array.shape != shape:
+            raise ValueError(f"actions must have shape {shape}, got {array.shape}")
+        return array
 
     def address(self, array: NDArray[Any]) -> int:
         """Where an array begins."""
@@ -52,7 +52,7 @@ class StandIn:
     def prepare(self, kernel: CudaKernel) -> None:
         """Compile a kernel."""
         self._kernel = kernel
-        library = kernel.stand_in()
+        library = kernel.cpu_library()
         kinds = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
         self._functions = {name: library.function(name, kinds) for name in kernel.names}
 

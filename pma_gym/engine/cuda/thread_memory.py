@@ -15,9 +15,9 @@ from pma_gym.codegen.machine.control import (
     integer,
     offset,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
-from pma_gym.engine.cpu.block_memory import Plan, narrowed
+from pma_gym.engine.cpu.block_memory import KernelSpec, narrowed
 from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.integrator.integration import FUSED
 
@@ -32,10 +32,10 @@ class ThreadMemory(Writer):
 
     Attributes:
         table: module of the functions that make a table, for the processor.
-        places: place of every number that is kept; fewer than the processor keeps.
+        offsets: offset of every number that is kept; fewer than the processor keeps.
     """
 
-    def __init__(self, kernel: Plan, own_tables: bool, ranged: bool) -> None:
+    def __init__(self, kernel: KernelSpec, own_tables: bool, ranged: bool) -> None:
         self.own_tables, self.ranged = own_tables, ranged
         super().__init__(kernel)
 
@@ -43,31 +43,34 @@ class ThreadMemory(Writer):
         self.traces = False
         self.element = FLOAT if self.kernel.single else DOUBLE
         self.real = "float" if self.kernel.single else "double"
-        self._find_places()
+        self._find_offsets()
 
-    def _find_places(self) -> None:
+    def _find_offsets(self) -> None:
         """Keep what some part reads, and the score."""
-        circuit, record = self.circuit, self.record
-        told = {*record.info, *(f"true_{part}" for part in ("rotation", "load", "pressure"))}
-        sensed = [value for name, value in self.sensed.items() if name not in told]
-        entries = circuit.observation(self.kernel.observed, self.sensed)
+        step_graph, state_layout = self.step_graph, self.state_layout
+        info_only = {
+            *state_layout.info,
+            *(f"true_{part}" for part in ("rotation", "load", "pressure")),
+        }
+        sensed = [value for name, value in self.sensed.items() if name not in info_only]
+        entries = step_graph.observation(self.kernel.observed, self.sensed)
         made = [*self.layout_values, *sensed, *entries, *self.tare, *self.commanded.values()]
         read = {value.id for value in live_inputs(made)}
         always = {"sample", "ended", *self.sums, "count", "key_0", "key_1", "episode"}
         # What only an info tells is computed with the rest.
-        always |= {"operator_moment"} & set(record.places)
-        names = [n for n in record.places if circuit.slot(n).id in read or n in always]
-        self.places = {name: i for i, name in enumerate(names)}
+        always |= {"operator_moment"} & set(state_layout.offsets)
+        names = [n for n in state_layout.offsets if step_graph.slot(n).id in read or n in always]
+        self.offsets = {name: i for i, name in enumerate(names)}
 
     @property
     def layout_values(self) -> list[Value]:
-        """What the march computes."""
+        """What the integration computes."""
         return [*self.attempt.states, self.attempt.next_size, *self.extra]
 
     @property
     def sums(self) -> list[str]:
         """Places of the sums of squared errors, one a phase."""
-        return [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
+        return [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
 
     def _write(self) -> None:
         self._table()
@@ -83,15 +86,17 @@ class ThreadMemory(Writer):
         )
 
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
-        return b.mul(self._spacing, integer(self.places[name]))
+        return b.mul(self._spacing, integer(self.offsets[name]))
 
-    def _lanes(self, width: int) -> Lanes:
-        return Lanes(width, self.real, FUSED)
+    def _lanes(self, width: int) -> SimdEmitter:
+        return SimdEmitter(width, self.real, FUSED)
 
-    def _load(self, b: Builder, lanes: Lanes, where: Operand, kind: Kind) -> Operand:
+    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
         return self._count(b, where) if kind == "integer" else super()._load(b, lanes, where, kind)
 
-    def _keep(self, b: Builder, lanes: Lanes, number: Operand, where: Operand, kind: Kind) -> None:
+    def _keep(
+        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+    ) -> None:
         if kind != "integer":
             super()._keep(b, lanes, number, where, kind)
         else:
@@ -104,7 +109,7 @@ class ThreadMemory(Writer):
         return b.load(where, typ=INTEGER)
 
     def _fixed(
-        self, b: Builder, lanes: Lanes, tables: Operand, lane: Operand | int
+        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         known = {}
         for i, value in enumerate(self.fixed):

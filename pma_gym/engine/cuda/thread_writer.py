@@ -2,8 +2,8 @@
 
 The arithmetic is the processor's own, by the same methods; only memory differs. A thread commands
 and senses environments thread, thread + threads, and so on. In between, the threads of a warp share
-the marches of theirs: who is done takes the next, so that none waits long for a neighbour whose
-steps are short.
+the integrations of theirs: who is done takes the next, so that none waits long for a neighbour
+whose steps are short.
 """
 
 from typing import Protocol
@@ -22,16 +22,16 @@ from pma_gym.codegen.machine.control import (
     offset,
     repeat,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import narrowed, widened
-from pma_gym.engine.cuda.reset_writer import BeginWriter
+from pma_gym.engine.cuda.reset_writer import CudaResetWriter
 from pma_gym.engine.graph.scoring import Sampling
 from pma_gym.integrator.integration import FUSED, memory
 
 
 class Turns(Protocol):
-    """Which environment a thread marches next, and what threads of a warp do together."""
+    """Which environment a thread integrates next, and what threads of a warp do together."""
 
     def following(self, job: Operand) -> Operand:
         """Write the number of the environment after one; beyond the last if there is none."""
@@ -46,7 +46,7 @@ class Turns(Protocol):
         ...
 
 
-class ThreadWriter(BeginWriter):
+class ThreadWriter(CudaResetWriter):
     """Writes what a thread does; see `ThreadMemory`."""
 
     def step(
@@ -85,7 +85,7 @@ class ThreadWriter(BeginWriter):
     ) -> None:
         lanes, made = self._lanes(1), self.attempt
         cells = _Cells(b, self.element)
-        kept = {name: self.circuit.slot(name) for name in self.record.states}
+        kept = {name: self.step_graph.slot(name) for name in self.state_layout.states}
         kept["size"] = made.size
         job, attempts = memory(b, INTEGER), memory(b, INDEX)
         self._clock = memory(b, DOUBLE)
@@ -101,19 +101,19 @@ class ThreadWriter(BeginWriter):
                     cells.put_vector(name, self._number(b, records, name))
                 for name, value in kept.items():
                     cells.put(value, self._number(b, records, name))
-                period = self.record.options.period
+                period = self.state_layout.options.period
                 cells.put(made.left, ir.Constant(self.element, period))
                 count = b.uitofp(self._count(b, self._cell(b, records, "count", 0)), DOUBLE)
                 time = b.fmul(count, ir.Constant(DOUBLE, period))
                 cells.put_vector("clock", narrowed(b, time, self.element))
                 b.store(time, self._clock)
                 known = self._fixed(b, lanes, tables, 0)
-                for name in self.record.held:
-                    if name in self.places:
-                        known[self.circuit.slot(name).id] = self._number(b, records, name)
-                found = lanes.emit(b, self.layout.held, known)
+                for name in self.state_layout.held:
+                    if name in self.offsets:
+                        known[self.step_graph.slot(name).id] = self._number(b, records, name)
+                emitted = lanes.emit(b, self.layout.held, known)
                 for value in self.layout.held:
-                    cells.put(value, found[value.id])
+                    cells.put(value, emitted[value.id])
 
         def end() -> None:
             records, _ = self._block(b, given, b.load(job, typ=INTEGER))
@@ -137,12 +137,12 @@ class ThreadWriter(BeginWriter):
             known = self._fixed(b, lanes, tables, 0)
             for value in (*self.layout.changing, *self.layout.held):
                 known[value.id] = cells.get(value)
-            found = lanes.emit(b, [*self.layout.outputs, *self.extra], known)
+            emitted = lanes.emit(b, [*self.layout.outputs, *self.extra], known)
             with b.if_then(works):
-                self._sample(b, lanes, cells, found, given)
+                self._sample(b, lanes, cells, emitted, given)
             for value, new in zip(self.layout.changing, self.layout.outputs, strict=True):
-                cells.put(value, found[new.id])
-            left = found[made.next_left.id]
+                cells.put(value, emitted[new.id])
+            left = emitted[made.next_left.id]
             finished = b.fcmp_ordered("<=", left, ir.Constant(self.element, 0.0))
             with b.if_then(b.and_(works, finished)):
                 end()
@@ -157,12 +157,12 @@ class ThreadWriter(BeginWriter):
         wide = {i: widened(b, number) for i, number in wide.items()}
         wide[self.eq.graph.input("clock", HELD).id] = b.load(self._clock, typ=DOUBLE)
         # What an attempt's samples share is asked for, or it would be a part of each one's sum.
-        found = Lanes(1, fused=FUSED).emit(b, [one.done, one.when], wide)
-        return {one.when.id: narrowed(b, found[one.when.id], self.element)}
+        emitted = SimdEmitter(1, fused=FUSED).emit(b, [one.done, one.when], wide)
+        return {one.when.id: narrowed(b, emitted[one.when.id], self.element)}
 
 
 class _Cells:
-    """A thread's numbers during the march: registers, once compiled."""
+    """A thread's numbers during the integration: registers, once compiled."""
 
     def __init__(self, builder: Builder, element: ir.Type) -> None:
         self.builder, self.element = builder, element

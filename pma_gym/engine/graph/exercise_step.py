@@ -8,10 +8,10 @@ from pma_gym.codegen.graph import Value
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
-from pma_gym.engine.state_layout import GUARDED, NOISE, plan_of_places
-from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
-from pma_gym.tasks.guard import MOMENT_FILTER_S, SPEED_FILTER_S, let_through
-from pma_gym.tasks.human import FORESIGHT_S, moved, unsteady
+from pma_gym.engine.state_layout import FILTER_STATE, NOISE, profile_at_offsets
+from pma_gym.tasks import PACE, MomentProfile, Operator, OperatorState, unsafe
+from pma_gym.tasks.operator import FORESIGHT_S, operator_step, unsteady
+from pma_gym.tasks.safety_filter import MOMENT_FILTER_S, SPEED_FILTER_S, filtered_pressure
 from pma_gym.units import SI_FACTORS
 
 
@@ -20,7 +20,7 @@ def held_volts(volts: Value) -> Value:
     return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
 
 
-class Exercised:
+class ExerciseStep:
     """The operator of an exercise, its safety layer and its score.
 
     Args:
@@ -28,23 +28,23 @@ class Exercised:
     """
 
     def __init__(self, inputs: StepInputs) -> None:
-        self.inputs, self.record = inputs, inputs.record
-        exercise = self.record.task.exercise
+        self.inputs, self.state_layout = inputs, inputs.state_layout
+        exercise = self.state_layout.task.exercise
         assert exercise is not None
         self.exercise = exercise
-        self.period = self.record.options.period
+        self.period = self.state_layout.options.period
 
     # -- what the rig's computer knows -------------------------------------------------------------
 
     @property
-    def human(self) -> Human:
+    def human(self) -> Operator:
         """The operator's numbers, as inputs."""
-        return Human(*(self.inputs.slot(f"human_{name}") for name in Human._fields))  # type: ignore[arg-type]
+        return Operator(*(self.inputs.slot(f"human_{name}") for name in Operator._fields))  # type: ignore[arg-type]
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> MomentProfile:
         """Moment that the exercise takes over the angle, as he knows it, as inputs."""
-        return plan_of_places(self.inputs.slot, self.exercise)
+        return profile_at_offsets(self.inputs.slot, self.exercise)
 
     @property
     def prescribed(self) -> Prescribed | None:
@@ -65,9 +65,9 @@ class Exercised:
         zero = self.inputs.graph.constant(0, "integer")
         key = slot("key_0"), slot("key_1")
         normal = unsteady(count, slot("episode") * 4 + NOISE, key, zero)
-        moment, mind = moved(
+        moment, mind = operator_step(
             human,
-            Mind(*(slot(f"mind_{name}") for name in Mind._fields)),
+            OperatorState(*(slot(f"mind_{name}") for name in OperatorState._fields)),
             human.effort * self.plan.at(intended),
             intended - angle,
             angle + FORESIGHT_S * slot("spin"),
@@ -78,11 +78,11 @@ class Exercised:
         )
         load = moment / slot("told_radius")
         volts = (load - slot("told_drive_offset")) / slot("told_drive_gain")
-        found = {f"mind_{name}": value for name, value in mind._asdict().items()}
-        return found | {"motor_voltage": held_volts(volts), "operator_moment": moment}
+        new = {f"mind_{name}": value for name, value in mind._asdict().items()}
+        return new | {"motor_voltage": held_volts(volts), "operator_moment": moment}
 
     def _intended(self, time: Value) -> Value:
-        """Angle that somebody means to have who hears the cues at a time of his own (rad)."""
+        """Angle that an operator intends, by a time that includes his reaction (rad)."""
         angle = self.inputs.graph.constant(0.0)
         for phase in PACE.phases:
             since = time - phase.start
@@ -94,20 +94,20 @@ class Exercised:
     # -- safety ------------------------------------------------------------------------------------
 
     def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
-        """Regulator voltage of one that is asked for, and what the safety layer remembers."""
-        if not self.record.options.safety:
+        """Regulator voltage that the safety layer passes on, and the layer's new state."""
+        if not self.state_layout.options.safety:
             return volts, {}
         # It stands at the rig: delays lie between the agent and it.
         slot = self.inputs.slot
-        heard = slot("extension_0")
+        extension = slot("extension_0")
         radius = slot("told_radius")
-        rate = (heard - slot("guard_extension")) / (self.period * radius)
+        rate = (extension - slot("guard_extension")) / (self.period * radius)
         speed = self._filtered("guard_speed", rate, SPEED_FILTER_S)
         moment = radius * slot("load_0")
         slow = self._filtered("guard_moment", moment, MOMENT_FILTER_S)
         gain, offset = slot("told_line_gain"), slot("told_line_offset")
         before = slot("guard_pressure")
-        pressure = let_through(
+        pressure = filtered_pressure(
             gain * volts + offset,
             before,
             moment,
@@ -116,12 +116,12 @@ class Exercised:
             slot("rotation_0"),
             self.exercise.safe_moment,
             self.exercise.safe_speed,
-            self.exercise.guard,
+            self.exercise.safety_filter,
         )
         there = before + slot("told_lag_share") * (pressure - before)
-        new = (there, heard, speed, slow)
-        found: dict[str, Value] = dict(zip(GUARDED, new, strict=True))
-        return held_volts((pressure - offset) / gain), found
+        new = (there, extension, speed, slow)
+        filter_state: dict[str, Value] = dict(zip(FILTER_STATE, new, strict=True))
+        return held_volts((pressure - offset) / gain), filter_state
 
     def _filtered(self, name: str, value: Value, time_constant: float) -> Value:
         kept = math.exp(-self.period / time_constant)
@@ -129,17 +129,17 @@ class Exercised:
 
     # -- score -------------------------------------------------------------------------------------
 
-    def score(self, found: Mapping[str, Value], first: bool) -> dict[str, Value]:
+    def score(self, sensed: Mapping[str, Value], first: bool) -> dict[str, Value]:
         """What a step came to: new numbers by name.
 
         Args:
-            found: the step's truth, and whether it broke a limit of the rig.
+            sensed: the step's truth, and whether it broke a limit of the rig.
             first: at the trial's beginning, where nothing has been done yet.
         """
         eq, slot = self.inputs.equations, self.inputs.slot
-        moment, speed = eq.parameters["rotor"].radius * found["true_load"], slot("spin")
+        moment, speed = eq.parameters["rotor"].radius * sensed["true_load"], slot("spin")
         if first:
-            return {"ended": self.inputs.graph.value(found["ended"])}
+            return {"ended": self.inputs.graph.value(sensed["ended"])}
         power = moment * speed
         new: dict[str, Value] = {}
         for name, value in (
@@ -152,17 +152,17 @@ class Exercised:
         done = power * self.period
         new["work"] = slot("work") + where(done > 0.0, done, 0.0)
         new["returned"] = slot("returned") + where(done < 0.0, -done, 0.0)
-        new |= self._pace(found)
-        rig = found["ended"]
+        new |= self._pace(sensed)
+        rig = sensed["ended"]
         broken = unsafe(self.exercise, moment, speed)
         return new | {"ended": where(rig > 0.0, rig, broken)}
 
-    def _pace(self, found: Mapping[str, Value]) -> dict[str, Value]:
+    def _pace(self, sensed: Mapping[str, Value]) -> dict[str, Value]:
         """Sums of squared errors of the angle by phase, at the control steps' ends (rad^2)."""
-        time = to_real(found["count"]) * self.period
+        time = to_real(sensed["count"]) * self.period
         new = {}
         for phase in PACE.phases:
-            error = found["true_rotation"] - (phase.initial + phase.slope * (time - phase.start))
+            error = sensed["true_rotation"] - (phase.initial + phase.slope * (time - phase.start))
             end = phase.start + phase.duration
             # Half a step beside the edges: times are whole steps, but for rounding.
             edge = 0.5 * self.period
@@ -171,11 +171,11 @@ class Exercised:
             new[f"pace_{phase.name}"] = where(inside, before + error * error, before)
         return new
 
-    def info(self, found: Mapping[str, Value]) -> list[Value]:
+    def info(self, sensed: Mapping[str, Value]) -> list[Value]:
         """An exercise's own numbers of the info, in order."""
         eq, degree = self.inputs.equations, SI_FACTORS["deg"]
-        moment = eq.parameters["rotor"].radius * found["true_load"]
-        speed, rotation = self.inputs.slot("spin"), found["true_rotation"]
+        moment = eq.parameters["rotor"].radius * sensed["true_load"]
+        speed, rotation = self.inputs.slot("spin"), sensed["true_rotation"]
         other = []
         if self.exercise.prescription:
             other = [rotation * (1.0 / degree), self.plan.at(rotation)]

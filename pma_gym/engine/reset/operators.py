@@ -21,7 +21,7 @@ from pma_gym.plant.exercise_device.prescription import (
     follow_from,
 )
 from pma_gym.plant.model import Model
-from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, Plan, Task, plan_of
+from pma_gym.tasks import PLAN_ANGLES, Exercise, MomentProfile, Operator, Task, moment_profile
 
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
 """Where a prescription is compared with what the device can give (rad)."""
@@ -94,14 +94,14 @@ def _refusal(task: Task, model: Model, miss: Miss, pressure: float) -> str:
 
 def _starts(task: Task, wanted: Iterable[Pressure]) -> set[float]:
     """Pressures to look at (Pa): each that is named, and the ends of the task's range."""
-    found: set[float] = set()
+    pressures: set[float] = set()
     for one in wanted:
         several = one if isinstance(one, Sequence) and not isinstance(one, str) else [one]
-        found |= set(task.starts) if isinstance(one, str) else {1e3 * float(p) for p in several}
-    return found
+        pressures |= set(task.starts) if isinstance(one, str) else {1e3 * float(p) for p in several}
+    return pressures
 
 
-def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> list[Plan]:
+def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> list[MomentProfile]:
     """Moment over the angle that operators expect.
 
     The prescribed one; where the speed is prescribed what the nominal device gives at rest at the
@@ -116,7 +116,7 @@ def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> l
         return [exercise.prescription] * len(pressures)
     angles = np.array(PLAN_ANGLES)
     given = resistive_moment(model, own_device(model), pressures[:, None], angles)
-    return [plan_of(PLAN_ANGLES, row.tolist()) for row in given.moment]
+    return [moment_profile(PLAN_ANGLES, row.tolist()) for row in given.moment]
 
 
 def operators(
@@ -128,7 +128,7 @@ def operators(
     pressures: NDArray[np.float64],
     regulator: NDArray[np.float64],
 ) -> Numbers:
-    """Numbers of the operators of episodes, and of what the rig's computer is told.
+    """Numbers of the operators of episodes, and of what the rig's computer knows.
 
     Args:
         task: an exercise.
@@ -142,16 +142,16 @@ def operators(
     exercise = task.exercise
     assert exercise is not None
     people = _people(exercise, options, keys, episodes)
-    found = {f"human_{name}": people[:, i] for i, name in enumerate(Human._fields)}
-    rise = found["human_rise"]
-    found["human_share"] = -np.expm1(-options.period / rise)
+    numbers = {f"human_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
+    rise = numbers["human_rise"]
+    numbers["human_share"] = -np.expm1(-options.period / rise)
     known = plans(exercise, model, pressures)
-    found["plan_first"] = np.array([plan.first for plan in known])
+    numbers["plan_first"] = np.array([plan.first for plan in known])
     for what in ("angles", "slopes"):
         rows = np.array([getattr(plan, what) for plan in known]).reshape(len(known), -1)
-        found |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
+        numbers |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
     drive, line, lag = (model.parameters[n] for n in ("drive", "regulator_line", "regulator_lag"))
-    told = {
+    common = {
         "told_radius": model.parameters["rotor"].radius,
         "told_drive_gain": drive.gain,
         "told_drive_offset": drive.offset,
@@ -162,11 +162,11 @@ def operators(
         "mind_freshness": 1.0,
         "operator_moment": exercise.start_moment,
     }
-    found |= {name: np.full(len(known), value) for name, value in told.items()}
+    numbers |= {name: np.full(len(known), value) for name, value in common.items()}
     if options.safety:
-        found["guard_moment"] = np.full(len(known), exercise.start_moment)
-        found["guard_pressure"] = line.gain * regulator + line.offset
-    return found
+        numbers["guard_moment"] = np.full(len(known), exercise.start_moment)
+        numbers["guard_pressure"] = line.gain * regulator + line.offset
+    return numbers
 
 
 def _people(
@@ -175,7 +175,7 @@ def _people(
     if options.human == "random":
         return exercise.population.draw(keys, episodes * 4 + DRAW)
     typical = exercise.population.typical
-    one = options.human if isinstance(options.human, Human) else typical
+    one = options.human if isinstance(options.human, Operator) else typical
     return np.tile(np.array(one), (len(keys), 1))
 
 

@@ -3,25 +3,29 @@
     m x'' + B x' = F(x, x', memories) - L       x contraction, L the load that the drive gives
 
 Nothing holds it, so no command has a rest: a trial begins where [start] says, as fast as it says.
-There is no pulley and no pressure; L is a command, so a load cell in the link tells nothing new.
+There is no pulley and no pressure; L is a command, so a load cell in the link would
+measure nothing new.
 """
 
 from collections.abc import Mapping
 
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant.composition import PlantEquations, Port
+from pma_gym.effects.ports import Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.station import SCALES, TURNING_M
 
 PORTS: dict[str, Port] = {
     "slide_force": Port("force on the slide (N), added; positive in the direction of contraction"),
     "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
     "two_way_drive": Port("load that the drive asks for (N)", least=1, most=1),
-    "drive_delay": Port("load that the drive has heard of (N)", most=1),
+    "drive_delay": Port("load command that has reached the drive (N)", most=1),
     "drive_lag": Port("load that arrives at the slide (N)", most=1),
 }
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
-REFUSED: dict[str, str] = {
+REFUSED_EFFECTS: dict[str, str] = {
     "operator": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
@@ -30,10 +34,10 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("slide", "start")
 """Effects of port `part` that the slide reads itself and cannot do without."""
 
-SILENT: tuple[str, ...] = ("rotation", "load", "pressure")
-"""Outputs that it does not have: the load is what it is told."""
+ABSENT_OUTPUTS: tuple[str, ...] = ("rotation", "load", "pressure")
+"""Outputs that it does not have: its load is its command."""
 
-POSITIONS: dict[str, float] = {"contraction": 0.001}
+POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 
@@ -60,10 +64,34 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)
-    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
-    eq.add_bends()
+    eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
+    eq.add_breakpoints()
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
     """0: nothing swings."""
     return 0.0
+
+
+def solve_equilibrium(problem: EquilibriumProblem) -> None:
+    """Put the slide where its model says that a trial begins; its bristles are relaxed."""
+    start = problem.parameters("start")
+    problem.zero[:] = problem["contraction"] = start["contraction"]
+    problem["velocity"] = start["velocity"]
+
+
+SLIDE = Rig(
+    name="slide",
+    ports=PORTS,
+    parts=PARTS,
+    position_tolerances=POSITION_TOLERANCES,
+    write_equations=write_equations,
+    solve_equilibrium=solve_equilibrium,
+    fastest_oscillation=fastest_oscillation,
+    refused_effects=REFUSED_EFFECTS,
+    absent_outputs=ABSENT_OUTPUTS,
+    is_free=True,
+    has_muscle=False,
+    is_diagnosable=True,
+    moving_lags={"lag_lvdt": "velocity"},
+)

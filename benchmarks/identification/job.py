@@ -1,0 +1,189 @@
+"""`python -m benchmarks identify`: the station from tables I2 and I3, judged on I3 and I1."""
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
+from benchmarks.files import write_text
+from benchmarks.identification import judge, statics
+from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, protocol_with_creep
+from benchmarks.identification.measurements import StationLimits, station_limits
+from benchmarks.identification.station import fitted_parameters, identify, leave_out
+from benchmarks.identification.transients import PressureSteps, pressure_steps
+from pma_gym.plant.model import Model, Note, dump_model
+from pma_gym.terminal import SafeConsole
+
+DIGITS = 5
+"""Significant digits of the values written: below every interval, above what machines differ by."""
+
+
+def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Model:
+    """Fit the station, judge it on left-out pressures, and write it.
+
+    Args:
+        out: TOML file to write; re-running writes the same bytes.
+        jobs: processes.
+        console: where to print.
+    Returns:
+        The model as written.
+    Raises:
+        KeyboardInterrupt: Ctrl-C, before anything is written.
+    """
+    console = console or SafeConsole()
+    data, steps = station_limits(), pressure_steps()
+    whole = identify(data, steps)
+    start = fitted_parameters(whole)
+    works = [partial(_fold, data, steps, float(pressure), start) for pressure in data.pressures]
+    folds = _all_folds(works, jobs, console)
+    decision = decided([fold.creep for fold in folds])
+    if decision.asked:
+        whole = identify(data, steps, start, creeps=True)
+    chosen = [fold.creeping if decision.asked else fold.plain for fold in folds]
+    model = _noted(whole, [fitted_parameters(fold) for fold, _ in chosen])
+    judged = [errors for _, errors in chosen]
+    words = [decision.words, *judge.unexplained(whole, data, steps)]
+    write_text(out, _header(judge.figures(judged), words) + dump_model(model))
+    _print(console, model, judged, words)
+    console.print(f"written: {out}")
+    return model
+
+
+class Fold(NamedTuple):
+    """A pressure left out: models fitted without it, with what they miss there.
+
+    Attributes:
+        plain: without creep.
+        creeping: with creep.
+        creep: what says whether creep is asked for.
+    """
+
+    plain: tuple[Model, judge.LeftOut]
+    creeping: tuple[Model, judge.LeftOut]
+    creep: CreepFold
+
+
+def _all_folds(works: Sequence[partial[Fold]], jobs: int, console: Console) -> list[Fold]:
+    """The fits with one pressure left out, in order."""
+    folds: dict[int, Fold] = {}
+    with Progress(console=console) as progress:
+        bar = progress.add_task("pressures left out", total=len(works))
+
+        def keep(index: int, fold: Fold) -> None:
+            folds[index] = fold
+            progress.update(bar, advance=1)
+
+        run_or_raise(works, local(jobs), keep)
+    return [folds[index] for index in range(len(works))]
+
+
+def _fold(
+    data: StationLimits, steps: PressureSteps, pressure: float, start: dict[str, float]
+) -> Fold:
+    """The station fitted without a pressure (Pa), and how it predicts that one."""
+    others, here = leave_out(data, steps, pressure), data.rows(data.pressure == pressure)
+    none = steps.rows(np.zeros(len(steps.load), bool))
+    plain, creeping = (identify(*others, start, creeps) for creeps in (False, True))
+    missed = [
+        float(np.mean(statics.weighted(plain, here, none) ** 2)),
+        float(np.mean(statics.weighted(creeping, here, none, protocol_with_creep) ** 2)),
+    ]
+    return Fold(
+        (plain, judge.left_out(plain, here)),
+        (creeping, judge.left_out(creeping, here, protocol_with_creep)),
+        CreepFold(fitted_parameters(creeping)["creep.stiffness_n_per_mm"], *missed),
+    )
+
+
+def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
+    """The model rounded, with intervals and sources; jackknife over the left-out pressures."""
+    values, notes = {}, dict(model.notes)
+    count = len(folds)
+    for path, value in fitted_parameters(model).items():
+        replicas = np.array([fold[path] for fold in folds])
+        error = math.sqrt((count - 1) / count * np.sum((replicas - replicas.mean()) ** 2))
+        low, high = _possible(model, path, value - STUDENT_10 * error, value + STUDENT_10 * error)
+        values[path] = _rounded(value)
+        notes[path] = Note(_source(path, low, high), _rounded(low, 3), _rounded(high, 3))
+    notes["cable.damping_n_s_per_mm"] = Note("assumption: 2 % of critical")
+    values["cable.damping_n_s_per_mm"] = _rounded(
+        model.at_the_door("cable")["damping_n_s_per_mm"]  # type: ignore[arg-type]
+    )
+    rounded = model.replace(values)
+    return Model(model.name, model.title, model.plant, rounded.parameters, notes)
+
+
+def _possible(model: Model, path: str, low: float, high: float) -> tuple[float, float]:
+    """The part of an interval in which a memory can lie; any other interval as it is.
+
+    A value outside the bounds of another parameter has a meaning, such as a damping below 0 that
+    tables do not tell from 0; a muscle cannot stand beyond the branch on which it was filled.
+    """
+    effect, _, door = path.partition(".")
+    law = model.effects[effect]
+    if law.names_at_the_door()[door] != law.memory_start:
+        return low, high
+    quantity = law.quantities[law.memory_start]
+    return max(low, quantity.lower), min(high, quantity.upper)
+
+
+def _source(path: str, low: float, high: float) -> str:
+    steps = path.startswith(("symmetric_damping", "regulator_lag", "regulator_asymmetry"))
+    source = "fit to Serres 2008, tables I2 and I3" if steps else "fit to Serres 2008, table I3"
+    return source + ("; these tables do not tell it from 0" if low < 0.0 < high else "")
+
+
+def _rounded(value: float, digits: int = DIGITS) -> float:
+    return float(f"{value:.{digits}g}")
+
+
+def _header(figures: dict[str, float], words: list[str]) -> str:
+    lines = [
+        "Written by `python -m benchmarks identify`. Intervals: 95 %, jackknife over pressures.",
+        f"Left-out pressures: extension {figures['extension_mm']:.2f} mm RMSE, rotation "
+        f"{figures['rotation_deg']:.2f} deg RMSE, no-load contraction within "
+        f"{figures['no_load_mm']:.2f} mm.",
+        "Not explained:",
+        *(f"- {line}" for line in words),
+    ]
+    return "".join(f"# {line}\n" for line in lines)
+
+
+def _print(console: Console, model: Model, folds: list[judge.LeftOut], words: list[str]) -> None:
+    table = Table("parameter", "value", "low", "high", title="Identified station")
+    for path, note in model.notes.items():
+        if note.low is not None:
+            effect, _, door = path.partition(".")
+            value = model.at_the_door(effect)[door]
+            table.add_row(path, f"{value:.5g}", f"{note.low:.3g}", f"{note.high:.3g}")
+    console.print(table)
+    table = Table(
+        "left-out pressure (kPa)",
+        "extension RMSE (mm)",
+        "rotation RMSE (deg)",
+        "no-load contraction (mm)",
+        title="Predicted less measured, table I3",
+    )
+    for fold in folds:
+        table.add_row(
+            f"{fold.pressure / 1e3:.0f}",
+            f"{judge.rms(fold.extension):.2f}",
+            f"{judge.rms(fold.rotation):.2f}",
+            f"{fold.no_load:+.2f}",
+        )
+    console.print(table)
+    for name, figure in judge.figures(folds).items():
+        target = judge.TARGETS[name]
+        verdict = "met" if figure <= target else "MISSED"
+        console.print(f"{name}: {figure:.2f}, target {target:g}: {verdict}")
+    console.print("Not explained:")
+    for line in words:
+        console.print(f"- {line}")

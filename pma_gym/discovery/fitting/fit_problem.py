@@ -1,0 +1,240 @@
+"""Fit a model, with or without candidate effects, to whitened trials."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
+from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.estimation.fitting import Search
+from pma_gym.estimation.least_squares import inverse
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+ROUNDS = 25
+"""Most rounds of one fit."""
+
+LARGER = (30.0, 5.0)
+"""How many times as large the noise is taken for on the way to a first fit."""
+
+CAUGHT, EASIER = 3.0, 10.0
+"""Residual, in standard deviations of the noise, from which on a fit may have been caught; how many
+times smaller the noise is taken for from one fit to the next on the way out."""
+
+RUGGED, STIFFER, SUSPECT = "cable.stiffness_n_per_mm", (0.75, 0.9, 1.1, 1.3), 1.3
+"""What chi-square is rugged in, at which shares of the given value fits begin from it, and the
+chi-square a reading from which on they do."""
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A model fitted to trials.
+
+    Attributes:
+        model: the model with its parameters.
+        names: the candidates in it.
+        paths: its free parameters.
+        values: their values in file units, shape (p,).
+        covariance: theirs, from the whitened readings and the prior, shape (p, p).
+        chi_square: of the whitened readings, with what the prior adds.
+        steps: moves of the parameters that their derivatives were taken with.
+        converged: whether a further step would gain nothing worth while.
+    """
+
+    model: Model
+    names: tuple[str, ...]
+    paths: tuple[str, ...]
+    values: Array
+    covariance: Array
+    chi_square: float
+    steps: Array
+    converged: bool
+
+    def estimate(self, path: str) -> tuple[float, float]:
+        """A parameter's value and its standard error, in file units."""
+        at = self.paths.index(path)
+        return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
+
+
+def _chi_square(fit: Fitted) -> float:
+    return fit.chi_square
+
+
+@dataclass(frozen=True)
+class FitProblem:
+    """What all fits share.
+
+    Attributes:
+        trials: the trials.
+        given: the model as it was given.
+        own: its own parameters and what they may be off by.
+        noise: whitening of each output.
+        threads: how many threads simulate.
+        coarse: whether a sensor keeps to coarser steps than its DAQ gives.
+        files: the file that each trial comes from; empty where each is a file of its own.
+    """
+
+    trials: Sequence[Trial]
+    given: Model
+    own: FreeParameters
+    noise: tuple[Whitening, ...]
+    threads: int = 1
+    coarse: bool = False
+    files: tuple[str, ...] = ()
+
+    def whitened_residuals(
+        self,
+        model: Model,
+        extra: Sequence[CandidateEffect] = (),
+        trials: Sequence[int] | None = None,
+    ) -> WhitenedResiduals:
+        """Trials beside a model with candidates in it; its own parameters and theirs are free."""
+        paths, own = list(self.own.free), {}
+        for candidate in extra:
+            paths += [
+                path for path, free in zip(candidate.paths, candidate.fitted, strict=True) if free
+            ]
+            own |= candidate.own
+        prior = np.full(len(paths), np.inf)
+        prior[: len(self.own.prior)] = self.own.prior
+        chosen = range(len(self.trials)) if trials is None else trials
+        centre = values(model, paths)
+        centre[: len(self.own.free)] = values(self.given, self.own.free)
+        return WhitenedResiduals(
+            model,
+            [self.trials[i] for i in chosen],
+            paths,
+            self.noise,
+            prior,
+            centre,
+            {path: [each[i] for i in chosen] for path, each in own.items()},
+            threads=self.threads,
+        )
+
+    def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:
+        """Trials beside a model with one candidate in it, all of whose parameters are free."""
+        return WhitenedResiduals(
+            candidate.beside(model),
+            self.trials,
+            candidate.paths,
+            self.noise,
+            np.full(len(candidate.paths), np.inf),
+            own=candidate.own,
+            threads=self.threads,
+        )
+
+    @cached_property
+    def count(self) -> int:
+        """How many readings there are."""
+        return self.whitened_residuals(self.given).count
+
+    def sum_of_squares(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> float:
+        """Whitened sum of squares of all readings, without what the prior adds.
+
+        Infinite where the model cannot be simulated.
+        """
+        whitened = self.whitened_residuals(model, extra)
+        at = values(model, [free.path for free in whitened.free])
+        pieces = whitened.pieces(at, np.empty(0))
+        return np.inf if pieces is None else float(pieces.total()[0, 0])
+
+    def left(self, fit: Fitted) -> float:
+        """Rms of what a fit leaves, the prior counted, in standard deviations of the noise."""
+        return float(np.sqrt(fit.chi_square / self.count))
+
+    def far(self, fit: Fitted) -> bool:
+        """Whether a fit is so far from the trials that it may be in a local minimum."""
+        return self.left(fit) > CAUGHT
+
+    def careful_fit(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
+        """Fit a model with candidates in it, whose parameters may be far off.
+
+        A cable that slackens makes chi-square rugged, and a search that starts far away can end in
+        a local minimum. With the noise assumed larger, the prior keeps parameters from going
+        astray. The rotor oscillates on the cable, at a frequency that a search finds from nearby
+        only: where much is left, fits start from other stiffnesses too. The best is returned.
+        """
+        begun = self._eased(model, extra, LARGER)
+        fits = [self.fit(begun, extra), self.fit(model, extra)]
+        best = min(filter(None, fits), key=_chi_square, default=None)
+        if best is None:
+            return None
+        if RUGGED in self.own.free and self.left(best) ** 2 > SUSPECT:
+            given = values(self.given, [RUGGED])[0]
+            for factor in STIFFER:
+                away = best.model.replace({RUGGED: float(factor * given)})
+                fits.append(self.fit(self._eased(away, extra, LARGER[-1:]), extra))
+        return min(filter(None, fits), key=_chi_square)
+
+    def continuation(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
+        """A fit, or a better one where it was in a local minimum far from the trials.
+
+        The noise is assumed as large as the residual, then ever smaller: a continuation, whose
+        derivatives are those of long steps, which leave a local minimum.
+        """
+        if not self.far(fit):
+            return fit
+        left = self.left(fit)
+        ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
+        found = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, found)), key=_chi_square)
+
+    def _eased(
+        self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
+    ) -> Model:
+        """A model fitted to larger noise, ever less of it."""
+        for factor in larger:
+            noise = tuple(
+                Whitening(n.coefficients, factor * n.innovation, factor * n.level)
+                for n in self.noise
+            )
+            found = replace(self, noise=noise).fit(model, extra)
+            model = model if found is None else found.model
+        return model
+
+    def fit(
+        self,
+        model: Model,
+        extra: Sequence[CandidateEffect] = (),
+        starts: Mapping[str, Array] | None = None,
+        trials: Sequence[int] | None = None,
+    ) -> Fitted | None:
+        """Fit a model with candidates in it.
+
+        Args:
+            model: where its own parameters begin.
+            extra: the candidates.
+            starts: values of all their `paths`, by name; where they are in the model if not given.
+            trials: which trials; all if not given.
+        Returns:
+            The fit, or None where the model cannot be simulated.
+        """
+        for candidate in extra:
+            model = candidate.beside(model)
+            if starts is not None and candidate.name in starts:
+                begun = dict(zip(candidate.paths, map(float, starts[candidate.name]), strict=True))
+                model = model.replace(begun)
+        whitened = self.whitened_residuals(model, extra, trials)
+        try:
+            search = Search(whitened, False, 1.0)
+        except ValueError:
+            return None
+        converged = search.run(None, ROUNDS)
+        found = dict(zip(search.named(search.values), search.values, strict=True))
+        return Fitted(
+            model.replace({path: float(value) for path, value in found.items()}),
+            tuple(candidate.name for candidate in extra),
+            tuple(found),
+            search.values,
+            inverse(search.best.curvature),
+            search.best.chi_square,
+            search.moves,
+            converged,
+        )

@@ -1,0 +1,110 @@
+"""Parameters first: which of a model's own numbers may be off, by how much, and what they become.
+
+A law that the model has at its neutral value is an effect, not a parameter, and so are the errors
+of its sensors. What is left is refitted, here and again beside every candidate.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+SHARE = 0.10
+"""Standard deviation of what a lab's parameters are off by, as a share of them: an assumption.
+Where data determine a parameter it hardly counts; it holds those that they do not."""
+
+LEAST = {
+    "N": 5.0,
+    "kPa": 5.0,
+    "mm": 0.5,
+    "deg": 1.0,
+    "N/mm": 0.5,
+    "N s/mm": 0.05,
+    "N/bar": 5.0,
+    "N/bar/%": 0.5,
+    "N/bar^2": 1.0,
+    "N/bar^2/%": 0.1,
+    "N/%": 1.0,
+    "N/mm/kPa": 0.002,
+    "N s/mm/kPa": 2e-4,
+    "V": 0.05,
+}
+"""Least standard deviation of a parameter by its unit, for those that may be near 0: assumptions,
+about a hundredth of what the station's quantities reach."""
+
+WIDER = 2.0
+"""How many times as wide as a model file's own 95 % interval a parameter may lie, for another
+rig."""
+
+
+@dataclass(frozen=True)
+class FreeParameters:
+    """A model's own parameters.
+
+    Attributes:
+        free: paths of those that may be off.
+        prior: standard deviations about the model's values, in file units, shape (p,).
+    """
+
+    free: tuple[str, ...]
+    prior: Array
+
+
+def free_parameters(model: Model) -> FreeParameters:
+    """Which parameters of a model may be off, and by how much."""
+    free = tuple(path for path in model.paths() if _is_own(model, path))
+    return FreeParameters(free, np.array([prior(model, path) for path in free]))
+
+
+def prior(model: Model, path: str) -> float:
+    """Standard deviation of a parameter about the model's value, in file units."""
+    effect, _, door = path.partition(".")
+    law = CATALOGUE[effect]
+    value = model.at_the_door(effect)[door]
+    assert isinstance(value, float | int)
+    unit = law.quantities[law.names_at_the_door()[door]].unit
+    usual = max(SHARE * abs(value), LEAST.get(unit, 0.0))
+    note = model.notes.get(path)
+    if note is not None and note.low is not None and note.high is not None:
+        usual = max(usual, WIDER * (note.high - note.low) / (2.0 * 1.96))
+    return usual if usual > 0.0 else SHARE
+
+
+def values(model: Model, paths: Sequence[str]) -> Array:
+    """Values of parameters in file units."""
+    found = []
+    for path in paths:
+        effect, _, door = path.partition(".")
+        found.append(model.at_the_door(effect)[door])
+    return np.array(found, float)
+
+
+def unit(path: str) -> str:
+    """File unit of a parameter."""
+    effect, _, door = path.partition(".")
+    law = CATALOGUE[effect]
+    return law.quantities[law.names_at_the_door()[door]].unit
+
+
+def _is_own(model: Model, path: str) -> bool:
+    effect, _, door = path.partition(".")
+    law = CATALOGUE[effect]
+    stem = law.names_at_the_door()[door]
+    if law.port == "part" and effect in ("limits", "validity"):
+        return False
+    if stem in law.rows or stem in law.held or effect in sensors.SENSORS:
+        return False
+    if effect == "drive" and "hanging_load" in model.parameters:
+        # Weights have been weighed.
+        return False
+    if effect.endswith("_error"):
+        return False
+    quantity, value = law.quantities[stem], getattr(model.parameters[effect], stem)
+    return not (quantity.neutral is not None and value == quantity.to_si(quantity.neutral))

@@ -1,0 +1,118 @@
+"""What a fit leaves of the readings, and whether that is noise."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.preparation.noise import Whitening, autoregression, step_between
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.autocorrelation import AutocorrelationTest, autocorrelation_test
+from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic, scan_statistic
+from pma_gym.plant.compiled_model import OUTPUTS
+
+Array = NDArray[np.float64]
+
+FAR = 10.0
+"""Residual (root mean square), in standard deviations of a signal's noise, from which on it is no
+noise whatever its form."""
+
+
+def reestimated_noise(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
+) -> tuple[Whitening, ...]:
+    """Whitening of what a fit leaves, never of less than is seen at rest."""
+    whitened = problem.whitened_residuals(fit.model, chosen)
+    left = residuals(whitened, fit)
+    found = []
+    for channel, before in enumerate(problem.noise):
+        parts = [part[channel] for part in left]
+        known = [part for part in parts if np.isfinite(part).any()]
+        found.append(autoregression(known, before.level) if known else before)
+    return tuple(found)
+
+
+def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    readings = whitened.readings(fit.values)
+    assert readings is not None
+    return simulated_less_measured(whitened, readings)
+
+
+def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Array]) -> list[Array]:
+    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    found = []
+    for logged, held in zip(whitened.logged, readings, strict=True):
+        left = held - logged.measured
+        for channel, name in enumerate(OUTPUTS):
+            if not logged.measures[channel]:
+                left[channel] = np.nan
+                continue
+            left[channel, logged.missing[channel]] = np.nan
+            if name in ("contraction", "rotation"):
+                left[channel] -= np.nanmean(left[channel])
+        found.append(left)
+    return found
+
+
+def is_autocorrelated(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
+) -> bool:
+    """Whether the residual of a fit is autocorrelated beyond noise in any signal."""
+    return any(each.sure for each in autocorrelation_tests(problem, fit, chosen).values())
+
+
+def far_off(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()) -> bool:
+    """Whether what a fit leaves of some signal is many times its noise.
+
+    Where everything is wrong, turning signs of the residual's pieces tells chance from nothing.
+    """
+    left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
+    for channel, noise in enumerate(problem.noise):
+        known = np.concatenate([part[channel] for part in left])
+        known = known[np.isfinite(known)]
+        if known.size and np.sqrt(np.mean(known**2)) > FAR * noise.level:
+            return True
+    return False
+
+
+def autocorrelation_tests(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
+) -> dict[str, AutocorrelationTest]:
+    """Autocorrelation test of the residual of each output.
+
+    Nothing beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts
+    are taken from readings, so that what is left remembers their noise.
+    """
+    if not _tells(problem):
+        return {}
+    left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
+    rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in problem.trials]))
+    return {
+        name: autocorrelation_test([part[c] for part in left], rate)
+        for c, name in enumerate(OUTPUTS)
+    }
+
+
+def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
+    """Scan statistic of what a fit leaves of all signals; 1 where no residual can be judged."""
+    if not _tells(problem):
+        return NO_EXCESS
+    whitened = problem.whitened_residuals(fit.model)
+    left, logged = residuals(whitened, fit), whitened.logged
+    edges = [whitened.edges(each) for each in logged]
+    found = [
+        scan_statistic(
+            [part[c] for part in left], edges, problem.noise[c].level, step_between(logged, c)
+        )
+        for c in range(len(OUTPUTS))
+    ]
+    chance = min(1.0, len(found) * min(each.chance for each in found))
+    return ScanStatistic(chance, sum(each.excess for each in found))
+
+
+def _tells(problem: FitProblem) -> bool:
+    """Whether a residual tells of itself what is noise."""
+    return not problem.coarse and not problem.given.rig.is_free

@@ -1,0 +1,266 @@
+"""Selection: which candidates are added to the model, one after the other.
+
+The gate is the score test: chance explains as much, over the whole catalogue, in one of two hundred
+data sets. It opens too where the residual itself is no noise: where it is many times as large
+(`far_off`), where it is autocorrelated beyond the noise (`autocorrelation`), or where single pieces
+are too large for noise (`scan_statistic`) and an effect explains them. What passes is fitted
+together with the model's parameters; the likeliest is added; then the same again beside it. Each
+effect is then left out once, and stays out if the fit is as good without it. The noise is estimated
+again only when all effects are selected: before, an autoregression would take the next effect for
+noise.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.covariance import covariance
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.screening.residuals import (
+    far_off,
+    is_autocorrelated,
+    reestimated_noise,
+    scan_of_fit,
+)
+from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
+from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, refined_score, screen
+from pma_gym.discovery.selection.candidate_fits import (
+    better,
+    cost,
+    fitted,
+    refit,
+    restarted,
+    stripped,
+    without_idle,
+)
+from pma_gym.plant.model import Model
+
+ALARM = 0.005
+"""Family-wise rate of false alarms that the gate lets through."""
+
+LEAST_CHANGE = 0.15
+"""Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
+most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
+
+COARSE_CHANGE = 0.5
+"""The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
+noise, and follows the motion."""
+
+SECOND_SHARE, SURE_SHARE = 0.12, 0.02
+"""Least share of the first effect's gain that another must bring: what a law of the catalogue
+misses of its real likeness is of that order; and the same where the residual is surely no noise."""
+
+BEGINNINGS = 3
+"""How often the selection begins anew from a better refitted model."""
+
+MOST_EFFECTS = 3
+"""Most effects that are added."""
+
+TRIED, NEAR = 8, 0.05
+"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
+
+CARRIED = 0.5
+"""Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
+noise that is larger in places bursts too, and no effect explains half of that."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One round of the selection.
+
+    Attributes:
+        problem: with the noise of this round.
+        before: the model that candidates were tried beside.
+        baseline: the same, ready to be looked beside.
+        scores: at every candidate.
+        fits: of those that were fitted, by name, each together with what was there before.
+        gate: the looks that passed.
+        missing: whether the residual says of itself that something is missing.
+        scan: pieces of it that opened the gate by themselves.
+    """
+
+    problem: FitProblem
+    before: Fitted
+    baseline: Baseline
+    scores: tuple[ScreeningScore, ...]
+    fits: dict[str, Fitted]
+    gate: tuple[ScreeningScore, ...]
+    missing: bool
+    scan: ScanStatistic = NO_EXCESS
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was selected.
+
+    Attributes:
+        stages: the rounds.
+        chosen: the candidates in the model, in the order in which they came.
+        fit: the model with them.
+        problem: with the noise that it leaves.
+        refitted: the model with its own parameters refitted alone; better than what the selection
+            began with, where it had been caught.
+    """
+
+    stages: tuple[Stage, ...]
+    chosen: tuple[CandidateEffect, ...]
+    fit: Fitted
+    problem: FitProblem
+    refitted: Fitted
+
+
+def select(
+    problem: FitProblem,
+    refitted: Fitted,
+    candidates: Sequence[CandidateEffect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Selection:
+    """Select candidates.
+
+    Args:
+        problem: the trials.
+        refitted: the model with its own parameters refitted.
+        candidates: the whole catalogue.
+        seed: of simulated residuals.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    chosen: tuple[CandidateEffect, ...] = ()
+    stages: list[Stage] = []
+    begun: list[str] = []
+    best = refitted
+    while len(chosen) < MOST_EFFECTS:
+        rest = [candidate for candidate in candidates if candidate not in chosen]
+        stage = _stage(problem, best, chosen, rest, seed, journal, progress)
+        stages.append(stage)
+        added = _likeliest(stage, stages[0])
+        if added is None:
+            break
+        chosen = (*chosen, next(s for s in candidates if s.name == added))
+        best = better(problem, stage.fits[added], chosen, journal)
+        chosen, best = without_idle(problem, best, chosen, refitted, journal)
+        if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
+            # The fit without effects was in a local minimum; restart from the better parameters.
+            refitted, stages = best, []
+            begun.append(added)
+        elif len(chosen) < len(stages):
+            # One is not missed beside the other, and that is the end of it.
+            break
+    problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
+    fit = refit(problem, best, chosen, journal)
+    fit = replace(fit, covariance=covariance(problem, fit, chosen))
+    return Selection(tuple(stages), chosen, fit, problem, refitted)
+
+
+def _stage(
+    problem: FitProblem,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    rest: Sequence[CandidateEffect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Stage:
+    step = f"looking for effect {len(chosen) + 1}"
+    progress(step, 0, len(rest))
+    baseline = Baseline.at(
+        problem.whitened_residuals(before.model, chosen), before.values, before.steps
+    )
+    plain = stripped(problem, before)
+    scores = screen(
+        baseline,
+        rest,
+        seed + len(chosen),
+        lambda candidate: problem.probed(plain, candidate),
+        lambda done: progress(step, done, len(rest)),
+    )
+    scores.sort(key=lambda each: -each.gain)
+    # Where the residual itself rules chance out, a look need not.
+    far = far_off(problem, before, chosen)
+    missing = far or is_autocorrelated(problem, before, chosen)
+    gate = tuple(each for each in scores if passes(problem, each, far or (missing and not chosen)))
+    scan = NO_EXCESS if gate or chosen else scan_of_fit(problem, before)
+    least, plainly = 0.0, scores
+    if scan.excess:
+        rows = sum(len(trial.time) for trial in problem.trials)
+        # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
+        least = max(CARRIED * scan.excess, LEAST_CHANGE**2 * rows)
+        scores = _refined_scores(problem, baseline, plain, scores, scan.chance, least)
+        gate = tuple(each for each in scores if each.starts)
+    fits: dict[str, Fitted] = {}
+    if gate:
+        worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
+        for number, each in enumerate(worth[:TRIED]):
+            progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+            found = fitted(problem, baseline, before, chosen, each, journal)
+            if found is not None:
+                fits[each.candidate.name] = found
+        fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
+    if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
+        gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
+    return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan)
+
+
+def _refined_scores(
+    problem: FitProblem,
+    baseline: Baseline,
+    plain: Model,
+    scores: Sequence[ScreeningScore],
+    chance: float,
+    least: float,
+) -> list[ScreeningScore]:
+    """Closer looks, the best first; of one that explains bursts, chance is that of the bursts.
+
+    Args:
+        problem: the trials.
+        baseline: the refitted model.
+        plain: the same, as candidates are put into it.
+        scores: the looks so far.
+        chance: that noise bursts so.
+        least: chi-square that explains bursts.
+    """
+    found = [
+        refined_score(baseline, problem.probed(plain, each.candidate), each) for each in scores
+    ]
+    found = [
+        replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
+        for each in found
+    ]
+    return sorted(found, key=lambda each: -each.gain)
+
+
+def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:
+    """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
+    least = COARSE_CHANGE if problem.coarse else LEAST_CHANGE
+    return (missing or each.p_value <= ALARM) and each.change >= least
+
+
+def _likeliest(stage: Stage, first: Stage) -> str | None:
+    """The candidate to add, or None."""
+    if not stage.gate or not stage.fits:
+        return None
+    passed = {each.candidate.name for each in stage.gate}
+    most = stage.gate[0].gain
+    # What did not pass may still explain more than what did: a look is linear, a fit is not.
+    worth = {
+        name: fit
+        for name, fit in stage.fits.items()
+        if name in passed or stage.before.chi_square - fit.chi_square > most
+    }
+    if not worth:
+        return None
+    name = min(worth, key=lambda each: cost(worth[each]))
+    gain = stage.before.chi_square - stage.fits[name].chi_square
+    if gain < 30.0:
+        return None
+    if stage is not first:
+        least = min(first.fits.values(), key=cost)
+        share = SURE_SHARE if stage.missing else SECOND_SHARE
+        if gain < share * (first.before.chi_square - least.chi_square):
+            return None
+    return name

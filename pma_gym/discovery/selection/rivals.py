@@ -1,0 +1,94 @@
+"""Rivals: what explains the data nearly as well as an effect that was selected."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.selection.candidate_fits import cost
+from pma_gym.discovery.selection.forward_selection import Stage
+
+NEAREST = 12.0
+"""Chi-square within which two effects are not identifiable: odds of 400 to 1."""
+
+NEAREST_SHARE = 0.02
+"""The same as a share of what the effect gained: laws of a catalogue are likenesses, and the wrong
+one of two that differ by less may be the nearer likeness by chance."""
+
+CLOSE = 0.35
+"""Share of the gain within which a rival is fitted again with the noise as reestimated."""
+
+MOST = 5
+"""Most rivals that are fitted again."""
+
+
+@dataclass(frozen=True)
+class Rival:
+    """Another effect in the place of one that was selected.
+
+    Attributes:
+        candidate: it.
+        fit: of the model with it.
+        behind: chi-square by which it explains less, counting parameters; negative where more.
+        equal: whether the data do not identify which of the two it is.
+    """
+
+    candidate: CandidateEffect
+    fit: Fitted
+    behind: float
+    equal: bool
+
+
+def rivals(
+    problem: FitProblem,
+    best: Fitted,
+    chosen: Sequence[CandidateEffect],
+    stage: Stage,
+    place: int,
+    candidates: Sequence[CandidateEffect],
+) -> list[Rival]:
+    """Rivals of one effect, the nearest first.
+
+    Args:
+        problem: with the noise that the selected model leaves.
+        best: the selected model's fit.
+        chosen: its effects.
+        stage: the round in which the effect was selected.
+        place: its place among the chosen.
+        candidates: the whole catalogue.
+    """
+    own = stage.fits.get(chosen[place].name)
+    if own is None:
+        return []
+    gain = stage.before.chi_square - own.chi_square
+    taken = {candidate.name for candidate in chosen}
+    near = sorted(
+        (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < CLOSE * gain),
+        key=lambda name: cost(stage.fits[name]),
+    )
+    found = []
+    for name in [name for name in near if name not in taken][:MOST]:
+        candidate = next(each for each in candidates if each.name == name)
+        others = [*chosen]
+        others[place] = candidate
+        starts = {each.name: _start(each, best, stage.fits[name]) for each in others}
+        begun = problem.given.replace(
+            {path: stage.fits[name].estimate(path)[0] for path in problem.own.free}
+        )
+        fit = problem.fit(begun, others, starts)
+        if fit is None:
+            continue
+        behind = cost(fit) - cost(best)
+        found.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
+    return sorted(found, key=lambda rival: rival.behind)
+
+
+def _start(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
+    """Values of a candidate's parameters in the last of some fits that has it."""
+    for fit in reversed(fits):
+        if candidate.effect in fit.model.parameters and candidate.name in fit.names:
+            table = fit.model.at_the_door(candidate.effect)
+            return np.array([table[path.partition(".")[2]] for path in candidate.paths], float)
+    return candidate.probes[0]

@@ -1,0 +1,204 @@
+"""Unknown: whether something is missing that no effect carries, and which figure tells so."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.screening.autocorrelation import SURE
+from pma_gym.discovery.screening.residuals import autocorrelation_tests
+from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
+from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
+from pma_gym.discovery.verdict.residual_laws import EstimatedLaw, estimated_laws
+
+MOST_LEFT = 0.35
+"""Share of what was slow in the residual that may be left by effects that explain it."""
+
+DOUBTFUL = 0.08
+"""The same, from which on laws without a shape of their own are set against the effects."""
+
+BETTER, BETTER_BY = 1.15, 60.0
+"""By how much such a law must explain more than the effects to say that they are not it: a factor
+on their gain in chi-square, and chi-square."""
+
+WORTH_DRAWING = 0.15
+"""Share of the chi-square beyond noise that such a law must explain to be drawn."""
+
+MOST_AUTOCORRELATED = 0.1
+"""Largest fraction of the autocorrelated residual that may be left, beyond chance."""
+
+MOST_SPREAD = 0.12
+"""Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
+
+Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
+"""`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
+the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
+too much of what was slow in it is left. `autocorrelated`: too much of its autocorrelated part is
+left. `scatters`: an effect has another size by trial or condition. `outdone`: a freely drawn law
+explains more."""
+
+
+@dataclass(frozen=True)
+class Reason:
+    """Why the verdict is `unknown`: the first figure that is beyond its limit.
+
+    Attributes:
+        why: see `Why`.
+        figure: what was found: standard errors (`unexplained`), floors (`misfit`, `explained`), a
+            share (`slow`, `autocorrelated`, `scatters`), or the fall of chi-square by the law
+            (`outdone`).
+        limit: the most that it may be, in the same unit.
+        effects: what was added; empty if nothing was.
+        nearest: the likeliest effect, where nothing was added; empty if none was looked at.
+        leaves: share that the effects leave of what was slow in the residual, or that the nearest
+            leaves of chi-square.
+        of: signal, by its column (`unexplained`, `misfit`, `explained`), effect whose size scatters
+            (`scatters`), or name of the law (`outdone`).
+        by: what the size scatters with: `trial` or an output.
+        gain: fall of chi-square by the effects (`outdone`).
+    """
+
+    why: Why
+    figure: float
+    limit: float
+    effects: tuple[str, ...] = ()
+    nearest: str = ""
+    leaves: float = 1.0
+    of: str = ""
+    by: str = ""
+    gain: float = 0.0
+
+
+def why_unknown(
+    findings: Findings, left: ResidualFraction, laws: Sequence[EstimatedLaw]
+) -> Reason | None:
+    """Why something is missing that no effect of the catalogue carries; None where that is not so.
+
+    Args:
+        findings: what the steps found.
+        left: what the effects leave of the residual.
+        laws: laws without a shape of their own, the one that explains most first.
+    """
+    reason = _beyond(findings, left, laws)
+    if reason is None and not findings.selection.chosen:
+        reason = _inadequate(findings)
+    if reason is None:
+        return None
+    chosen = tuple(candidate.name for candidate in findings.selection.chosen)
+    if chosen:
+        return replace(reason, effects=chosen, leaves=left.slow)
+    if not findings.selection.stages:
+        return reason
+    nearest, leaves = _nearest(findings)
+    return replace(reason, nearest=nearest, leaves=leaves)
+
+
+def _beyond(
+    findings: Findings, left: ResidualFraction, laws: Sequence[EstimatedLaw]
+) -> Reason | None:
+    """The first figure beyond its limit, cheap ones first."""
+    if not findings.selection.chosen and _missing(findings):
+        return _unexplained(findings)
+    if not gate(findings):
+        return None
+    if left.slow > MOST_LEFT:
+        return Reason("slow", left.slow, MOST_LEFT)
+    if left.autocorrelated > MOST_AUTOCORRELATED:
+        return Reason("autocorrelated", left.autocorrelated, MOST_AUTOCORRELATED)
+    return _scatters(findings) or _outdone(findings, laws)
+
+
+def gate(findings: Findings) -> bool:
+    """Whether anything passed the gate."""
+    return bool(findings.selection.stages and findings.selection.stages[0].gate)
+
+
+def _missing(findings: Findings) -> bool:
+    """Whether the residual says of itself that something is missing."""
+    return bool(findings.selection.stages and findings.selection.stages[0].missing)
+
+
+def _inadequate(findings: Findings) -> Reason | None:
+    """The residual is no noise: by its size, or by what a flexible regression explains of it."""
+    if findings.adequacy.structure is None:
+        return None
+    name, signal = findings.adequacy.structure
+    column = BY_QUANTITY[name].name
+    if signal.fault == "explained":
+        return Reason("explained", signal.explained, MOST_EXPLAINED, of=column)
+    return Reason("misfit", signal.fitted, MOST_FLOORS, of=column)
+
+
+def _unexplained(findings: Findings) -> Reason | None:
+    """The residual is no noise: by the signal whose autocorrelation is surest."""
+    stage = findings.selection.stages[0]
+    sure = {
+        name: each
+        for name, each in autocorrelation_tests(stage.problem, stage.before).items()
+        if each.sure
+    }
+    if not sure:
+        return _inadequate(findings)
+    signal = max(sure, key=lambda name: sure[name].score)
+    return Reason("unexplained", sure[signal].score, SURE, of=BY_QUANTITY[signal].name)
+
+
+def _nearest(findings: Findings) -> tuple[str, float]:
+    """The likeliest effect where none was added, and the share of chi-square that it leaves."""
+    stage = findings.selection.stages[0]
+    before = stage.before.chi_square
+    gains = {name: before - fit.chi_square for name, fit in stage.fits.items()}
+    gains = gains or {score.candidate.name: score.gain for score in stage.scores}
+    if not gains:
+        return "", 1.0
+    name = max(gains, key=lambda each: gains[each])
+    return name, 1.0 - gains[name] / before
+
+
+def shapeless_laws(findings: Findings, left: ResidualFraction) -> list[EstimatedLaw]:
+    """Laws without a shape of their own, where the effects leave room for one."""
+    if not (gate(findings) or _missing(findings)):
+        return []
+    if left.most < DOUBTFUL and _scatters(findings) is None:
+        return []
+    return estimated_laws(findings.selection.problem, findings.refitted)
+
+
+def _scatters(findings: Findings) -> Reason | None:
+    """The first effect that was selected whose size differs by trial or by condition, and how."""
+    selection = findings.selection
+    for place, candidate in enumerate(selection.chosen):
+        by = homogeneity_test(selection.problem, selection.fit, selection.chosen, place)
+        wide = {name: scatter for name, scatter in by.items() if scatter > MOST_SPREAD}
+        if wide:
+            most = max(wide, key=lambda name: wide[name])
+            return Reason("scatters", wide[most], MOST_SPREAD, of=candidate.name, by=most)
+    return None
+
+
+def _outdone(findings: Findings, laws: Sequence[EstimatedLaw]) -> Reason | None:
+    """A freely drawn law that explains more than the effects do."""
+    if not laws:
+        return None
+    selection = findings.selection
+    whitened = selection.problem.whitened_residuals(findings.refitted.model)
+    before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
+    gain = before - selection.fit.chi_square
+    limit = max(BETTER * gain, gain + BETTER_BY)
+    if laws[0].gain > limit:
+        return Reason("outdone", laws[0].gain, limit, of=laws[0].name, gain=gain)
+    return None
+
+
+def telling(findings: Findings, laws: Sequence[EstimatedLaw]) -> bool:
+    """Whether the best freely drawn law explains enough to be shown."""
+    if not laws:
+        return False
+    whitened = findings.selection.problem.whitened_residuals(findings.refitted.model)
+    count = sum(logged.count for logged in whitened.logged)
+    before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
+    return laws[0].gain > max(BETTER_BY, WORTH_DRAWING * (before - count))
