@@ -120,8 +120,8 @@ def refreshed(text: str, run: Run | None) -> str:
         RunError: a block that nobody renders, or figures that are missing.
     """
 
-    def block(found: re.Match[str]) -> str:
-        name = found["name"]
+    def block(match: re.Match[str]) -> str:
+        name = match["name"]
         if name not in FIGURES and name not in KEPT:
             known = ", ".join([*FIGURES, *KEPT])
             raise RunError(f"no figures {name!r}; there are {known}")
@@ -133,10 +133,10 @@ def refreshed(text: str, run: Run | None) -> str:
                     f"what docs/figures keeps for {name} has no {error}; put a newer run's there"
                 ) from None
         elif run is None:
-            return found[0]
+            return match[0]
         else:
             figures = FIGURES[name](run)
-        return f"{found['start']}\n{figures}\n\n{found['end']}"
+        return f"{match['start']}\n{figures}\n\n{match['end']}"
 
     return _BLOCK.sub(block, text)
 
@@ -172,14 +172,14 @@ def main(
     try:
         run = None if kept else load_run(scores)
         texts = {path: path.read_text(encoding="utf-8") for path in FILES}
-        found = {path: refreshed(text, run) for path, text in texts.items()}
+        contents = {path: refreshed(text, run) for path, text in texts.items()}
     except RunError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(2) from None
-    changed = [path for path in FILES if found[path] != texts[path]]
+    changed = [path for path in FILES if contents[path] != texts[path]]
     for path in changed:
         if not check:
-            write_text(path, found[path])
+            write_text(path, contents[path])
         print(f"{path.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
     if check and changed:
         raise typer.Exit(1)

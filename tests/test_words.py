@@ -48,7 +48,7 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
-CLEAN = ("controllers",)
+CLEAN = ("benchmarks", "controllers",)
 """Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
 
 PHRASES = (
@@ -62,7 +62,7 @@ PHRASES = (
 )
 """Phrases that are never right, in code and pages."""
 
-TEXTS = ("controllers", "docs", "README.md")
+TEXTS = ("benchmarks", "controllers", "docs", "README.md")
 EXEMPT = ("docs/notebook",)
 """Notes of what was thought then stay as they were written."""
 

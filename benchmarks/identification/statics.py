@@ -128,7 +128,7 @@ def fit(
         )
         return np.concatenate([part[np.isfinite(part)] for part in all_parts])
 
-    found = least_squares(
+    solution = least_squares(
         cost,
         begin,
         x_scale=scale,
@@ -141,7 +141,7 @@ def fit(
         gtol=1e-10,
         max_nfev=200,
     )
-    return model.replace(dict(zip(names, found.x.tolist(), strict=True)))
+    return model.replace(dict(zip(names, solution.x.tolist(), strict=True)))
 
 
 def _bounds(model: Model, names: list[str]) -> tuple[list[float], list[float]]:

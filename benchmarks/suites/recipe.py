@@ -9,7 +9,7 @@ from pma_gym.plant.model import load_model
 
 
 class RecipeError(ValueError):
-    """A recipe that no station can be drawn by; the message says why and the mend."""
+    """A recipe that no station can be drawn by; the message says why and the fix."""
 
 
 class Occasional(NamedTuple):
@@ -18,9 +18,10 @@ class Occasional(NamedTuple):
     Attributes:
         name: the effect's, in the catalogue.
         share: probability that a station has it.
-        ranges: lowest and highest value of each of its parameters by name at the door; drawn
-            evenly between them, evenly in the logarithm if the highest is over 3 times the lowest.
-        tied: parameters that are another one times a factor, by name at the door.
+        ranges: lowest and highest value of each of its parameters by name, in the units of model
+            files; drawn evenly between them, evenly in the logarithm if the highest is over 3
+            times the lowest.
+        tied: parameters that are another one times a factor, by name in the units of model files.
     """
 
     name: str

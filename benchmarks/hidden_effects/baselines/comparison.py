@@ -34,7 +34,7 @@ def compared(folder: Path, ways: Sequence[str]) -> dict[str, Any]:
 
 def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
     """A way's outcomes, and the cases about which it has said nothing."""
-    found, silent = [], []
+    answered, silent = [], []
     for path in sorted((folder / "truth").glob("case_*.json")):
         file = answer_file(folder, way, path.stem)
         answer: dict[str, Any] = (
@@ -45,8 +45,8 @@ def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
             continue
         outcome = compare(json.loads(path.read_text("utf-8")), answer)
         outcome.seconds = answer["seconds"]
-        found.append(outcome)
-    return found, silent
+        answered.append(outcome)
+    return answered, silent
 
 
 def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:

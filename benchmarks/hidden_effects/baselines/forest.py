@@ -69,8 +69,8 @@ def random_forest(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """The class with most votes; others with nearly as many are told beside it."""
     ready = prepare(dataset, jobs)
     forest, names = _grown(TABLE, seed)
-    found = signature(ready)
-    votes = forest.predict_proba(np.array([[found[name] for name in names]]))[0]
+    features = signature(ready)
+    votes = forest.predict_proba(np.array([[features[name] for name in names]]))[0]
     order = np.argsort(-votes, kind="stable")
     first = str(forest.classes_[order[0]])
     shares = {str(forest.classes_[k]): float(votes[k]) for k in order[:5]}
@@ -147,8 +147,8 @@ def read_case(seed: int, number: int) -> dict[str, Any]:
         write_case(case, Path(folder), number)
         ready = prepare(read_dataset(Path(folder) / "cases" / case_name(number)), 1)
     hidden = [effect["name"] for effect in case.truth["effects"]]
-    found = {name: f"{value:.4g}" for name, value in signature(ready).items()}
-    return {"seed": seed, "number": number, "label": hidden[0] if hidden else NOTHING} | found
+    features = {name: f"{value:.4g}" for name, value in signature(ready).items()}
+    return {"seed": seed, "number": number, "label": hidden[0] if hidden else NOTHING} | features
 
 
 def _hidden(block: str, number: int) -> tuple[str, ...]:
