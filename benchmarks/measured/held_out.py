@@ -133,7 +133,7 @@ def _at_measured_load(trial: Trial, model: Model) -> Trial:
 def _errors(
     model: Model, loaded: Sequence[NamedTrial], trials: Sequence[Trial]
 ) -> dict[str, Array]:
-    """Predicted less measured, in the units of reports, by `FIGURES`."""
+    """Predicted less measured, in file units, by `FIGURES`."""
     some = ("drive.offset_n",)
     whitened = WhitenedResiduals(
         model,
@@ -165,7 +165,7 @@ def rms(errors: Array) -> float:
 
 
 def repeat_scatter(data: Dataset) -> dict[str, float]:
-    """Rms of I3's rows about the mean of their repeats, in the units of reports, by `FIGURES`."""
+    """Rms of I3's rows about the mean of their repeats, in file units, by `FIGURES`."""
     groups: dict[str, list[int]] = {}
     loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
     for i, each in enumerate(loaded):

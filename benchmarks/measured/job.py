@@ -185,7 +185,7 @@ def _without(pressures_kpa: Sequence[float]) -> tuple[Dataset, Dataset]:
 
 
 def floors() -> dict[str, float]:
-    """Scatter of I3's rows about the mean of their repeats (rms, mm and deg), by figure."""
+    """Scatter of I3's rows about the mean of their repeats (rms, in file units), by figure."""
     from benchmarks.measured.held_out import repeat_scatter
 
     return repeat_scatter(measured_dataset(steps=0))

@@ -64,7 +64,7 @@ class Explanation:
 
     Attributes:
         name: the effect, or the parameter.
-        values: fitted values in the units of model files, by path.
+        values: fitted values in file units, by path.
         fitted_mm: rms left where all pressures were fitted (mm at the muscle).
         left_out_mm: at pressures left out.
         displacement_mm: of that, in the displacement trials.

@@ -18,10 +18,9 @@ class Occasional(NamedTuple):
     Attributes:
         name: the effect's, in the catalogue.
         share: probability that a station has it.
-        ranges: lowest and highest value of each of its parameters by name, in the units of model
-            files; drawn evenly between them, evenly in the logarithm if the highest is over 3
-            times the lowest.
-        tied: parameters that are another one times a factor, by name in the units of model files.
+        ranges: lowest and highest value of each of its parameters by name in files; drawn
+            evenly between them, evenly in the logarithm if the highest is over 3 times the lowest.
+        tied: parameters that are another one times a factor, by name in files.
     """
 
     name: str
@@ -65,7 +64,7 @@ def parse_recipe(given: Mapping[str, Any], model: str) -> Recipe:
     Raises:
         RecipeError: a model or an effect that cannot be drawn so.
     """
-    if load_model(model).plant != "station":
+    if not load_model(model).rig.balances_loads:
         raise RecipeError(f"stations are drawn about the model of a station, {model} is none")
     return Recipe(
         model=model,

@@ -140,7 +140,7 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
         for rate, delay in LOOPS
         for task, pressures in PRESSURES_KPA.items()
         # A cascade has no muscle that a load could be held against.
-        if model.plant == "station" or EVERY_TASK[task].actuator == "motor"
+        if model.rig.balances_loads or EVERY_TASK[task].actuator == "motor"
         for controller in CONTROLLERS
         for pressure in pressures
     ]
@@ -222,7 +222,7 @@ def _rounded(value: float) -> float:
 
 
 def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, Any]:
-    """Gains in the units of their file, by loop, kind of task and controller."""
+    """Gains in file units by loop, kind of task and controller."""
     tables: dict[str, Any] = {}
     for job, (gains, cost) in zip(jobs, results, strict=True):
         kinds = tables.setdefault(job.loop, {}).setdefault(job.kind, {})

@@ -124,7 +124,7 @@ class Effect:
 
     @cached_property
     def defaults(self) -> Mapping[str, float]:
-        """Values at the door of the parameters that need not be named, by their names there.
+        """Values in file units of the parameters that need not be named, by their names there.
 
         >>> from pma_gym.effects import CATALOGUE
         >>> dict(CATALOGUE["drive_dead_zone"].defaults)
@@ -137,7 +137,7 @@ class Effect:
         )
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:
-        """Parameters in SI from values by their names at the door; defaults for what has one.
+        """Parameters in SI from values by their names in files; defaults for what has one.
 
         Raises:
             ValueError: an unknown, missing or out-of-bounds parameter, naming all of it.
@@ -157,7 +157,7 @@ class Effect:
         return self.checked(self.parameters(**given))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
-        """The parameters, some of them given anew by their names at the door.
+        """The parameters, some of them given anew by their names in files.
 
         Raises:
             ValueError: an unknown or out-of-bounds parameter.
@@ -199,7 +199,7 @@ class Effect:
         return converted if many else converted[0]
 
     def at_the_door(self, parameters: Parameters) -> dict[str, Value]:
-        """Values by their names at the door: the inverse of `parse`."""
+        """Values by their names in files: the inverse of `parse`."""
         out: dict[str, Value] = {}
         for door, stem in self.names_at_the_door().items():
             value, quantity = getattr(parameters, stem), self.quantities[stem]

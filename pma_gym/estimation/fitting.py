@@ -124,7 +124,7 @@ class Search:
         before: a search over fewer trials, whose result is the start.
 
     Attributes:
-        values: the best so far, at the door, shape (p,).
+        values: the best so far, in file units, shape (p,).
         best: the sums there.
         damping: of the next step.
         rate: by which factor the last step lowered what the next one should gain.

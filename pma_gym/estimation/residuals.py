@@ -55,7 +55,7 @@ class Sums:
 
     Attributes:
         chi_square: r.r; infinite where the model cannot be simulated.
-        gradient: J^T r, shape (p,), per unit at the door.
+        gradient: J^T r, shape (p,), per unit in files.
         curvature: J^T J, shape (p, p).
     """
 
@@ -84,7 +84,7 @@ class Residuals:
 
     Attributes:
         free: the free parameters.
-        start: their values in the model, at the door, shape (p,).
+        start: their values in the model, in file units, shape (p,).
         count: number of residuals.
         deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
         trials: number of trials.
@@ -128,7 +128,7 @@ class Residuals:
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
-        if self.plant.model.plant == "slide":
+        if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
             paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
             self._begun = self._places({path: list(row) for path, row in paths.items()})
@@ -137,7 +137,7 @@ class Residuals:
         """Sums at parameters, with the Jacobian by finite differences.
 
         Args:
-            values: the parameters at the door, shape (p,).
+            values: the parameters in file units, shape (p,).
             steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
             central: move each both ways, which costs twice as much.
         """

@@ -112,7 +112,7 @@ def moved(problem: FitProblem, fit: Fitted) -> dict[str, dict[str, Any]]:
 
 
 def estimate(fit: Fitted, path: str) -> dict[str, Any]:
-    """A parameter's value, 95 % interval and unit in model files."""
+    """A parameter's value, 95 % interval and unit in files."""
     value, error = fit.estimate(path)
     return {
         "value": value,
