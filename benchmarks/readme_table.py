@@ -5,7 +5,6 @@ A block of figures, of the run or of those that `docs/figures` keeps, stands bet
 and leaves its blocks alone. `--check` changes nothing and fails if a file is not as it would be.
 """
 
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +17,7 @@ import typer
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation.readme import hidden_effects
 from benchmarks.reproduction.score import PHASES, UNITS
+from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = (ROOT / "README.md", ROOT / "docs" / "benchmark.md")
@@ -149,7 +149,10 @@ def load_run(scores: Path) -> Run:
     """
     if not scores.is_file():
         raise RunError(f"there is no file {scores}; run `python -m benchmarks` first")
-    run = json.loads(scores.read_text(encoding="utf-8"))
+    try:
+        run = read_json(scores, "journal_mib", own=True, finite=False)
+    except ValueError as error:
+        raise RunError(f"{error}; run `python -m benchmarks` again") from None
     failed = [score for score in run["scores"] if score["failure"]]
     if not run["complete"] or run["suite"]["selected"] or failed:
         raise RunError(

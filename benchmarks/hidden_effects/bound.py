@@ -205,7 +205,7 @@ def distances(
 
 def bounded(folder: Path, case: str) -> dict[str, Any]:
     """Distances of one drawn case that hides one effect."""
-    truth = json.loads((folder / "truth" / f"{case}.json").read_text("utf-8"))
+    truth = read_json(folder / "truth" / f"{case}.json", "journal_mib", own=True, finite=False)
     dataset = read_dataset(folder / "cases" / case)
     problem, model = noiseless(dataset, truth, load_model(dataset.model or "station"))
     effect = truth["effects"][0]
@@ -277,7 +277,9 @@ def main(
         print(f"{next(done)}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
 
     run_or_raise([partial(_bound_one, cases, name) for name in missing], local(jobs), tell)
-    entries = [json.loads((kept / f"{name}.json").read_text("utf-8")) for name in names]
+    entries = [
+        read_json(kept / f"{name}.json", "journal_mib", own=True, finite=False) for name in names
+    ]
     by_effect = {
         effect: curves([each for each in entries if each["effect"] == effect])
         for effect in dict.fromkeys(each["effect"] for each in entries)
@@ -301,7 +303,7 @@ def _is_kept(path: Path) -> bool:
 
 
 def _counts(truth: Path) -> bool:
-    effects = json.loads(truth.read_text("utf-8"))["effects"]
+    effects = read_json(truth, "journal_mib", own=True, finite=False)["effects"]
     return len(effects) == 1 and effects[0]["name"] not in NOT_A_MEAN
 
 

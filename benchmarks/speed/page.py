@@ -4,7 +4,6 @@ A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figu
 types one in. `--check` changes nothing and fails if the page is not as the run would have it.
 """
 
-import json
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -16,6 +15,7 @@ import typer
 from benchmarks.files import write_text
 from benchmarks.speed.measure import Repetition
 from benchmarks.speed.report.tables import SpeedTable, sentences, speed_tables
+from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "speed.md"
@@ -40,7 +40,10 @@ def load_run(path: Path) -> Mapping[str, Any]:
     advice = "run `python -m benchmarks speed --json results/speed.json`"
     if not path.is_file():
         raise RunError(f"there is no file {path}; {advice} first")
-    run = json.loads(path.read_text(encoding="utf-8"))
+    try:
+        run = read_json(path, "journal_mib", own=True, finite=False)
+    except ValueError as error:
+        raise RunError(f"{error}; {advice} again") from None
     whole, made = Repetition(), run["run"]
     if not run["complete"] or made["rounds"] < whole.rounds or made["seconds"] < whole.seconds:
         raise RunError(f"{path} is no whole run; {advice} without --quick and let it finish")

@@ -1,6 +1,5 @@
 """The table of all ways: rates on the same cases, with Wilson's intervals."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from benchmarks.hidden_effects.baselines.answers import answer_file
 from benchmarks.hidden_effects.baselines.registry import WAYS
 from benchmarks.hidden_effects.evaluation.scoring import rate
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare
+from pma_gym.documents import read_json
 
 COLUMNS = (
     "detected",
@@ -38,12 +38,14 @@ def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
     for path in sorted((folder / "truth").glob("case_*.json")):
         file = answer_file(folder, way, path.stem)
         answer: dict[str, Any] = (
-            json.loads(file.read_text("utf-8")) if file.is_file() else {"error": "not asked"}
+            read_json(file, "journal_mib", own=True, finite=False)
+            if file.is_file()
+            else {"error": "not asked"}
         )
         if "error" in answer:
             silent.append(f"{path.stem}: {answer['error']}")
             continue
-        outcome = compare(json.loads(path.read_text("utf-8")), answer)
+        outcome = compare(read_json(path, "journal_mib", own=True, finite=False), answer)
         outcome.seconds = answer["seconds"]
         answered.append(outcome)
     return answered, silent

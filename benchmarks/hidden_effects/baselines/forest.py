@@ -7,7 +7,6 @@ of `signatures.csv`, one line a case, from which the forest is grown when it is 
 # pyright: reportMissingImports=false
 import csv
 import io
-import json
 import sys
 import tempfile
 import time
@@ -28,6 +27,7 @@ from benchmarks.hidden_effects.generation.cases import draw_case
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import case_name, write_case
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
+from pma_gym.documents import read_json
 from pma_gym.files import replace_file
 
 Array = NDArray[np.float64]
@@ -106,7 +106,7 @@ def check_unseen(folder: Path, file: Path) -> None:
     """
     learnt = set(read_table(file).seeds.tolist())
     for path in sorted((folder / "truth").glob("case_*.json")):
-        seed = json.loads(path.read_text("utf-8"))["seed"]
+        seed = read_json(path, "journal_mib", own=True, finite=False)["seed"]
         if seed in learnt:
             raise ValueError(
                 f"{path.stem} in {folder} is of seed {seed}, from which the forest's table {file} "

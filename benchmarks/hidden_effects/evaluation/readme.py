@@ -1,9 +1,10 @@
 """README's table of how well the diagnosis does, from the figures that were kept of the runs."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from pma_gym.documents import read_json
 
 KEPT = Path(__file__).resolve().parents[3] / "docs" / "figures" / "hidden-effects.json"
 """What runs of `hidden-effects --json` wrote of their blocks, put together."""
@@ -32,7 +33,7 @@ ROWS = (
 
 def hidden_effects(kept: Path = KEPT) -> str:
     """Every promised rate with its 95 % interval, count and target, as Markdown."""
-    blocks = json.loads(kept.read_text("utf-8"))["blocks"]
+    blocks = read_json(kept, "journal_mib", own=True, finite=False)["blocks"]
     lines = ["| | Measured | n | Target |", "| :-- | --: | --: | --: |"]
     for words, block, name in ROWS:
         rate = blocks[block]["rates"][name]

@@ -22,6 +22,7 @@ from benchmarks.hidden_effects.evaluation.targets import (
     Target,
 )
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
+from pma_gym.documents import read_json
 
 Z = 1.959964
 """Of a 95 % interval."""
@@ -46,11 +47,15 @@ def read(folder: Path) -> list[Outcome]:
     outcomes = []
     for case in sorted((folder / "cases").glob("case_*")):
         answer = folder / "answers" / case.name
-        truth = json.loads((folder / "truth" / f"{case.name}.json").read_text("utf-8"))
+        truth = read_json(
+            folder / "truth" / f"{case.name}.json", "journal_mib", own=True, finite=False
+        )
         if not (answer / "diagnosis.json").is_file():
             outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
             continue
-        outcome = compare(truth, json.loads((answer / "diagnosis.json").read_text("utf-8")))
+        outcome = compare(
+            truth, read_json(answer / "diagnosis.json", "journal_mib", own=True, finite=False)
+        )
         if (answer / "seconds.txt").is_file():
             outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
         outcomes.append(outcome)
