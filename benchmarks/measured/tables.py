@@ -116,10 +116,9 @@ def reverse_words(result: Measured) -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
     for explanations in result.reverse:
         plain = next(each for each in explanations if each.name == NOTHING)
-        best, others = (
-            explanations[0],
-            [each for each in alike(explanations) if each is not explanations[0]],
-        )
+        yield from _hypothesis_words(explanations, plain)
+        counted = [each for each in explanations if not each.hypothesis]
+        best, others = counted[0], [each for each in alike(counted) if each is not counted[0]]
         if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
             yield (
                 f"Nothing further explains a tenth of the {plain.left_out_mm:.2f} mm that are left "
@@ -132,6 +131,19 @@ def reverse_words(result: Measured) -> Iterator[str]:
             "mm at pressures left out, the least."
             + (f" As good within 15 %: {others_as_good}." if others_as_good else "")
         )
+
+
+def _hypothesis_words(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
+    """What was thought of when the tables had been seen: told, and never counted."""
+    for each in explanations:
+        if each.hypothesis:
+            size = ", ".join(f"{name} {value:.3g}" for name, value in each.values.items())
+            yield (
+                f"Hypothesis, thought of when these tables had been seen: {each.name} ({size}) "
+                f"leaves {each.left_out_mm:.2f} of {plain.left_out_mm:.2f} mm at pressures left "
+                "out. These tables cannot decide it: undecidable until the potentiometer is turned "
+                "once by hand beside a scale."
+            )
 
 
 def _costs(each: Explanation, plain: Explanation) -> str:
