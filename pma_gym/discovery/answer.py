@@ -24,6 +24,7 @@ from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.leftovers import residuals
 from pma_gym.discovery.parameters import unit, values
 from pma_gym.discovery.quantisation import coarse_sensors
+from pma_gym.discovery.range_words import widened_ranges
 from pma_gym.discovery.records import floors_at_the_door, gaps, judgements, trial_records
 from pma_gym.discovery.residual_laws import residual_law
 from pma_gym.discovery.screening import Look
@@ -134,6 +135,10 @@ def _effects(found: Findings) -> tuple[NamedEffect, ...]:
                     path.partition(".")[2]: _estimate(found, fit, path)
                     for path in suspect.fitted_paths
                 },
+                undetermined={
+                    path.partition(".")[2]: found.selection.undetermined[path]
+                    for path in suspect.left
+                },
             )
         )
     return tuple(effects)
@@ -164,7 +169,7 @@ def _bounds(found: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:
     if found.fewest is not None and fit is found.fewest.fit:
         bench = found.fewest.bench
     chosen = found.selection.chosen if fit is found.selection.fit else ()
-    evidence = bench.evidence(fit.model, chosen)
+    evidence = bench.evidence_of(fit, chosen)
     pairs = zip(evidence.lower.tolist(), evidence.upper.tolist(), strict=True)
     return dict(zip((free.path for free in evidence.free), pairs, strict=True))
 
@@ -315,6 +320,8 @@ def _amended(found: Findings, verdict: Verdict) -> Model:
             value - 1.96 * error if known else None,
             value + 1.96 * error if known else None,
         )
+    for path in found.selection.undetermined if verdict in ("effect", "unknown") else ():
+        notes[path] = Note("not determined by the trials: held where its law is at a limit")
     return replace(
         fit.model,
         name=f"{found.given.name}_amended",
@@ -387,7 +394,7 @@ def _doubts(found: Findings) -> list[str]:
 
 
 def _warnings(found: Findings) -> tuple[str, ...]:
-    words = _doubts(found)
+    words = [*_doubts(found), *widened_ranges(found.bench, found.proposed[1])]
     if found.discarded is not None:
         given, refitted = found.discarded
         words.append(

@@ -43,7 +43,7 @@ def spreads(
         as simulated, by name; 0 where fewer than three groups show the effect, or where chance
         would scatter as much. Empty where the model cannot be simulated.
     """
-    evidence = bench.evidence(fit.model, chosen)
+    evidence = bench.evidence_of(fit, chosen)
     pieces = evidence.pieces(fit.values, fit.steps)
     if pieces is None:
         return {}
@@ -94,10 +94,9 @@ def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> A
 def _direction(fit: Fitted, suspect: Suspect) -> Array:
     """How a fit's parameters move where the effect as a whole grows."""
     direction = np.zeros(len(fit.paths))
-    for path, absent, scales, fitted in zip(
-        suspect.paths, suspect.absent, suspect.amplitudes, suspect.fitted, strict=True
-    ):
-        if fitted and (scales or len(suspect.paths) == 1):
+    rows = zip(suspect.paths, suspect.absent, suspect.amplitudes, strict=True)
+    for path, absent, scales in rows:
+        if path in suspect.fitted_paths and (scales or len(suspect.paths) == 1):
             at = fit.paths.index(path)
             size = fit.values[at] - (absent if suspect.fitted.all() and scales else 0.0)
             direction[at] = size

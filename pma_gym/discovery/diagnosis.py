@@ -93,6 +93,21 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Undetermined:
+    """A parameter of an effect that the data do not determine: it has left the effect's law.
+
+    Attributes:
+        above: value above which it lies (95 %), in its unit; None where nothing tells.
+        below: the same from above.
+        unit: the unit.
+    """
+
+    above: float | None
+    below: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
 class NamedEffect:
     """An effect that the diagnosis adds to the model.
 
@@ -101,12 +116,14 @@ class NamedEffect:
         confused_with: other candidates that explain these data as well.
         p_value: family-wise over the whole catalogue.
         parameters: estimates by name at the door.
+        undetermined: parameters without an estimate, by name at the door (`nested_laws`).
     """
 
     name: str
     confused_with: tuple[str, ...]
     p_value: float
     parameters: Mapping[str, Estimate]
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -374,6 +391,9 @@ class Diagnosis:
                     "p_value": effect.p_value,
                     "parameters": {
                         name: vars(estimate) for name, estimate in effect.parameters.items()
+                    },
+                    "not_determined": {
+                        name: vars(each) for name, each in effect.undetermined.items()
                     },
                 }
                 for effect in self.effects

@@ -1,13 +1,14 @@
 """Fits of a model, alone or with suspects in it, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.noise import Whitening
 from pma_gym.discovery.parameters import Own, values
@@ -46,6 +47,8 @@ class Fitted:
         chi_square: of the whitened readings, with what the prior adds.
         steps: moves of the parameters that their derivatives were taken with.
         converged: whether a further step would gain nothing worth while.
+        reach: how many times as wide as assumed beforehand the range of a parameter became, by
+            path, for those that went beyond.
     """
 
     model: Model
@@ -56,6 +59,7 @@ class Fitted:
     chi_square: float
     steps: Array
     converged: bool
+    reach: Mapping[str, float] = field(default_factory=dict)
 
     def estimate(self, path: str) -> tuple[float, float]:
         """A parameter's value and its standard error, at the door."""
@@ -90,14 +94,23 @@ class Bench:
     files: tuple[str, ...] = ()
 
     def evidence(
-        self, model: Model, extra: Sequence[Suspect] = (), trials: Sequence[int] | None = None
+        self,
+        model: Model,
+        extra: Sequence[Suspect] = (),
+        trials: Sequence[int] | None = None,
+        reach: Mapping[str, float] | None = None,
     ) -> Evidence:
-        """Trials beside a model with suspects in it; its own parameters and theirs are free."""
+        """Trials beside a model with suspects in it; its own parameters and theirs are free.
+
+        Args:
+            model: the model.
+            extra: the suspects.
+            trials: which trials; all if not given.
+            reach: how many times as wide as assumed beforehand ranges are, by path.
+        """
         paths, own = list(self.own.free), {}
         for suspect in extra:
-            paths += [
-                path for path, free in zip(suspect.paths, suspect.fitted, strict=True) if free
-            ]
+            paths += suspect.fitted_paths
             own |= suspect.own
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
@@ -113,6 +126,7 @@ class Bench:
             centre,
             {path: [each[i] for i in chosen] for path, each in own.items()},
             threads=self.threads,
+            reach=reach,
         )
 
     def probed(self, model: Model, suspect: Suspect) -> Evidence:
@@ -194,6 +208,10 @@ class Bench:
             model = model if found is None else found.model
         return model
 
+    def evidence_of(self, fit: Fitted, extra: Sequence[Suspect] = ()) -> Evidence:
+        """Trials beside a fit with suspects in it, within the ranges that it ended with."""
+        return self.evidence(fit.model, extra, reach=fit.reach)
+
     def fit(
         self,
         model: Model,
@@ -202,6 +220,9 @@ class Bench:
         trials: Sequence[int] | None = None,
     ) -> Fitted | None:
         """Fit a model with suspects in it.
+
+        A parameter goes beyond what is assumed beforehand where the fit gains by it
+        (`assumed_range`).
 
         Args:
             model: where its own parameters begin.
@@ -217,19 +238,38 @@ class Bench:
                 begun = dict(zip(suspect.paths, map(float, starts[suspect.name]), strict=True))
                 model = model.replace(begun)
         evidence = self.evidence(model, extra, trials)
+        # A fit of some of the trials begins where that of all ended.
+        reach = evidence.needed_reach(evidence.start)
+        evidence = self.evidence(model, extra, trials, reach) if reach else evidence
         try:
             search = Search(evidence, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
-        found = dict(zip(search.named(search.values), search.values, strict=True))
+        for _ in range(MOST_DOUBLINGS):
+            edges = evidence.at_assumed_edge(search.values)
+            if not edges:
+                break
+            wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
+            evidence = self.evidence(_at(model, search), extra, trials, wider)
+            further = Search(evidence, False, 1.0)
+            ended = further.run(None, ROUNDS)
+            if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
+                break
+            search, converged, reach = further, ended, wider
         return Fitted(
-            model.replace({path: float(value) for path, value in found.items()}),
+            _at(model, search),
             tuple(suspect.name for suspect in extra),
-            tuple(found),
+            tuple(search.named(search.values)),
             search.values,
             inverse(search.best.curvature),
             search.best.chi_square,
             search.moves,
             converged,
+            evidence.needed_reach(search.values),
         )
+
+
+def _at(model: Model, search: Search) -> Model:
+    """A model with the parameters that a search is at."""
+    return model.replace(search.named(search.values))

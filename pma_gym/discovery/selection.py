@@ -9,10 +9,11 @@ not missed goes. Noise is learnt anew only when all effects are found: before, a
 would take the next effect for noise.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from pma_gym.discovery.bursts import NO_BURSTS, Bursts
+from pma_gym.discovery.diagnosis import Undetermined
 from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.journal import Journal
@@ -97,6 +98,7 @@ class Selection:
         bench: with the noise that it leaves.
         refitted: the model with its own parameters refitted alone; better than what the selection
             began with, where it had been caught.
+        undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
     """
 
     stages: tuple[Stage, ...]
@@ -104,6 +106,7 @@ class Selection:
     fit: Fitted
     bench: Bench
     refitted: Fitted
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
 
 def select(

@@ -9,7 +9,7 @@ from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.parameters import values
 from pma_gym.discovery.screening import Baseline, Look, beginnings
 from pma_gym.discovery.suspects import Suspect
-from pma_gym.document_shape import ListOf, Real, check_shape
+from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
@@ -161,6 +161,7 @@ _KEPT = {
     "chi_square": Real(),
     "steps": ListOf(Real(finite=False)),
     "converged": bool,
+    "reach": {ANY: Real(1.0)},
 }
 """Shape of a fit in a journal."""
 
@@ -174,6 +175,7 @@ def kept_form(fit: Fitted) -> dict:
         "chi_square": fit.chi_square,
         "steps": fit.steps.tolist(),
         "converged": bool(fit.converged),
+        "reach": dict(fit.reach),
     }
 
 
@@ -210,4 +212,5 @@ def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect])
         kept["chi_square"],
         np.array(kept["steps"]),
         kept["converged"],
+        kept["reach"],
     )

@@ -4,7 +4,7 @@ import numpy as np
 
 from pma_gym.discovery.adequacy import OPEN
 from pma_gym.discovery.adequacy_words import agreement, remainder, undecided
-from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
+from pma_gym.discovery.diagnosis import ADDED, Diagnosis, NamedEffect, Verdict
 from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
@@ -23,6 +23,7 @@ from pma_gym.discovery.words import (
     percent,
     signal_name,
     signal_unit,
+    undetermined_words,
 )
 from pma_gym.units import suffix, with_unit
 
@@ -107,15 +108,25 @@ def _propose(diagnosis: Diagnosis) -> str:
 def _effects(diagnosis: Diagnosis) -> str:
     named = []
     for effect in diagnosis.effects:
-        sizes = ", ".join(
-            f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
-            f"{at_its_limit(each)}"
-            for parameter, each in effect.parameters.items()
-        )
+        sizes = effect_sizes(effect)
         others = effect_names(list(effect.confused_with), "or")
         doubt = f", or {others}" if others else ""
         named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
     return " and ".join(named)
+
+
+def effect_sizes(effect: NamedEffect) -> str:
+    """Sizes of an effect and what is not determined of it: `force 8.2 N, distance 1.1 mm`."""
+    known = [
+        f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
+        f"{at_its_limit(each)}"
+        for parameter, each in effect.parameters.items()
+    ]
+    left = [
+        f"{_stem(parameter, each.unit)} {undetermined_words(each)}"
+        for parameter, each in effect.undetermined.items()
+    ]
+    return ", ".join([*known, *left])
 
 
 def _unsure(diagnosis: Diagnosis) -> str:

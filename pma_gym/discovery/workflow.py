@@ -20,6 +20,7 @@ from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.held_out import fold_of_rows, unseen
 from pma_gym.discovery.journal import Journal
 from pma_gym.discovery.leftovers import left_over, relearnt
+from pma_gym.discovery.nested_laws import nested
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters
 from pma_gym.discovery.preparation import prepared
@@ -123,7 +124,7 @@ class _Work:
         named, words = prepared(named, given)
         words = (*said, *words)
         trials = [each.trial for each in named]
-        journal = Journal(self.folder, trials, given, f"diagnosis 2 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named))
         own = own_parameters(given)
@@ -151,6 +152,7 @@ class _Work:
                 else _nothing(bench, refitted)
             ),
         )
+        selection = self._timed("nested laws", lambda: self._nested(selection))
         found = Findings(
             named=tuple(named),
             given=given,
@@ -198,6 +200,20 @@ class _Work:
                 "commands and the model's drive and force"
             )
         return found
+
+    def _nested(self, selection: Selection) -> Selection:
+        """Without the parameters of effects that the trials do not determine."""
+        if not selection.chosen:
+            return selection
+        less = nested(
+            selection.bench,
+            selection.fit,
+            selection.chosen,
+            lambda done, total: self._tell("nested laws", done, total),
+        )
+        return replace(
+            selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined
+        )
 
     def _confirmed(self, found: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""

@@ -112,6 +112,7 @@ COULOMB_FRICTION = Effect(
     port="slide_force",
     parameters=CoulombFriction,
     held=("presliding",),
+    ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     path=friction_path,
     path_bend=friction_bend,

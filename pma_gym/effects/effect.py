@@ -46,6 +46,9 @@ class Effect:
         memory_scale: what an error of the memory is counted against, roughly its range.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
+        ties: simpler laws in it, each a row of parameters (field names): where the first equals the
+            second, the others do nothing. A diagnosis takes the simpler law where its data do not
+            refuse it.
     """
 
     name: str
@@ -61,6 +64,7 @@ class Effect:
     memory_scale: float = 1.0
     memories: int = 1
     held: tuple[str, ...] = ()
+    ties: tuple[tuple[str, ...], ...] = ()
 
     @cached_property
     def quantities(self) -> dict[str, Quantity]:

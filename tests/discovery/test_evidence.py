@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.evidence import FARTHEST, Evidence
+from pma_gym.discovery.assumed_range import FARTHEST
+from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.noise import Whitening, white_noise
 from tests.discovery.laboratory import LEVELS, OFF, STATION, measured
 
