@@ -9,7 +9,8 @@ which know its equations exactly:
 
 - the oracle (`controllers.oracle`), which knows its state and memories too and plans 0.32 s ahead,
   at 100 and at 384 decisions a second;
-- the exact inverse of the model (`controllers.motion`), at 100 and at 384 periods a second.
+- the exact inverse of the model (`controllers.models.nominal_motion`), at 100 and at 384 periods a
+  second.
 
 The oracle is not proven to be the optimum: it may lie some thousandths of a degree lower. No
 controller that is shipped comes closer; a test holds that.
@@ -20,7 +21,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from benchmarks.open_loop import open_loop_positions
-from controllers.motion import nominal_motion
+from controllers.models.nominal_motion import nominal_motion
 from controllers.oracle import Oracle
 from pma_gym.envs import PMAEnv, Station
 from pma_gym.metrics import SAMPLE_RATE_HZ

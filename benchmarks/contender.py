@@ -13,8 +13,8 @@ from types import ModuleType
 import controllers.controller
 from controllers import CONTROLLERS
 from controllers.controller import Controller
+from controllers.policies.policy_file import PolicyError, policy_pair
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
-from controllers.policy_file import PolicyError, policy_pair
 
 PROTOCOL = Path(controllers.controller.__file__)
 """File that says what a controller is."""

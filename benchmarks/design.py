@@ -44,7 +44,7 @@ from benchmarks.tune import CONTROLLERS as TUNED
 from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from controllers import CONTROLLERS
-from controllers.designs import KINDS, SCHEMA, loop_name
+from controllers.design.designs import KINDS, SCHEMA, loop_name
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
 from pma_gym.envs import PMAEnv

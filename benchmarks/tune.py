@@ -49,7 +49,7 @@ from benchmarks.tuning.job import Job
 from benchmarks.tuning.kept import KeptRows, name_of
 from benchmarks.tuning.loop import lambda_tuning
 from benchmarks.worker import ProcessDied
-from controllers.gains import GAINS_FILE, SCHEMA, Gains, column_names
+from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
 from controllers.pid import PID, FeedforwardPID
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json
@@ -65,7 +65,7 @@ PRESSURES_KPA = {
     "triangle_high": (450,),
 }
 """Pressures that trials begin at, by task; between them gains are interpolated. Tasks of one kind
-(`controllers.designs.task_kind`) fill one table, whose pressures rise."""
+(`controllers.design.designs.task_kind`) fill one table, whose pressures rise."""
 
 LOOPS = ((100.0, 0.0), (50.0, 0.02))
 """Control rates (Hz), and how late commands are with each (s)."""

@@ -4,19 +4,19 @@ from collections.abc import Callable
 
 from controllers.adrc import ADRC
 from controllers.controller import Controller, Reference
-from controllers.exercise_mpc import ExerciseMPC
-from controllers.feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
+from controllers.exercise.exercise_mpc import ExerciseMPC
+from controllers.exercise.moment_pid import MomentPID
+from controllers.exercise.scheduled_pressure import ConstantPressure, ScheduledPressure
+from controllers.exercise.speed_pid import SpeedPID
 from controllers.ilc import ILC
+from controllers.improved_feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
 from controllers.lqg import LQG
-from controllers.moment_pid import MomentPID
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID, FeedforwardPID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
-from controllers.practised_policy import PractisedPolicy
-from controllers.scheduled_pressure import ConstantPressure, ScheduledPressure
+from controllers.policy_with_ilc import PractisedPolicy
 from controllers.sliding_mode import SlidingMode
-from controllers.speed_pid import SpeedPID
 
 CONTROLLERS: dict[str, Callable[[], Controller]] = {
     "serres_replay": SerresReplay,

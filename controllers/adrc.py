@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.designs import designed
-from controllers.lag_control import LagControl
-from controllers.lags import LagObserver, Place
-from controllers.motion import NominalMotion
+from controllers.design.designs import designed
+from controllers.design.observer_feedback import LagControl
+from controllers.models.lag_model import LagObserver, Place
+from controllers.models.nominal_motion import NominalMotion
 from controllers.pid import nominal_offset
 
 
@@ -35,14 +35,14 @@ DEFAULTS = {
     "rotation": Settings(0.6, 0.35),
     "contraction": Settings(0.5, 0.45),
 }
-"""Settings by kind of task for what `controllers/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
 
 
 class ADRC(LagControl[Settings]):
     """Cancels an estimated disturbance, and is left with a known lag to control.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
-    lag (motor) or two (regulator) behind a dead time (`controllers.lags`):
+    lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`):
 
         prod_i (tau_i d/dt + 1) x = g (v + d),   d'' = 0,   e(t) = x(t - dead time)
 

@@ -18,9 +18,9 @@ class Controller(Protocol):
 
     A controller may keep what it needs between calls; `reset` makes it new. It never sees the
     plant, only what the station's sensors say. One that can do some kinds of task only
-    (`controllers.designs.kind_of`) may have them as an attribute `kinds`; one that runs a shipped
-    policy has its algorithm's name as an attribute `algorithm`, so that a comparison's journal
-    knows that its scores depend on that policy's files.
+    (`controllers.design.designs.kind_of`) may have them as an attribute `kinds`; one that runs a
+    shipped policy has its algorithm's name as an attribute `algorithm`, so that a comparison's
+    journal knows that its scores depend on that policy's files.
     """
 
     name: str

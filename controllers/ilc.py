@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_opening
 
 from controllers.controller import Reference
-from controllers.designs import designed
-from controllers.gains import scheduled_gains
-from controllers.lags import LOOSE_N
-from controllers.lifted import LiftedPlant
-from controllers.motion import NominalMotion, nominal_motion
+from controllers.design.designs import designed
+from controllers.design.gains import scheduled_gains
+from controllers.models.lag_model import LOOSE_N
+from controllers.models.lifted_model import LiftedPlant
+from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.pid import FeedforwardPID
 from pma_gym.envs import Reading, Station
 
@@ -41,7 +41,7 @@ DEFAULTS = {
     "rotation": Settings(3.0, 0.3, 0.3),
     "contraction": Settings(3.0, 0.3, 0.3),
 }
-"""Settings by kind of task for what `controllers/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
 
 LEAST_STEPS = 10
 """Fewest steps of a trial that are learned from: others say nothing of a motion."""
@@ -66,7 +66,7 @@ class ILC:
         d_j = argmin |o_j - G d|^2 + rho |D2 d|^2
 
     That is the inverse of G behind a low-pass without phase, G'G / (G'G + rho D2'D2): a Q-filter
-    whose corner rho sets (`controllers.lifted`).
+    whose corner rho sets (`controllers.models.lifted_model`).
 
     v_(j+1) = v_j + k_j d_j. A gain of 1 would pass every trial's noise on to the next. With b_j the
     power of what is still to be learned, r of what differs from trial to trial, and a model that is

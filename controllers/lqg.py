@@ -6,18 +6,18 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import solve_discrete_are
 
-from controllers.cable import free_rotor
 from controllers.controller import Reference
-from controllers.designs import designed, task_kind
-from controllers.kalman import (
+from controllers.design.designs import designed, task_kind
+from controllers.models.cable import free_rotor
+from controllers.models.local_model import FINE, VOLTAGE_LIMIT, LocalModel, Stroke
+from controllers.models.nominal_motion import nominal_motion
+from controllers.observers.deviation_filter import (
     SHARE,
     SHARE_TIME_S,
     DeviationFilter,
     Unknowns,
     with_disturbance,
 )
-from controllers.local_model import FINE, VOLTAGE_LIMIT, LocalModel, Stroke
-from controllers.motion import nominal_motion
 from pma_gym.envs import Reading, Station
 
 if TYPE_CHECKING:
@@ -70,10 +70,10 @@ class LQG:
 
         v = V + V_P(P) - k(y) x - d - s H,   u = min(max(v, 0), 10 V)
 
-    V is the voltage that the nominal plant needs (`controllers.motion`), V_P what the measured
-    pressure adds to it, x the deviation from the plan, d and s H the voltage that the nominal model
-    does not know: as estimated by `controllers.kalman`, and taken forward, over the delays of
-    readings and commands, to when u will be in force.
+    V is the voltage that the nominal plant needs (`controllers.models.nominal_motion`), V_P what
+    the measured pressure adds to it, x the deviation from the plan, d and s H the voltage that the
+    nominal model does not know: as estimated by `controllers.observers.deviation_filter`, and taken
+    forward, over the delays of readings and commands, to when u will be in force.
 
     k minimises the sum of (y / g)^2 + r v^2 along the linearised plant, g its static gain: the
     solution of the discrete Riccati equation at 11 places of the stroke, mixed between them. That

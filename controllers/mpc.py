@@ -5,14 +5,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.bank_design import BankDesign, bank_design
-from controllers.bounded_program import BoundedProgram
 from controllers.controller import Reference
-from controllers.damping_bank import DampingBank
-from controllers.designs import designed
-from controllers.linear_motion import VOLTAGE_LIMIT, linear_motion
-from controllers.motion import nominal_motion
-from controllers.nominal import Nominal
+from controllers.design.designs import designed
+from controllers.design.quadratic_program import BoundedProgram
+from controllers.models.linear_motion import VOLTAGE_LIMIT, linear_motion
+from controllers.models.model_key import Nominal
+from controllers.models.nominal_motion import nominal_motion
+from controllers.observers.filter_bank import DampingBank
+from controllers.observers.filter_bank_design import BankDesign, bank_design
 from pma_gym.envs import Reading, Station
 from pma_gym.plant.plant import regulator_voltage
 
@@ -38,7 +38,7 @@ DEFAULTS = {
     "rotation": Settings(0.3, 5.0, 1.0),
     "contraction": Settings(0.3, 10.0, 1.0, 0.3),
 }
-"""Settings by kind of task where `controllers/designs.json` has none."""
+"""Settings by kind of task where `controllers/design/designs.json` has none."""
 
 BOUNDS = {"effort": (1e-2, 1e2), "wander": (0.5, 100.0), "jolt": (0.1, 10.0)}
 """Within which a design searches."""
@@ -55,11 +55,11 @@ class PreviewMPC:
     """Model predictive control along the nominal motion, with preview and a disturbance observer.
 
     Before a trial the nominal plant is simulated under the feed-forward's voltages u_ff and
-    linearised on the way (`controllers.linear_motion`). In every period, from what a bank of Kalman
-    filters knows of the deviations from that motion and of the forces and offsets that the model
-    does not know (`controllers.bank_design`, `controllers.damping_bank`), it foresees the error at
-    the ends of the coming N periods, e = f + G v, linear in the deviations v of their voltages,
-    and chooses
+    linearised on the way (`controllers.models.linear_motion`). In every period, from what a bank of
+    Kalman filters knows of the deviations from that motion and of the forces and offsets that the
+    model does not know (`controllers.observers.filter_bank_design`,
+    `controllers.observers.filter_bank`), it foresees the error at the ends of the coming N periods,
+    e = f + G v, linear in the deviations v of their voltages, and chooses
 
         min  |f + G v|^2 / h^2 + rho * sum over i of (v_i - v_(i-1))^2
         0 <= u_ff + v <= 10 V
@@ -72,7 +72,8 @@ class PreviewMPC:
     that it is estimated to have, begins to pull.
 
     If the voltages that minimise without limits keep them, they are the answer; else OSQP searches
-    from the last answer on (`controllers.bounded_program`). If it fails, the last plan goes on.
+    from the last answer on (`controllers.design.quadratic_program`). If it fails, the last plan
+    goes on.
 
     Args:
         settings: instead of the designed ones.

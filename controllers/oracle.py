@@ -10,12 +10,13 @@ In every period it plans the voltages of the coming 0.32 s, each in 0-10 V, chan
     sum over times t of (position(t) - reference(t))^2
 
 least, and commands the first of them. At first the times are as dense as those of the scores, then
-10 ms apart and weighted for it (`controllers.horizon`); none lies after the trial's end. Changes of
-the plan of the period before are searched for by least squares (`controllers.plan_search`) with the
-true plant's own simulation (`controllers.foresight`). A plan's last period is new each time; there
-it goes on as the voltages do that the true station's inverse needs for the reference
-(`controllers.motion`). Those voltages themselves are tried too, and pushes of a period where the
-cable hangs loose: it gives no slope to follow.
+10 ms apart and weighted for it (`controllers.design.horizon`); none lies after the trial's end.
+Changes of the plan of the period before are searched for by least squares
+(`controllers.design.bounded_least_squares`) with the true plant's own simulation
+(`controllers.models.prediction`). A plan's last period is new each time; there it goes on as the
+voltages do that the true station's inverse needs for the reference
+(`controllers.models.nominal_motion`). Those voltages themselves are tried too, and pushes of a
+period where the cable hangs loose: it gives no slope to follow.
 
 It is close to the optimum, not proven to be it.
 """
@@ -28,10 +29,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.controller import Reference
-from controllers.foresight import PLANS, Commands, Foresight
-from controllers.horizon import horizon
-from controllers.motion import nominal_motion
-from controllers.plan_search import Errors, Space, best_plan
+from controllers.design.bounded_least_squares import Errors, Space, best_plan
+from controllers.design.horizon import horizon
+from controllers.models.nominal_motion import nominal_motion
+from controllers.models.prediction import PLANS, Commands, Foresight
 from pma_gym.envs import Reading, Station
 from pma_gym.units import SI_FACTORS
 

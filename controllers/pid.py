@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from controllers.controller import Reference
-from controllers.feedforward import ImprovedFeedforward
-from controllers.gains import Gains, scheduled_gains
+from controllers.design.gains import Gains, scheduled_gains
+from controllers.improved_feedforward import ImprovedFeedforward
 from pma_gym.envs import Reading, Station
 
 if TYPE_CHECKING:
@@ -49,11 +49,11 @@ class PID:
     The derivative is of the error: on a ramp that of the measurement alone would push against
     the motion all the time, which the integral would have to make good.
 
-    Gains come from `controllers/gains.json`, where `benchmarks/tune.py` wrote them: of the nearest
-    loop (control rate and delay) and the kind of task, linear in pressure between the pressures
-    that it tuned at and constant beyond, and varying with the reference (`Gains.scaled`). They are
-    those under the model's name, else, for a model of one's own, those of the shipped model of its
-    plant (`station`, `cascade`).
+    Gains come from `controllers/design/gains.json`, where `benchmarks/tune.py` wrote them: of the
+    nearest loop (control rate and delay) and the kind of task, linear in pressure between the
+    pressures that it tuned at and constant beyond, and varying with the reference (`Gains.scaled`).
+    They are those under the model's name, else, for a model of one's own, those of the shipped
+    model of its plant (`station`, `cascade`).
 
     Args:
         gains: gains to use instead of the scheduled ones, in SI of the task.

@@ -4,14 +4,14 @@ import math
 from pathlib import Path
 
 from controllers.controller import Reference
-from controllers.designs import loop_name, task_kind
-from controllers.network import Network
-from controllers.pilot import Pilot
-from controllers.policy_document import PolicyError
-from controllers.policy_file import PolicyFile, load_policy_file
+from controllers.design.designs import loop_name, task_kind
+from controllers.policies.adapter import Pilot
+from controllers.policies.document import PolicyError
+from controllers.policies.network import Network
+from controllers.policies.policy_file import PolicyFile, load_policy_file
 from pma_gym.envs import Reading, Station
 
-POLICIES = Path(__file__).with_name("policies")
+POLICIES = Path(__file__).parent / "policies" / "shipped"
 """Folder of the shipped policies, each called `{kind of task}-{loop}-{algorithm}`."""
 
 SHOWN = 3
@@ -22,7 +22,7 @@ class Policy:
     """A trained policy on the station that it was trained for.
 
     Args:
-        path: its file, see `controllers.policy_file`.
+        path: its file, see `controllers.policies.policy_file`.
         anywhere: whether it may run at another control rate or delay than it was trained with, to
             see what becomes of it. What it sees must be the same all the same.
 

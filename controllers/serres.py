@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from controllers.controller import Reference
-from controllers.designs import must_give_a_position
+from controllers.design.designs import must_give_a_position
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.envs import Reading, Station
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm

@@ -4,10 +4,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controllers.designs import designed
-from controllers.lag_control import LagControl
-from controllers.lags import LagObserver, Place
-from controllers.motion import NominalMotion
+from controllers.design.designs import designed
+from controllers.design.observer_feedback import LagControl
+from controllers.models.lag_model import LagObserver, Place
+from controllers.models.nominal_motion import NominalMotion
 
 
 class Settings(NamedTuple):
@@ -38,7 +38,7 @@ DEFAULTS = {
     "rotation": Settings(1.5, 0.35, 0.03),
     "contraction": Settings(1.2, 0.4, 0.05),
 }
-"""Settings by kind of task for what `controllers/designs.json` does not give."""
+"""Settings by kind of task for what `controllers/design/designs.json` does not give."""
 
 
 class Surface(NamedTuple):
@@ -57,8 +57,8 @@ class SlidingMode(LagControl[Settings]):
     """Drives the error to a surface s = 0 on which it dies out, and holds it there.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
-    lag (motor) or two (regulator) behind a dead time (`controllers.lags`), x in what follows, in
-    sampled form x(k+1) = A x(k) + b (v(k) + d(k)). The surface is s = c x, with
+    lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`), x in what
+    follows, in sampled form x(k+1) = A x(k) + b (v(k) + d(k)). The surface is s = c x, with
 
         c x = x,   or   c x = x' + omega_s x   with two lags: on it x dies out as exp(-omega_s t).
 

@@ -31,9 +31,9 @@ from functools import cached_property
 import numpy as np
 
 from benchmarks.budget.statics import GRID_V, Statics, fitted_quadratic
-from controllers.inverse import TAKE_UP_S
-from controllers.motion import nominal_motion
-from controllers.muscle import Muscle
+from controllers.models.inverse import TAKE_UP_S
+from controllers.models.muscle import Muscle
+from controllers.models.nominal_motion import nominal_motion
 from controllers.serres import PROFILE_RADIUS
 from pma_gym.envs import Station
 from pma_gym.plant.model import Model

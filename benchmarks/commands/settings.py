@@ -61,7 +61,7 @@ def design(
 ) -> None:
     """Search the settings of controllers on training stations; without --out, the shipped file."""
     from benchmarks.design import run_design
-    from controllers.designs import DESIGNS_FILE
+    from controllers.design.designs import DESIGNS_FILE
 
     try:
         complete = run_design(listed(controllers), out or DESIGNS_FILE, seed, jobs, again, only)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from benchmarks.comparison.statistics import Draws, resample
 from benchmarks.comparison.suite import NOMINAL, Entry, Episode, FrozenSuite
 from benchmarks.contender import Contender
-from controllers.designs import kind_of
+from controllers.design.designs import kind_of
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.tasks import EVERY_TASK, Task, named_task
 from pma_gym.units import SI_FACTORS

@@ -16,7 +16,7 @@ SOURCES = (
     "pma_gym/**/*.toml",
     "pma_gym/**/*.csv",
     "controllers/**/*.py",
-    "controllers/*.json",
+    "controllers/design/*.json",
     "benchmarks/rollout.py",
     "benchmarks/contender.py",
     "benchmarks/suite.py",

@@ -14,7 +14,7 @@ from benchmarks.comparison.stations import DrawnStation, draw_station
 from benchmarks.comparison.target import Target, parse_target
 from benchmarks.contender import Contender
 from benchmarks.suite import SUITES, SuiteError
-from controllers import designs
+from controllers.design import designs
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.envs.options import parse_options

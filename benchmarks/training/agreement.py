@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.network import Network, Weights
+from controllers.policies.network import Network, Weights
 from pma_gym.envs.observation import BOUND
 
 AGREEMENT = 1e-6

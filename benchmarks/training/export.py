@@ -7,10 +7,10 @@ import numpy as np
 from gymnasium import spaces
 
 from benchmarks.training.agreement import ExportError, check_agreement
-from controllers.form import Form
-from controllers.network import Layer, Scaling, Weights
-from controllers.policy_file import PolicyFile
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.network import Layer, Scaling, Weights
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import PolicyFile
 
 if TYPE_CHECKING:
     from stable_baselines3.common.base_class import BaseAlgorithm

@@ -16,9 +16,9 @@ from benchmarks.training.preset import Preset, PresetError, load_preset
 from benchmarks.training.product import policy_name, policy_of
 from benchmarks.training.run import Order, Point, Trained, train
 from benchmarks.training.validation import unit_of
-from controllers.designs import kind_of
-from controllers.pilot import base_of
-from controllers.policy_file import save_policy_file
+from controllers.design.designs import kind_of
+from controllers.policies.adapter import base_of
+from controllers.policies.policy_file import save_policy_file
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.tasks import EXERCISES, named_task
 

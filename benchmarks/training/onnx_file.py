@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.files import write_bytes
 from benchmarks.training.agreement import ExportError, check_agreement
-from controllers.network import Scaling
-from controllers.policy_file import PolicyFile
+from controllers.policies.network import Scaling
+from controllers.policies.policy_file import PolicyFile
 
 OPSET, IR_VERSION = 17, 8
 """Of 2022: runtimes that came out since read it."""

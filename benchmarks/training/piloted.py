@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
 from benchmarks.training.reward import bounded
-from controllers.form import HIGHEST_V, Form
-from controllers.pilots import Pilots
-from controllers.view import View
+from controllers.policies.action_mapping import HIGHEST_V, Form
+from controllers.policies.batch_adapter import Pilots
+from controllers.policies.observation_spec import View
 from pma_gym.envs import PMAVectorEnv, Station
 from pma_gym.envs.observation import BOUND
 from pma_gym.envs.sb3 import EngineVecEnv

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from benchmarks.training.reward import bounded
 from benchmarks.training.stations import Stations
-from controllers.form import Form
-from controllers.pilot import Pilot
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.adapter import Pilot
+from controllers.policies.observation_spec import View
 from pma_gym.envs import PMAEnv
 from pma_gym.envs.observation import BOUND
 

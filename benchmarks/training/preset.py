@@ -13,9 +13,9 @@ from typing import Any
 
 from benchmarks.training.settings import mapping, nearest, network, real, setting, whole
 from benchmarks.training.stations import training_recipe
-from controllers.form import Form
-from controllers.pilot import base_of
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.adapter import base_of
+from controllers.policies.observation_spec import View
 from pma_gym.documents import is_file, read_yaml
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.envs.options import parse_options, parse_task

@@ -8,8 +8,8 @@ from benchmarks.training.export import policy_from_sb3
 from benchmarks.training.preset import Preset
 from benchmarks.training.run import Order, Trained
 from benchmarks.training.validation import unit_of
-from controllers.designs import loop_name, task_kind
-from controllers.policy_file import PolicyFile
+from controllers.design.designs import loop_name, task_kind
+from controllers.policies.policy_file import PolicyFile
 from pma_gym.envs import PMAEnv, Station
 
 TITLES = {"ppo": "PPO", "sac": "SAC", "td3": "TD3", "tqc": "TQC"}

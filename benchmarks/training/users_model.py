@@ -11,10 +11,10 @@ import gymnasium as gym
 
 from benchmarks.training.export import ExportError, policy_from_sb3
 from benchmarks.training.onnx_file import onnx_bytes
-from controllers.designs import task_kind
-from controllers.form import MIDDLE_V, Form
-from controllers.policy_file import PolicyFile, policy_pair, save_policy_file
-from controllers.view import View
+from controllers.design.designs import task_kind
+from controllers.policies.action_mapping import MIDDLE_V, Form
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import PolicyFile, policy_pair, save_policy_file
 from pma_gym.documents import parse_json
 from pma_gym.envs import ENVIRONMENTS, PMAEnv
 from pma_gym.files import check_output, replace_file

@@ -9,8 +9,8 @@ import numpy as np
 from benchmarks.tuning.job import Job
 from benchmarks.tuning.loop import Loop
 from controllers.controller import Reference
-from controllers.gains import Gains
-from controllers.motion import NominalMotion, nominal_motion
+from controllers.design.gains import Gains
+from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.pid import PID, FeedforwardPID
 from pma_gym.effects.effect import Value
 from pma_gym.envs import PMAEnv, Station

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from controllers.designs import loop_name, task_kind
+from controllers.design.designs import loop_name, task_kind
 from controllers.pid import PID
 from pma_gym.data.protocol import Protocol
 from pma_gym.envs import Station

@@ -8,7 +8,7 @@ from benchmarks.damaged import say_damaged
 from benchmarks.environment_info import ROOT, git_state
 from benchmarks.files import write_text
 from benchmarks.tuning.job import Job
-from controllers.gains import Gains
+from controllers.design.gains import Gains
 from pma_gym.document_shape import ListOf, Real, check_shape
 from pma_gym.documents import read_json
 

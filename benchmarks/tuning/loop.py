@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.tuning.job import Job
 from benchmarks.tuning.plant import linearised, sampled
-from controllers.gains import Gains
+from controllers.design.gains import Gains
 from controllers.pid import PID, linear_law
 
 

@@ -11,8 +11,8 @@ from benchmarks.training.study.tables import (
     robustness_table,
     training_table,
 )
+from controllers.policies.policy_file import load_policy_file
 from controllers.policy import POLICIES, shipped_policies
-from controllers.policy_file import load_policy_file
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
 

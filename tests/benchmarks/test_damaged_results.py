@@ -11,7 +11,7 @@ from benchmarks.hidden_effects.job import JobError, Order, run_block
 from benchmarks.measured.stages import Stages
 from benchmarks.suite import SuiteError
 from benchmarks.tuning.kept import KeptRows
-from controllers.gains import Gains
+from controllers.design.gains import Gains
 from tests.benchmarks.cheap_diagnosis import by_size
 from tests.fuzz.test_fuzz_documents import ROW
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from benchmarks import design as designing
 from benchmarks.__main__ import app
 from benchmarks.design import DesignError, Found, run_design, searches_of
-from controllers.designs import DESIGNS_FILE
+from controllers.design.designs import DESIGNS_FILE
 
 TABLES = {
     "robust/displacement",

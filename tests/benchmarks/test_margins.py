@@ -18,8 +18,8 @@ from benchmarks.margins import (
     worst,
 )
 from benchmarks.tuning.plant import linearised, sampled
-from controllers.feedforward import ImprovedFeedforward
-from controllers.gains import Gains
+from controllers.design.gains import Gains
+from controllers.improved_feedforward import ImprovedFeedforward
 from controllers.pid import PID, FeedforwardPID, linear_law
 from pma_gym.envs import Reading, Station
 from pma_gym.plant.model import load_model

@@ -50,7 +50,7 @@ def test_a_copy_in_the_middle_of_a_trial_goes_on_alike_and_alone(name):
 
 
 def test_a_copy_of_a_program_that_met_its_limits_goes_on_with_the_same_bits():
-    from controllers.bounded_program import BoundedProgram
+    from controllers.design.quadratic_program import BoundedProgram
 
     program, generator = BoundedProgram(3), np.random.default_rng(5)
 

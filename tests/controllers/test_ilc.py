@@ -7,8 +7,8 @@ import pytest
 
 from controllers import ILC
 from controllers.ilc import BOUNDS, DEFAULTS, LearningGain, Settings
-from controllers.lifted import LiftedPlant
-from controllers.motion import nominal_motion
+from controllers.models.lifted_model import LiftedPlant
+from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
 
 PERIOD = 0.01

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controllers import ImprovedFeedforward, SerresReplay
-from controllers.inverse import inverse_of
+from controllers.models.inverse import inverse_of
 from pma_gym.data.serres2008 import pressures
 from pma_gym.envs import Station
 from pma_gym.plant.model import load_model

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from controllers import LQG, ImprovedFeedforward
-from controllers.cable import Cable, free_rotor
-from controllers.kalman import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
-from controllers.local_model import LocalModel
 from controllers.lqg import BOUNDS, DEFAULTS, Settings, regulator, steady_gain
-from controllers.motion import nominal_motion
-from controllers.pressure import PressureFilter
+from controllers.models.cable import Cable, free_rotor
+from controllers.models.local_model import LocalModel
+from controllers.models.nominal_motion import nominal_motion
+from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
+from controllers.observers.pressure_filter import PressureFilter
 from pma_gym.envs import PMAEnv, Reading, Station
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS

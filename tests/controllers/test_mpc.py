@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from controllers import PID, PreviewMPC
-from controllers.bounded_program import ACCURACY, BoundedProgram, imported_osqp
+from controllers.design.quadratic_program import ACCURACY, BoundedProgram, imported_osqp
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import varied_station

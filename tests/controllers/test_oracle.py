@@ -5,9 +5,9 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
-from controllers.foresight import PLANS, Commands, Foresight
-from controllers.horizon import HORIZON_S, LONGEST, block_lengths, horizon
-from controllers.plan_search import Space, best_plan
+from controllers.design.bounded_least_squares import Space, best_plan
+from controllers.design.horizon import HORIZON_S, LONGEST, block_lengths, horizon
+from controllers.models.prediction import PLANS, Commands, Foresight
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.plant import Condition, Plant

@@ -11,14 +11,14 @@ import pytest
 pytest.importorskip("safetensors")
 
 from controllers.controller import Controller
-from controllers.form import Form
-from controllers.network import Network
-from controllers.pilot import Pilot
+from controllers.policies.action_mapping import Form
+from controllers.policies.adapter import Pilot
+from controllers.policies.network import Network
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import PolicyError, save_policy_file
 from controllers.policy import Policy, ShippedPolicy, shipped_policies
-from controllers.policy_file import PolicyError, save_policy_file
-from controllers.view import View
 from pma_gym.envs import PMAEnv
-from tests.controllers.policies import drawn_policy
+from tests.controllers.drawn_policies import drawn_policy
 
 KINDS = [
     (View("environment", 2, 3), Form("direct", 5.0)),

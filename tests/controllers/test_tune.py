@@ -14,7 +14,7 @@ from benchmarks.tuning.job import Job
 from benchmarks.tuning.kept import KeptRows
 from benchmarks.tuning.loop import Loop, lambda_tuning
 from benchmarks.worker import ProcessDied
-from controllers.gains import GAINS_FILE, Gains, scheduled_gains
+from controllers.design.gains import GAINS_FILE, Gains, scheduled_gains
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant

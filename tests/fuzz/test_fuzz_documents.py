@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from benchmarks.comparison.journal import case_rows
 from benchmarks.comparison.suite import parse_suite
 from benchmarks.training.preset import PresetError, load_preset
-from controllers.policy_document import PolicyError, parsed_document
-from controllers.tensor_header import check_header
+from controllers.policies.document import PolicyError, parsed_document
+from controllers.policies.tensor_header import check_header
 from pma_gym.data.dataset_toml import read_description
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.documents import parse_json, parse_toml, parse_yaml
@@ -54,9 +54,9 @@ SUITES = [content for content in contents("benchmarks/suites/*.toml") if b"schem
 SUITE_TABLES = [tomllib.loads(content.decode()) for content in SUITES]
 PRESETS = contents("benchmarks/training/presets/*/*.yml")
 PRESET_TABLES = [yaml.safe_load(content) for content in PRESETS]
-POLICIES = contents("controllers/policies/*.json")
+POLICIES = contents("controllers/policies/shipped/*.json")
 POLICY_TABLES = [json.loads(content) for content in POLICIES]
-WEIGHTS = [content[:4096] for content in contents("controllers/policies/*.safetensors")]
+WEIGHTS = [content[:4096] for content in contents("controllers/policies/shipped/*.safetensors")]
 DATASETS = [
     {
         "title": "Bench",

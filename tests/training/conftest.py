@@ -10,8 +10,8 @@ import torch
 
 from benchmarks.training import environments
 from benchmarks.training.preset import Preset
-from controllers.form import Form
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.observation_spec import View
 
 SMALL = {
     "ppo": {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},

@@ -23,10 +23,10 @@ from benchmarks.training.stations import Stations
 from benchmarks.training.study.operators import SEED, figures_of, table_of
 from benchmarks.training.validation import measure_of
 from controllers import ConstantPressure
-from controllers.form import Form
+from controllers.policies.action_mapping import Form
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import Policy, shipped_policies
-from controllers.policy_file import load_policy_file, save_policy_file
-from controllers.view import View
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 from pma_gym.plant.model import load_model
 

@@ -25,17 +25,17 @@ from benchmarks.training.agreement import AGREEMENT, ExportError, drawn_observat
 from benchmarks.training.export import weights_from_sb3
 from benchmarks.training.onnx_file import onnx_bytes
 from benchmarks.training.users_model import algorithm_of
-from controllers.form import Form
-from controllers.network import Network
+from controllers.policies.action_mapping import Form
+from controllers.policies.network import Network
+from controllers.policies.observation_spec import View
+from controllers.policies.policy_file import load_policy_file
 from controllers.policy import Policy
-from controllers.policy_file import load_policy_file
-from controllers.view import View
 from pma_gym.envs import Station
 from pma_gym.envs.sb3_policy import LeanMlpPolicy
 from pma_gym.envs.sb3_ppo import LeanPPO
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS
-from tests.controllers.policies import drawn_policy
+from tests.controllers.drawn_policies import drawn_policy
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
 LEARNING = {"learning_starts": 16, "buffer_size": 500, "batch_size": 16}

@@ -9,8 +9,8 @@ import gymnasium as gym
 
 from benchmarks.training.piloted import PilotedVecEnv
 from benchmarks.training.piloted_env import PilotedEnv
-from controllers.form import Form
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.observation_spec import View
 from pma_gym.plant.model import load_model
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"

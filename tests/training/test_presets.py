@@ -20,7 +20,7 @@ from benchmarks.training.piloted_env import PilotedEnv
 from benchmarks.training.preset import ALGORITHMS, PRESETS, PresetError, load_preset, preset_names
 from benchmarks.training.product import station_of
 from benchmarks.training.settings import network
-from controllers.view import View
+from controllers.policies.observation_spec import View
 from pma_gym.envs import ENVIRONMENTS
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"

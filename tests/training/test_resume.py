@@ -105,8 +105,8 @@ PROCESS = """
 import hashlib, sys, pathlib
 from benchmarks.training import environments, run
 from benchmarks.training.preset import Preset
-from controllers.form import Form
-from controllers.view import View
+from controllers.policies.action_mapping import Form
+from controllers.policies.observation_spec import View
 environments.VALIDATION = 1
 preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", View("tracking", 2, 2),
     Form("increment", 0.5), "", {"control_rate_hz": 10.0, "pressure_kpa": 300.0}, 4, 480, 0.5,

@@ -13,10 +13,10 @@ from benchmarks.training.study.cells import CHANGES, cells
 from benchmarks.training.study.figures import reached
 from benchmarks.training.study.pooled import Pool
 from benchmarks.training.study.ship import best_policies, card, ship
+from controllers.policies.policy_file import load_policy_file, save_policy_file
 from controllers.policy import shipped_policies
-from controllers.policy_file import load_policy_file, save_policy_file
 from pma_gym.envs import PMAEnv
-from tests.controllers.policies import drawn_policy
+from tests.controllers.drawn_policies import drawn_policy
 
 
 @pytest.fixture(scope="module")

@@ -14,7 +14,7 @@ It is an achieved figure: the optimum lies at or below it. Nothing that has to m
 predict can be expected there.
 
 Source:
-    Levenberg-Marquardt; the lifted form of a trial as `controllers.lifted`.
+    Levenberg-Marquardt; the lifted form of a trial as `controllers.models.lifted_model`.
 """
 
 import math

@@ -25,7 +25,7 @@ def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
     """Train what has no policy yet; an interrupted study goes on."""
     from benchmarks.training.study.cells import cells
     from benchmarks.training.study.runs import Run, runs, train_all
-    from controllers.policy_file import PolicyFile
+    from controllers.policies.policy_file import PolicyFile
 
     chosen = [cell for cell in cells() if not groups or cell.group in groups.split(",")]
     todo = runs(chosen, out)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from benchmarks.training.job import ENVIRONMENT_OF
 from benchmarks.training.preset import Preset, load_preset
-from controllers.form import MIDDLE_V, Form
+from controllers.policies.action_mapping import MIDDLE_V, Form
 
 HEADLINE = "ppo"
 """Algorithm with the most seeds."""

@@ -12,7 +12,7 @@ from benchmarks.training.study.cells import Cell, cells
 from benchmarks.training.study.judged import PID_FOLDER, SUITES, pools, seed_folders
 from benchmarks.training.study.pooled import Pool
 from benchmarks.training.validation import measure_of
-from controllers.policy_file import PolicyFile, load_policy_file
+from controllers.policies.policy_file import PolicyFile, load_policy_file
 
 
 def study_figures(out: Path) -> dict[str, Any]:

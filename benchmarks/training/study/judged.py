@@ -81,7 +81,7 @@ def _able(suite: FrozenSuite, tasks: Sequence[str], group: Path, algorithm: str)
 
 def suite_loop(suite: FrozenSuite) -> str:
     """Name of a suite's loop."""
-    from controllers.designs import loop_name
+    from controllers.design.designs import loop_name
     from pma_gym.envs import PMAEnv
 
     environment = PMAEnv("displacement", pressure_kpa=300.0, **suite.environment)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from benchmarks.training.product import policy_name, policy_of
 from benchmarks.training.run import Order, train
 from benchmarks.training.study.cells import Cell
-from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
+from controllers.policies.policy_file import PolicyFile, load_policy_file, save_policy_file
 
 
 class Run(NamedTuple):

@@ -8,9 +8,9 @@ from typing import Any
 from benchmarks.training.stations import TRAINING, VALIDATION
 from benchmarks.training.study.judged import seed_folders
 from benchmarks.training.study.operators import table_of
-from controllers.designs import EXERCISE_KINDS
+from controllers.design.designs import EXERCISE_KINDS
+from controllers.policies.policy_file import PolicyFile, load_policy_file, save_policy_file
 from controllers.policy import POLICIES
-from controllers.policy_file import PolicyFile, load_policy_file, save_policy_file
 from pma_gym.envs import ENVIRONMENTS
 
 

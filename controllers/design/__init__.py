@@ -1,0 +1,1 @@
+"""Gains and settings by loop and task, and the optimisation that controllers share."""

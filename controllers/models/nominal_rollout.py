@@ -1,0 +1,86 @@
+"""Trials on the nominal plant before the real one: what comes of voltages, and better voltages."""
+
+import numpy as np
+
+from controllers.models.local_model import VOLTAGE_LIMIT, Stroke
+from controllers.models.operating_range import rest_voltages
+from pma_gym.envs import Station
+from pma_gym.plant.plant import Plant
+
+REPETITIONS = 3
+"""How often voltages are rehearsed."""
+
+LEARNED_SHARE = 0.7
+"""Share of what an error calls for that is learned from a rehearsal."""
+
+WINDOW_S = 0.2
+"""Width of the window (s) over which errors are averaged: some lags of the plant."""
+
+LEAST_LOAD_N = 5.0
+"""Load (N) under which a cable may be slack, and an error tells nothing of the voltage."""
+
+
+def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
+    """What the nominal plant's sensors say at control instants under voltages, without noise.
+
+    Args:
+        station: nominal model, task, pressure, period, action delay.
+        volts: actuator's voltage to be in force in every period (V), shape (steps,); held to
+            0-10 V, and to where the trial begins until the first command is in force.
+    Returns:
+        Contraction (m) and rotation (rad) from the start, load (N), shape (3, steps + 1).
+    """
+    plant, (motor, regulator) = Plant(station.model), rest_voltages(station)
+    moves_regulator = station.task.actuator == "regulator"
+    held = np.clip(np.append(volts, volts[-1]), 0.0, VOLTAGE_LIMIT)
+    held[: round(station.action_delay / station.period)] = regulator if moves_regulator else motor
+    other = np.full(len(held), motor if moves_regulator else regulator)
+    commands = (other, held) if moves_regulator else (held, other)
+    start = plant.settle(motor, regulator_voltage=regulator)
+    times = station.period * np.arange(len(held))
+    states, zero = plant.run(times, *commands, joined=False, condition=start)
+    said = plant.lagged(states, plant.observe(states, zero))
+    found = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
+    found[:2] -= found[:2, :1]
+    return found
+
+
+def position_of(station: Station, said: np.ndarray) -> np.ndarray:
+    """The position that the task asks for (m or rad), shape (n,), of what `rehearsed` returns."""
+    contraction, rotation, _ = said
+    quantity = station.task.protocol.quantity
+    return {"extension": -contraction, "rotation": rotation, "contraction": contraction}[quantity]
+
+
+def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke) -> np.ndarray:
+    """Voltages after some rehearsals, in each of which errors that stay are learned from.
+
+        V[k] += share * mean of e / g over a window about k
+
+    e is the plan less what the sensor says, g the static gain there. An inverse makes no error but
+    for what its steps leave out, as friction's memory of a voltage that was held to a limit; of a
+    few hundredths of a degree in a hold, a third is left. Where a voltage is beyond its limits, or
+    the cable does not pull, it stays, and nothing is learned from there.
+
+    Args:
+        station: as of `rehearsed`.
+        volts: to begin with (V), shape (steps,).
+        wanted: planned position at control instants, as its sensor would say (m or rad), shape
+            (steps + 1,).
+        stroke: how the plant answers.
+    """
+    places = [stroke.nearest(position) for position in wanted[1:].tolist()]
+    gains = np.array([stroke.models[place].gain for place in places])
+    window = np.hanning(2 * round(0.5 * WINDOW_S / station.period) + 3)
+    pulls = "cable" in station.model.parameters
+    for _ in range(REPETITIONS):
+        said = rehearsed(station, volts)
+        error = wanted - position_of(station, said)
+        possible = (volts >= 0.0) & (volts <= VOLTAGE_LIMIT)
+        if pulls:
+            possible &= said[2, 1:] > LEAST_LOAD_N
+        called_for = np.convolve(np.where(possible, error[1:] / gains, 0.0), window, "same")
+        weight = np.convolve(possible, window, "same")
+        step = np.divide(called_for, weight, out=np.zeros_like(volts), where=possible)
+        volts = volts + LEARNED_SHARE * step
+    return volts

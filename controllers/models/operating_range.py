@@ -1,0 +1,67 @@
+"""The local models of a station's task, and what its sensors and voltages are there."""
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from controllers.models.local_model import SENSORS, Stroke, stroke_models
+from controllers.models.model_key import Nominal
+from pma_gym.envs import Station
+from pma_gym.plant import sensors
+from pma_gym.plant.plant import Plant
+
+STROKES_KEPT = 64
+"""Strokes whose local models a process keeps: one a pressure, task and control period."""
+
+
+def stroke_along(positions: np.ndarray, station: Station) -> Stroke:
+    """Local models over the stroke of a motion: the task's range, and beyond where it goes there.
+
+    Args:
+        positions: of the motion (m or rad), shape (n,).
+        station: nominal model, task, pressure, control period.
+    """
+    task, ways = station.task, np.diff(positions)
+    rises, falls = bool(np.any(ways > 0.0)), bool(np.any(ways < 0.0))
+    contracts, relaxes = (rises, falls) if task.actuator == "regulator" else (falls, rises)
+    directions = ("relaxing",) * relaxes + ("contracting",) * contracts
+    return _stroke(
+        Nominal(station.model),
+        *(task.protocol.quantity, task.actuator),
+        rest_voltages(station),
+        station.period,
+        (min(float(positions.min()), 0.0), max(float(positions.max()), task.protocol.span)),
+        directions or ("relaxing",),
+    )
+
+
+@lru_cache(maxsize=STROKES_KEPT)
+def _stroke(
+    nominal: Nominal,
+    quantity: str,
+    actuator: str,
+    rest: tuple[float, float],
+    period: float,
+    reach: tuple[float, float],
+    directions: tuple[str, ...],
+) -> Stroke:
+    plant = Plant(nominal.model)
+    return stroke_models(plant, quantity, actuator, rest, reach, directions, period)
+
+
+def rest_voltages(station: Station) -> tuple[float, float]:
+    """Voltages of motor and regulator (V) at which the nominal station begins a trial."""
+    load, drive = station.task.load, station.model.parameters.get("drive")
+    motor = (load - drive.offset) / drive.gain if load and drive is not None else 0.0
+    return motor, Plant(station.model).regulator_voltage(station.pressure)
+
+
+def sensor_of(station: Station, quantity: str) -> tuple[float, float]:
+    """Lag (s) and noise (m or rad), the DAQ's rounding included, of the sensor of a quantity."""
+    name = SENSORS[quantity]
+    _, calibration = sensors.SENSORS[name]
+    sensor = station.model.parameters.get(name)
+    lag = 1.0 / (2.0 * math.pi * sensor.bandwidth) if sensor is not None else 0.0
+    level = sensor.noise if sensor is not None else 0.0
+    return lag, math.hypot(level, calibration.resolution / math.sqrt(12.0))

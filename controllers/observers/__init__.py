@@ -1,0 +1,1 @@
+"""State estimators: Kalman filters, extended state observers and their gains."""

@@ -1,0 +1,1 @@
+"""Policies: networks, their files, and what maps measurements to entries, actions to volts."""

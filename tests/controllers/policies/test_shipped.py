@@ -1,0 +1,83 @@
+"""The policies that ship: whole, with their cards, and as good as is asked of them."""
+
+import numpy as np
+import pytest
+
+from controllers import Policy, PPOPolicy
+from controllers.pid import nominal_offset
+from controllers.policies.policy_file import load_policy_file
+from controllers.policy import shipped_policies
+from pma_gym.envs import ENVIRONMENTS, PMAEnv
+
+
+def driven(environment, controller, seed=7):
+    environment.reset(seed=seed)
+    controller.reset(environment.reference, environment.station)
+    ended = False
+    while not ended:
+        volts = controller.act(environment.reading, environment.time)
+        *_, terminated, truncated, info = environment.step(environment.action(volts))
+        ended = terminated or truncated
+    assert truncated
+    return info
+
+
+@pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)
+def test_each_loads_and_has_a_card_that_says_how_to_make_it_again(path):
+    policy = load_policy_file(path)
+    training = policy.training
+    card = path.with_suffix(".md").read_text(encoding="utf-8")
+    assert policy.name == path.stem and policy.name.endswith(f"-{training['algorithm']}")
+    assert f"--preset {training['preset']} --seed {training['seed']}`" in card
+    assert training["code"] in card and "+" not in training["code"]
+
+
+@pytest.mark.parametrize("pressure", [200.0, 350.0, 550.0])
+def test_displacement_is_followed_to_a_tenth_of_a_millimetre(pressure):
+    assert driven(PMAEnv("displacement", pressure_kpa=pressure), PPOPolicy())["rmse_mm"] <= 0.10
+
+
+@pytest.mark.parametrize("pressure", [300.0, 500.0])
+def test_rotation_is_followed_to_half_a_degree(pressure):
+    info = driven(PMAEnv("rotation", pressure_kpa=pressure), PPOPolicy())
+    assert max(info["rmse_by_phase_deg"][phase] for phase in ("I", "II")) <= 0.5
+
+
+def test_the_late_loop_has_policies_of_its_own():
+    late = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
+    disturbed = late | {"disturbances": "regulator_and_operator"}
+    assert driven(PMAEnv("displacement", pressure_kpa=300.0, **late), PPOPolicy())["rmse_mm"] < 0.4
+    info = driven(PMAEnv("rotation", pressure_kpa=400.0, **disturbed), PPOPolicy())
+    assert info["rmse_deg"] < 2.0
+
+
+@pytest.mark.parametrize("path", shipped_policies(), ids=lambda path: path.stem)
+def test_each_drives_the_task_that_it_was_trained_for(path):
+    policy = Policy(path)
+    kwargs = dict(policy.file.environment["kwargs"])
+    task = kwargs.pop("task", None) or ENVIRONMENTS[policy.file.environment["id"]]
+    kwargs |= {"pressure_kpa": 400.0}
+    driven(PMAEnv(task, **kwargs), policy)
+
+
+class Constant:
+    """The regulator voltage that holds the pressure that a trial begins at."""
+
+    def reset(self, reference, station):
+        self.volts = nominal_offset(station)
+
+    def act(self, observation, time):
+        return self.volts
+
+
+def test_operators_are_held_to_the_pace_in_every_phase():
+    """Over eight operators the errors are half of those at constant pressure, or less."""
+    env = PMAEnv("isokinetic_exercise", pressure_kpa=400.0)
+
+    def pooled(controller):
+        rows = [
+            list(driven(env, controller, seed)["rmse_by_phase_deg"].values()) for seed in range(8)
+        ]
+        return np.sqrt(np.mean(np.square(rows), axis=0))
+
+    assert np.all(pooled(PPOPolicy()) <= 0.5 * pooled(Constant()))
