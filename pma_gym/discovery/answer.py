@@ -6,9 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.approximate import closing
+from pma_gym.discovery.approximate_words import why_approximate
 from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.diagnosis import (
     ADDED,
+    Approximate,
     Candidate,
     Diagnosis,
     Estimate,
@@ -32,7 +35,7 @@ from pma_gym.discovery.selection import passes
 from pma_gym.discovery.slowness import leftover, tones
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.discovery.trial_states import misfits, trial_states
-from pma_gym.discovery.unknown import shapeless_laws, telling, why_unknown
+from pma_gym.discovery.unknown import Reason, shapeless_laws, telling, why_unknown
 from pma_gym.discovery.verdict import suspicious, verdict_of
 from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.where import localise
@@ -73,6 +76,13 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
     off = any(moved.significant for moved in parameters.values())
     unknown = why_unknown(found, left, laws)
     verdict = verdict_of(found, unknown, blind, bool(coarse), off)
+    records = trial_records(found)
+    count = 0 if unknown is None else len(unknown.effects)
+    closes = closing(gaps(records), count) if count else None
+    if closes is not None and closes.named:
+        # An approximate law is a name where a right one would be; else the verdict stays.
+        named = verdict_of(found, None, blind, bool(coarse), off)
+        verdict = named if named == "effect" else verdict
     effects = (*_effects(found), *coarse) if verdict == "effect" else ()
     model = _amended(found, verdict)
     tell("putting the answer together", 1, 3)
@@ -82,7 +92,6 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         np.array([floor.level for floor in found.floors]),
         found.seed,
     )
-    records = trial_records(found)
     states = trial_states(*_proposal(found, verdict), [each.name for each in found.named])
     tell("putting the answer together", 2, 3)
     diagnosis = Diagnosis(
@@ -102,7 +111,12 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
             if path not in parameters
         },
         blind=blind,
-        law=residual_law(laws[0]) if verdict == "unknown" and telling(found, laws) else None,
+        approximate=(
+            Approximate(_effects(found), closes.left, closes.held_out)
+            if closes is not None and closes.worth_saying
+            else None
+        ),
+        law=residual_law(laws[0]) if unknown is not None and telling(found, laws) else None,
         tones=tones(found) if verdict == "unknown" else {},
         floors=floors_at_the_door(found),
         adequacy=judgements(found),
@@ -110,13 +124,19 @@ def answer(found: Findings, tell: Progress, propose: bool = True) -> Diagnosis:
         states=states,
         written=misfits(found.named, model, states),
         maps=maps,
-        warnings=_warnings(found),
+        warnings=(*_warnings(found), *_approximations(verdict, unknown)),
         converged=found.proposed[1].converged,
         worsened=_worsened(found, verdict, records),
     )
+    reason = unknown if verdict == "unknown" else None
     return replace(
-        diagnosis, sentence=sentence(diagnosis, unknown), steps=steps(found, diagnosis, left)
+        diagnosis, sentence=sentence(diagnosis, reason), steps=steps(found, diagnosis, left)
     )
+
+
+def _approximations(verdict: Verdict, unknown: Reason | None) -> list[str]:
+    """Why the law of what is named is only approximate."""
+    return [why_approximate(unknown)] if verdict == "effect" and unknown is not None else []
 
 
 def _effects(found: Findings) -> tuple[NamedEffect, ...]:

@@ -125,6 +125,33 @@ class NamedEffect:
     parameters: Mapping[str, Estimate]
     undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
+    def document(self) -> dict[str, Any]:
+        """The effect in `diagnosis.json`."""
+        return {
+            "name": self.name,
+            "confused_with": list(self.confused_with),
+            "p_value": self.p_value,
+            "parameters": {name: vars(each) for name, each in self.parameters.items()},
+            "not_determined": {name: vars(each) for name, each in self.undetermined.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Approximate:
+    """Effects that carry most of what is missing by laws that fit only approximately.
+
+    Attributes:
+        effects: they, with their sizes: what the verdict `effect` names, or the best candidates of
+            the verdict `unknown`.
+        left: share of the misfit beyond noise (mean square, summed over signals in units of their
+            noise) that they leave.
+        held_out: whether it is that of readings which the fits had not seen.
+    """
+
+    effects: tuple[NamedEffect, ...]
+    left: float
+    held_out: bool
+
 
 @dataclass(frozen=True)
 class Gap:
@@ -332,7 +359,10 @@ class Diagnosis:
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
         blind: effects that would not have shown in these data even at their usual size.
-        law: the residual law, where the verdict is `unknown` and one explains enough.
+        approximate: effects whose law is only approximate, and what they leave; None where there
+            are none, or where they leave too much for their size to mean anything.
+        law: the residual law, where the verdict is `unknown` or the law of an effect approximate,
+            and one explains enough.
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
             rings, for those that do.
         floors: noise by signal at the door.
@@ -362,6 +392,7 @@ class Diagnosis:
     given: Model
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
     blind: tuple[str, ...] = ()
+    approximate: Approximate | None = None
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
@@ -384,20 +415,14 @@ class Diagnosis:
             "verdict": self.verdict,
             "sentence": self.sentence,
             "where": [vars(place) for place in self.where],
-            "effects": [
-                {
-                    "name": effect.name,
-                    "confused_with": list(effect.confused_with),
-                    "p_value": effect.p_value,
-                    "parameters": {
-                        name: vars(estimate) for name, estimate in effect.parameters.items()
-                    },
-                    "not_determined": {
-                        name: vars(each) for name, each in effect.undetermined.items()
-                    },
-                }
-                for effect in self.effects
-            ],
+            "effects": [effect.document() for effect in self.effects],
+            "approximate": self.approximate
+            and {
+                "effects": [effect.document() for effect in self.approximate.effects],
+                "closed": 1.0 - self.approximate.left,
+                "left": self.approximate.left,
+                "held_out": self.approximate.held_out,
+            },
             "parameters": {
                 path: {
                     "from": moved.start,

@@ -1,7 +1,9 @@
 """The verdict `unknown` in words: what the best effects leave, and the figure beyond its limit."""
 
+from pma_gym.discovery.approximate_words import left_words
 from pma_gym.discovery.diagnosis import Diagnosis
 from pma_gym.discovery.residual_laws import LAWS
+from pma_gym.discovery.size_words import sized_effects
 from pma_gym.discovery.unknown import Reason
 from pma_gym.discovery.words import effect_name, effect_names, figure, percent, signal_name
 
@@ -34,7 +36,19 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
     return (
         f"Something is missing in model {diagnosis.given.name} that no effect of the catalogue "
         f"carries: {_best(reason, residual)}, {beyond(reason, residual)}."
-    ) + _tones(diagnosis)
+    ) + f"{_candidate(diagnosis)}{_tones(diagnosis)}"
+
+
+def _candidate(diagnosis: Diagnosis) -> str:
+    """One more sentence: the best candidates with their sizes, where they carry most."""
+    known = diagnosis.approximate
+    if known is None:
+        return ""
+    closed = percent(1.0 - max(known.left, 0.0))
+    return (
+        f" The best candidate is {sized_effects(known.effects)}: it closes {closed} of the misfit "
+        f"beyond noise; {left_words(known)}."
+    )
 
 
 def _best(reason: Reason, residual: str) -> str:

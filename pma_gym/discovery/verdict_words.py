@@ -4,11 +4,13 @@ import numpy as np
 
 from pma_gym.discovery.adequacy import OPEN
 from pma_gym.discovery.adequacy_words import agreement, remainder, undecided
-from pma_gym.discovery.diagnosis import ADDED, Diagnosis, NamedEffect, Verdict
+from pma_gym.discovery.approximate_words import left_words
+from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fewest import ODDS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.parameters import Own, unit
+from pma_gym.discovery.size_words import sized_effects
 from pma_gym.discovery.slowness import Left
 from pma_gym.discovery.unknown import Reason
 from pma_gym.discovery.unknown_words import unknown_words
@@ -23,9 +25,8 @@ from pma_gym.discovery.words import (
     percent,
     signal_name,
     signal_unit,
-    undetermined_words,
 )
-from pma_gym.units import suffix, with_unit
+from pma_gym.units import with_unit
 
 ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""
@@ -42,8 +43,8 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
         return (
-            f"In {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}"
-            f"{_unsure(diagnosis)}."
+            f"In {trials} model {name} misses {sized_effects(diagnosis.effects)}"
+            f"{_approximately(diagnosis)}{_closed(diagnosis)}{_unsure(diagnosis)}."
         )
     if diagnosis.verdict == "parameters":
         off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
@@ -105,28 +106,9 @@ def _propose(diagnosis: Diagnosis) -> str:
     return f"; measure next: {following.protocol}." if following else "."
 
 
-def _effects(diagnosis: Diagnosis) -> str:
-    named = []
-    for effect in diagnosis.effects:
-        sizes = effect_sizes(effect)
-        others = effect_names(list(effect.confused_with), "or")
-        doubt = f", or {others}" if others else ""
-        named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
-    return " and ".join(named)
-
-
-def effect_sizes(effect: NamedEffect) -> str:
-    """Sizes of an effect and what is not determined of it: `force 8.2 N, distance 1.1 mm`."""
-    known = [
-        f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
-        f"{at_its_limit(each)}"
-        for parameter, each in effect.parameters.items()
-    ]
-    left = [
-        f"{_stem(parameter, each.unit)} {undetermined_words(each)}"
-        for parameter, each in effect.undetermined.items()
-    ]
-    return ", ".join([*known, *left])
+def _approximately(diagnosis: Diagnosis) -> str:
+    known = diagnosis.approximate
+    return "" if known is None else f" ({left_words(known)})"
 
 
 def _unsure(diagnosis: Diagnosis) -> str:
@@ -143,13 +125,6 @@ def _unsure(diagnosis: Diagnosis) -> str:
     more = f" and {len(trials) - 3} more" if len(trials) > 3 else ""
     worse += [f"{', '.join(trials[:3])}{more}"] if trials else []
     return words + (f"; but it fits {listed(worse)} worse than the model as given" if worse else "")
-
-
-def _stem(parameter: str, unit_: str) -> str:
-    """A parameter's name without its unit: `force` of `force_n`."""
-    ending = suffix(unit_)
-    stem = parameter.removesuffix(f"_{ending}") if ending else parameter
-    return stem.replace("_", " ")
 
 
 def _closed(diagnosis: Diagnosis) -> str:

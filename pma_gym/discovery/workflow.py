@@ -211,9 +211,7 @@ class _Work:
             selection.chosen,
             lambda done, total: self._tell("nested laws", done, total),
         )
-        return replace(
-            selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined
-        )
+        return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
 
     def _confirmed(self, found: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""
