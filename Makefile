@@ -23,7 +23,7 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test fuzz test-integrations test-lower-bounds kills lint style types layers
+.PHONY: help bench peers test examples fuzz test-integrations test-lower-bounds kills lint style types layers
 .PHONY: pages docs clean distclean
 
 help: ## Show this list.
@@ -38,7 +38,10 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 	$(BIN)/python -m benchmarks.speed.install
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m "not example and not kills" $(PYTEST_ARGS)
+
+examples: $(FULL) ## Run the examples of README and the pages, and with Ray, PyTorch and SB3.
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m example tests $(PYTEST_ARGS)
 
 fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
 	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
@@ -50,10 +53,10 @@ test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrat
 # Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
 LOWER = .lower-bounds
 LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
-LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/kernels tests/plant \
-    tests/controllers tests/envs
+LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen \
+    tests/integrator tests/plant tests/estimation tests/controllers tests/engine tests/envs tests/sb3
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
-LOWER_TESTS += --ignore=tests/envs/test_sb3_threads.py
+LOWER_TESTS += --ignore=tests/sb3/test_threads.py
 
 test-lower-bounds: ## Install every lower bound of pyproject.toml into .lower-bounds/ and run tests.
 	"$(PYTHON)" -m venv "$(LOWER)"

@@ -36,8 +36,10 @@ from benchmarks.reference import (
     simulated,
 )
 from benchmarks.speed.rows import EVALUATIONS
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.terminal import SafeConsole
 

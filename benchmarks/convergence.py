@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from pma_gym.kernels.graph import CHANGING
-from pma_gym.kernels.substitute import substitute
-from pma_gym.kernels.text import python_text
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.attempt import beginning
-from pma_gym.plant.compose import COMMANDS, ZERO
-from pma_gym.plant.exponential import Step, step
+from pma_gym.codegen.graph import CHANGING
+from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.text import python_text
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.integrator.equations import COMMANDS, ZERO
+from pma_gym.integrator.exponential_rosenbrock import Step, step
+from pma_gym.integrator.step_attempt import beginning
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names

@@ -31,16 +31,17 @@ from benchmarks.reference import TRIALS, Commands, reference, shares
 from benchmarks.rosenbrock import VELDHUIZEN, Method
 from benchmarks.rosenbrock import step as rosenbrock_step
 from benchmarks.speed.rows import EVALUATIONS
-from pma_gym.kernels.lanes import rebind
-from pma_gym.plant.attempt import attempt
-from pma_gym.plant.compose import Equations
-from pma_gym.plant.exponential import step
-from pma_gym.plant.march import Layout
+from pma_gym.codegen.rebinding import rebind
+from pma_gym.integrator.exponential_rosenbrock import step
+from pma_gym.integrator.integration import Layout
+from pma_gym.integrator.step_attempt import attempt
+from pma_gym.integrator.system import System
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import PLANTS, Model, load_model
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import Program, table
 from pma_gym.plant.simulation import Run, simulate_all
-from pma_gym.plant.system import System
 from pma_gym.terminal import SafeConsole
 
 MODEL, PRESSURE, CONTROL_STEPS = "station", 350e3, 60
@@ -113,7 +114,7 @@ class MethodProgram(Program):
     def ramped(self) -> System:
         """The system with this method's step."""
         plant = PLANTS[self.model.plant]
-        equations = Equations(self.model.effects, self.model.parameters, ramped=True)
+        equations = PlantEquations(self.model.effects, self.model.parameters, ramped=True)
         plant.write_equations(equations)
         equations.finish()
         made_by = step if self.method is None else partial(rosenbrock_step, method=self.method)

@@ -5,9 +5,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.stiffness import spring_stiffness
+from pma_gym.effects.muscle.stiffness import spring_stiffness
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 
 FRICTIONLESS = {
     "damping.contracting_n_s_per_mm": 0.0,

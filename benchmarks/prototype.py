@@ -7,17 +7,18 @@ from numpy.typing import NDArray
 
 from benchmarks.methods import Stepper
 from benchmarks.reference import Commands, switches
-from pma_gym.kernels.derivative import derivatives
-from pma_gym.kernels.graph import FIXED, HELD, Value
-from pma_gym.kernels.substitute import substitute
-from pma_gym.kernels.text import python_text
-from pma_gym.kernels.trace import live_inputs, operation_counts
-from pma_gym.plant.attempt import GROW, LEAST_S, SAFETY, SHRINK
-from pma_gym.plant.compose import COMMANDS, ZERO, State
-from pma_gym.plant.kinks import BEYOND
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import FIXED, HELD, Value
+from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.text import python_text
+from pma_gym.codegen.trace import live_inputs, operation_counts
+from pma_gym.integrator.equations import COMMANDS, ZERO, State
+from pma_gym.integrator.events import BEYOND
+from pma_gym.integrator.step_attempt import GROW, LEAST_S, SAFETY, SHRINK
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, parameter_names
-from pma_gym.plant.station import POSITIONS, TIGHTENING_M, TURNING_M
+from pma_gym.plant.rigs.station import POSITIONS, TIGHTENING_M, TURNING_M
 
 _WEIGHTS = {"divide": 8, "square_root": 8}
 """Cost of these operations in additions."""

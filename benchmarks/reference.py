@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 
 CONTROL_PERIOD = 0.01
 """Time from one command to the next (s)."""

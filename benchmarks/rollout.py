@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from benchmarks.contender import ControllerError
 from controllers.controller import Controller
 from pma_gym.data.trial import Trial
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, Reading
-from pma_gym.envs.command import HIGHEST_VOLTAGE
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task

@@ -4,19 +4,19 @@
     y_new = y + sum_i m_i u_i,    error = sum_i e_i u_i
 
 J is the exact Jacobian at the step's start, differentiated from the laws themselves. The plant was
-integrated with van Veldhuizen's coefficients until `pma_gym.plant.exponential` took half as many
-attempts at the same errors.
+integrated with van Veldhuizen's coefficients until `pma_gym.integrator.exponential_rosenbrock`
+took half as many attempts at the same errors.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from pma_gym.kernels.derivative import derivatives
-from pma_gym.kernels.graph import Value
-from pma_gym.kernels.substitute import substitute
-from pma_gym.plant.compose import State
-from pma_gym.plant.elimination import solver
-from pma_gym.plant.exponential import Step, substituted, total
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.substitute import substitute
+from pma_gym.integrator.elimination import solver
+from pma_gym.integrator.equations import State
+from pma_gym.integrator.exponential_rosenbrock import Step, substituted, total
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,8 @@ from benchmarks.tuning.kept import KeptRows, name_of
 from benchmarks.tuning.loop import lambda_tuning
 from benchmarks.worker import ProcessDied
 from controllers.design.gains import GAINS_FILE, SCHEMA, Gains, column_names
-from controllers.pid import PID, FeedforwardPID
+from controllers.feedforward_pid import FeedforwardPID
+from controllers.pid import PID
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json
 from pma_gym.plant.model import Model, dump_model, load_model

@@ -1,44 +1,25 @@
-"""Controllers of the benchmark, each a short file; `CONTROLLERS` lists them by name."""
-
-from collections.abc import Callable
+"""Controllers of the benchmark, one a file; `CONTROLLERS` lists them by name."""
 
 from controllers.adrc import ADRC
 from controllers.controller import Controller, Reference
+from controllers.exercise.constant_pressure import ConstantPressure
 from controllers.exercise.exercise_mpc import ExerciseMPC
 from controllers.exercise.moment_pid import MomentPID
-from controllers.exercise.scheduled_pressure import ConstantPressure, ScheduledPressure
+from controllers.exercise.scheduled_pressure import ScheduledPressure
 from controllers.exercise.speed_pid import SpeedPID
+from controllers.feedforward_pid import FeedforwardPID
 from controllers.ilc import ILC
-from controllers.improved_feedforward import ImprovedFeedforward, SerresFeedforward, SerresReplay
+from controllers.improved_feedforward import ImprovedFeedforward
 from controllers.lqg import LQG
 from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
-from controllers.pid import PID, FeedforwardPID
+from controllers.pid import PID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
 from controllers.policy_with_ilc import PractisedPolicy
+from controllers.registry import CONTROLLERS
+from controllers.serres_feedforward import SerresFeedforward
+from controllers.serres_replay import SerresReplay
 from controllers.sliding_mode import SlidingMode
-
-CONTROLLERS: dict[str, Callable[[], Controller]] = {
-    "serres_replay": SerresReplay,
-    "serres_feedforward": SerresFeedforward,
-    "improved_feedforward": ImprovedFeedforward,
-    "pid": PID,
-    "feedforward_pid": FeedforwardPID,
-    "lqg": LQG,
-    "adrc": ADRC,
-    "sliding_mode": SlidingMode,
-    "mpc": PreviewMPC,
-    "ilc": ILC,
-    "ppo": PPOPolicy,
-    "ppo_ilc": PractisedPolicy,
-    "oracle": Oracle,
-    "constant_pressure": ConstantPressure,
-    "scheduled_pressure": ScheduledPressure,
-    "speed_pid": SpeedPID,
-    "moment_pid": MomentPID,
-    "exercise_mpc": ExerciseMPC,
-}
-"""Controllers by name: what makes a new one. A controller listed here is scored."""
 
 __all__ = [
     "ADRC",
@@ -48,6 +29,7 @@ __all__ = [
     "PID",
     "ConstantPressure",
     "Controller",
+    "ExerciseMPC",
     "FeedforwardPID",
     "ImprovedFeedforward",
     "MomentPID",

@@ -5,10 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.design.designs import designed
-from controllers.design.observer_feedback import LagControl
-from controllers.models.lag_model import LagObserver, Place
 from controllers.models.nominal_motion import NominalMotion
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
+from controllers.observers.extended_state_observer import LagObserver, Place
+from controllers.observers.observer_feedback import LagControl
 
 
 class Settings(NamedTuple):

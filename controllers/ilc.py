@@ -11,10 +11,10 @@ from scipy.ndimage import binary_opening
 from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.gains import scheduled_gains
-from controllers.models.lag_model import LOOSE_N
+from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.lifted_model import LiftedPlant
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.pid import FeedforwardPID
+from controllers.observers.extended_state_observer import LOOSE_N
 from pma_gym.envs import Reading, Station
 
 

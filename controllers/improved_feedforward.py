@@ -1,12 +1,9 @@
-"""Open-loop controllers: the dissertation's, and one without its faults."""
+"""Open loop: the voltage that the inverse of the nominal model gives for the reference."""
 
 from controllers.controller import Reference
-from controllers.models.inverse import VOLTAGE_LIMIT
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.serres import SerresFeedforward, SerresReplay
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.envs import Reading, Station
-
-__all__ = ["ImprovedFeedforward", "SerresFeedforward", "SerresReplay"]
 
 
 class ImprovedFeedforward:

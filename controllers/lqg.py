@@ -9,8 +9,9 @@ from scipy.linalg import solve_discrete_are
 from controllers.controller import Reference
 from controllers.design.designs import designed, task_kind
 from controllers.models.cable import free_rotor
-from controllers.models.local_model import FINE, VOLTAGE_LIMIT, LocalModel, Stroke
+from controllers.models.local_model import FINE, LocalModel, Stroke
 from controllers.models.nominal_motion import nominal_motion
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.deviation_filter import (
     SHARE,
     SHARE_TIME_S,

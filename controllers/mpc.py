@@ -8,13 +8,14 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.quadratic_program import BoundedProgram
-from controllers.models.linear_motion import VOLTAGE_LIMIT, linear_motion
+from controllers.models.linear_motion import linear_motion
 from controllers.models.model_key import Nominal
 from controllers.models.nominal_motion import nominal_motion
+from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
 from pma_gym.envs import Reading, Station
-from pma_gym.plant.plant import regulator_voltage
+from pma_gym.plant.compiled_model import regulator_voltage
 
 
 class Settings(NamedTuple):

@@ -33,14 +33,13 @@ from controllers.design.bounded_least_squares import Errors, Space, best_plan
 from controllers.design.horizon import horizon
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.prediction import PLANS, Commands, Foresight
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.envs import Reading, Station
 from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
     from pma_gym.envs import PMAEnv
 
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
 
 PUSHES_V = np.append(0.0, np.geomspace(0.01, 10.0, 13))
 """Pushes of a loose cable that are tried, beyond where the drive begins to pull (V)."""

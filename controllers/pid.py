@@ -1,30 +1,16 @@
 """PID with gains scheduled on pressure, alone and on top of the improved feed-forward."""
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from controllers.controller import Reference
 from controllers.design.gains import Gains, scheduled_gains
-from controllers.improved_feedforward import ImprovedFeedforward
+from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from pma_gym.envs import Reading, Station
 
 if TYPE_CHECKING:
     import control
-
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
-
-
-class OpenLoop(Protocol):
-    """What gives a voltage by time alone, such as `ImprovedFeedforward`."""
-
-    def reset(self, reference: Reference, station: Station) -> None:
-        """Prepare for a trial."""
-
-    def voltage(self, time: float) -> float:
-        """Motor voltage (V) at a time (s)."""
-        ...
 
 
 class PID:
@@ -114,34 +100,6 @@ class PID:
         return control.StateSpace(*law, station.period)
 
 
-class FeedforwardPID(PID):
-    """`ImprovedFeedforward` plus a PID on what error remains; gains of their own.
-
-    The integral need not carry the motion itself, only what the nominal model does not know. The
-    anti-windup sees the whole voltage.
-
-    Args:
-        gains: as `PID`.
-        open_loop: another feed-forward to add.
-    """
-
-    name = "feedforward_pid"
-
-    def __init__(self, gains: Gains | None = None, open_loop: OpenLoop | None = None) -> None:
-        super().__init__(gains)
-        self._open_loop = open_loop or ImprovedFeedforward()
-
-    def reset(self, reference: Reference, station: Station) -> None:
-        """As `PID.reset`, and compute the feed-forward, which holds the drive's offset itself."""
-        super().reset(reference, station)
-        self._open_loop.reset(reference, station)
-        self._offset, self._delay = 0.0, station.action_delay
-
-    def feedforward(self, time: float) -> float:
-        """Voltage of the feed-forward (V) that is due when a command of now is in force."""
-        return self._open_loop.voltage(time + self._delay)
-
-
 def linear_law(
     gains: Gains, period: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -158,17 +116,3 @@ def linear_law(
     a, c = np.diag([1.0, share]), np.ones((1, 2))
     b = np.array([[gains.integral * period], [(share - 1.0) * slope]])
     return a, b, c, np.array([[gains.proportional + slope]])
-
-
-def nominal_offset(station: Station) -> float:
-    """Voltage (V) that changes nothing of how a trial begins.
-
-    Of the motor the one at which the nominal drive just begins to pull, 0 without a drive; of the
-    regulator the one that holds the pressure.
-    """
-    parameters = station.model.parameters
-    if station.task.actuator == "regulator":
-        line = parameters["regulator_line"]
-        return (station.pressure - line.offset) / line.gain
-    drive = parameters.get("drive")
-    return max(0.0, -drive.offset / drive.gain) if drive else 0.0

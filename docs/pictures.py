@@ -16,7 +16,7 @@ from benchmarks.exercise.job import run_exercise
 from benchmarks.exercise.profile import read_profile
 from benchmarks.hidden_effects.pictures import naming_picture
 from controllers import SerresReplay
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose
 from pma_gym.discovery.curves import curves_picture, worst_trial
 from pma_gym.discovery.pictures import gap_picture, map_picture

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pma_gym.cli import main
+from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import read_trial, write_trial
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ
 
 HEADER = "time_s,motor_voltage_v,regulator_voltage_v"

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pma_gym.cli import main
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from tests.discovery.data_checks.logs import logs, write
 
 NAMES = {

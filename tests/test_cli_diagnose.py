@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from pma_gym.cli import main
+from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import read_trial, write_trial
 from pma_gym.discovery.diagnosis import (
     Diagnosis,
     Estimate,
@@ -242,7 +242,7 @@ def test_warnings_of_the_data_set_are_said(run, engine, tmp_path):
 def test_effects_of_ones_own_are_loaded_before_the_model(run, engine, tmp_path, monkeypatch):
     loaded = []
     own = SimpleNamespace(load_effects=loaded.append)
-    monkeypatch.setitem(sys.modules, "pma_gym.effects.own", own)
+    monkeypatch.setitem(sys.modules, "pma_gym.effects.user_effects", own)
     code, _, _ = run("diagnose", "lab", "--effect", "a.py", "--effect", "b.py")
     assert code == 0
     assert [path.name for path in loaded] == ["a.py", "b.py"]

@@ -126,6 +126,7 @@ EXAMPLES = [
 ]
 
 
+@pytest.mark.example
 @pytest.mark.parametrize(("language", "code"), EXAMPLES)
 def test_example_runs(language, code, tmp_path):
     for module in ("stable_baselines3", "sympy", "pyarrow"):

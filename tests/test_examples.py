@@ -15,6 +15,7 @@ LIBRARIES = {"ppo_torch": "torch", "sb3_ppo": "stable_baselines3", "rllib_ppo": 
 SECONDS = {"rllib_ppo": 300}
 
 
+@pytest.mark.example
 @pytest.mark.parametrize("name", LIBRARIES)
 def test_it_runs_and_prints_its_error(name, tmp_path):
     library = LIBRARIES[name].split(".")[0]

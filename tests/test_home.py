@@ -17,8 +17,8 @@ pwd.getpwuid = unknown
 
 CODE = """
 import pma_gym
-from pma_gym.kernels.cache import cache_directory
-from pma_gym.kernels.native import Library
+from pma_gym.codegen.cache.compile_cache import cache_directory
+from pma_gym.codegen.machine.native import Library
 Library("define double @one() { ret double 1.0 }")
 print(cache_directory())
 """

@@ -39,6 +39,7 @@ def run(*command, cwd):
     return done.stdout
 
 
+@pytest.mark.example
 def test_ten_lines_print_the_rmse_of_a_pid(tmp_path):
     (code,) = (block for block in blocks("python") if "gym.make" in block)
     printed = run("-c", code, cwd=tmp_path)
@@ -50,6 +51,7 @@ def test_example_of_a_controller_is_the_file():
     assert EXAMPLE.read_text(encoding="utf-8").rstrip() in blocks("python")
 
 
+@pytest.mark.example
 def test_example_of_a_controller_is_scored(tmp_path):
     (command,) = (block for block in blocks("bash") if "integral.py:Integral --out" in block)
     _, controllers, _, out = command.split("-m benchmarks ")[1].split()

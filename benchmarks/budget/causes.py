@@ -34,7 +34,7 @@ from benchmarks.budget.statics import GRID_V, Statics, fitted_quadratic
 from controllers.models.inverse import TAKE_UP_S
 from controllers.models.muscle import Muscle
 from controllers.models.nominal_motion import nominal_motion
-from controllers.serres import PROFILE_RADIUS
+from controllers.serres_feedforward import PROFILE_RADIUS
 from pma_gym.envs import Station
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant

@@ -44,7 +44,7 @@ def exercise(
     from benchmarks.exercise.choice import Choice, ChoiceError
     from benchmarks.exercise.job import run_exercise
     from benchmarks.exercise.profile import ProfileError, held, read_profile
-    from pma_gym.plant.prescription import UnreachableError
+    from pma_gym.plant.exercise_device.prescription import UnreachableError
     from pma_gym.terminal import SafeConsole
 
     try:

@@ -11,8 +11,8 @@ from benchmarks.comparison.isolated import Isolated, driver
 from benchmarks.comparison.suite import Entry, Episode, FrozenSuite, frozen_suite
 from benchmarks.contender import Contender
 from benchmarks.rollout import Rollout, rollout
+from pma_gym.engine.options import told_model
 from pma_gym.envs import PMAEnv
-from pma_gym.envs.options import told_model
 from pma_gym.plant.model import Model
 
 Row = dict[str, Any]

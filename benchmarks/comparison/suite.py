@@ -17,7 +17,7 @@ from benchmarks.suite import SUITES, SuiteError
 from controllers.design import designs
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
-from pma_gym.envs.options import parse_options
+from pma_gym.engine.options import parse_options
 from pma_gym.limits import LimitError
 from pma_gym.plant.model import Model, is_path, load_model, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.exercise.profile import Prescription
-from pma_gym.plant.exercise import Device
+from pma_gym.plant.exercise_device.device import Device
+from pma_gym.plant.exercise_device.prescription import Held, Schedule, follow, hold, smallest
 from pma_gym.plant.model import Model
-from pma_gym.plant.prescription import Held, Schedule, follow, hold, smallest
 from pma_gym.units import SI_FACTORS
 
 

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from itertools import product
 
 from pma_gym.numerals import parse_numbers
-from pma_gym.plant.exercise import RADIUS, Device, own_device
+from pma_gym.plant.exercise_device.device import RADIUS, Device, own_device
+from pma_gym.plant.exercise_device.parallel_muscles import MusclesError, muscles
 from pma_gym.plant.model import Model
-from pma_gym.plant.muscles import MusclesError, muscles
 
 SEARCHED = {"muscles": range(1, 7), "diameter": (10, 20, 40), "length": (150, 200, 250, 300, 400)}
 """Numbers, diameters and lengths (mm) among which the smallest is sought: the diameters are those

@@ -14,7 +14,7 @@ from benchmarks.exercise.tables import terminal_table
 from benchmarks.files import write_bytes, write_text
 from benchmarks.profiles import write_csv
 from pma_gym.pages.document import TextTable, to_html, to_markdown
-from pma_gym.plant.exercise import FULL_ANGLE, Device, pressure_grid, resistive_moment
+from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model, load_model
 
 MODEL = "station"

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 from benchmarks.exercise.answer import Answer
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
 from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture
-from pma_gym.plant.exercise import Device
-from pma_gym.plant.knee import BODY_HEIGHT, BODY_MASS, dissertations_knee_peak
+from pma_gym.plant.exercise_device.device import Device
+from pma_gym.plant.exercise_device.knee import BODY_HEIGHT, BODY_MASS, dissertations_knee_peak
 from pma_gym.plant.model import Model
 
 PICTURE = "exercise"

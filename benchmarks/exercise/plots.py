@@ -8,8 +8,14 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from benchmarks.exercise.answer import Answer
 from pma_gym.pages.figures import picture, png
-from pma_gym.plant.exercise import FULL_ANGLE, Device, own_device, pressure_grid, resistive_moment
-from pma_gym.plant.knee import dissertations_knee_peak, knee_extension_torque
+from pma_gym.plant.exercise_device.device import (
+    FULL_ANGLE,
+    Device,
+    own_device,
+    pressure_grid,
+    resistive_moment,
+)
+from pma_gym.plant.exercise_device.knee import dissertations_knee_peak, knee_extension_torque
 from pma_gym.plant.model import Model
 from pma_gym.studies.moment_ranges import check_moments, lowest_rest_pressure
 from pma_gym.units import SI_FACTORS

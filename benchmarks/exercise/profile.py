@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pma_gym.documents import read_content
 from pma_gym.numerals import parse_number
-from pma_gym.plant.exercise import FULL_ANGLE
+from pma_gym.plant.exercise_device.device import FULL_ANGLE
 from pma_gym.units import SI_FACTORS
 
 COLUMNS = ("angle_deg", "moment_nm")

@@ -6,8 +6,8 @@ import numpy as np
 from rich.table import Table
 
 from pma_gym.pages.document import TextTable
-from pma_gym.plant.exercise import Device, own_device, resistive_moment
-from pma_gym.plant.knee import knee_extension_torque
+from pma_gym.plant.exercise_device.device import Device, own_device, resistive_moment
+from pma_gym.plant.exercise_device.knee import knee_extension_torque
 from pma_gym.plant.model import Model
 from pma_gym.studies.makers_figures import makers_figures
 from pma_gym.studies.moment_ranges import Span, check_moments, lowest_rest_pressure, span

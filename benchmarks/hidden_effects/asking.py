@@ -42,7 +42,7 @@ def unproposed(folder: Path) -> Answer:
 def diagnosed(folder: Path, propose: bool = True) -> Answer:
     """The answer of `pma-gym diagnose` with its defaults, without the start of a process."""
     # Here, for other judges need none of it.
-    from pma_gym.data.dataset import read_dataset
+    from pma_gym.data.datasets.dataset import read_dataset
     from pma_gym.discovery import diagnose
 
     found = diagnose(read_dataset(folder), jobs=1, propose=propose)

@@ -47,7 +47,7 @@ from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
 )
 from benchmarks.hidden_effects.physics.simulation import Commands  # noqa: E402
 from benchmarks.hidden_effects.size import simulate_variants  # noqa: E402
-from pma_gym.data.dataset import Dataset, read_dataset  # noqa: E402
+from pma_gym.data.datasets.dataset import Dataset, read_dataset  # noqa: E402
 from pma_gym.data.trial import Trial  # noqa: E402
 from pma_gym.discovery.fits import Bench, Fitted  # noqa: E402
 from pma_gym.discovery.noise import Whitening  # noqa: E402

@@ -12,9 +12,9 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from pma_gym.codegen.rebinding import lanes
 from pma_gym.data.serres2008 import load_table
-from pma_gym.effects.damping import symmetric_damping
-from pma_gym.plant.lanes import lanes
+from pma_gym.effects.muscle.damping import symmetric_damping
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 

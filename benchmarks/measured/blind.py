@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from benchmarks.measured.held_out import Rig
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.screening import Baseline, Look, look
 from pma_gym.effects import CATALOGUE

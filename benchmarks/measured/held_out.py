@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench, Fitted
@@ -14,9 +14,9 @@ from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import Own, own_parameters, values
 from pma_gym.discovery.suspects import Suspect, suspects
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

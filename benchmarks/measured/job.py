@@ -23,8 +23,8 @@ from benchmarks.measured.steps import Step, folds, steps
 from benchmarks.measured.tables import print_measured
 from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import Held, held_against
-from pma_gym.data.dataset import Dataset
-from pma_gym.data.trial_files import encode_trial
+from pma_gym.data.datasets.dataset import Dataset
+from pma_gym.data.files.trial_files import encode_trial
 from pma_gym.discovery.journal import digest
 from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model

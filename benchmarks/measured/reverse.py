@@ -23,8 +23,9 @@ from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import prior, values
 from pma_gym.discovery.suspects import Suspect, bounds, suspects
 from pma_gym.metrics import PHASE_DURATION, regression
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from typing import Any
 from benchmarks.damaged import reason, say_damaged
 from benchmarks.files import write_text
 from benchmarks.measured.stages import Stages
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.diagnosis import ADDED, Diagnosis
 from pma_gym.discovery.journal import digest
 from pma_gym.discovery.workflow import diagnose

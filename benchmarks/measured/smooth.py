@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.measured.held_out import AT_LOAD, FIGURES, LOADED, rms
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.trial import Trial
 from pma_gym.units import SI_FACTORS
 

@@ -8,7 +8,7 @@ from benchmarks.files import write_text
 from benchmarks.measured.held_out import AT_LOAD, FIGURES, Rig, limit_errors, rms, worked
 from benchmarks.measured.replays import Replay, replays
 from benchmarks.measured.stages import Stages
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.journal import digest
 from pma_gym.plant.model import Model, dump_model
 

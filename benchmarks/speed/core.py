@@ -18,8 +18,7 @@ from llvmlite import ir
 
 from benchmarks.speed.loops import Prepared
 from benchmarks.speed.rows import DISPLACEMENT
-from pma_gym.envs.kernel_writer import Writer
-from pma_gym.kernels.control import (
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INTEGER,
     POINTER,
@@ -30,9 +29,10 @@ from pma_gym.kernels.control import (
     loop,
     offset,
 )
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import compiled, simd_lanes
-from pma_gym.plant.march import FUSED, memory
+from pma_gym.codegen.machine.native import compiled, simd_lanes
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.engine.cpu.step_writer import Writer
+from pma_gym.integrator.integration import FUSED, memory
 
 CHAINS = 12
 """Registers of numbers that wait for nothing but themselves: enough to hide how long each takes,

@@ -19,7 +19,7 @@ import typer
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant.fitting import Fit, fit
+from pma_gym.estimation.fitting import Fit, fit
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import program

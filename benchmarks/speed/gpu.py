@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.speed.loops import Prepared
-from pma_gym.envs.cuda import CudaEngine, torch_with_gpu
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.options import Options
-from pma_gym.kernels.driver import GpuError
+from pma_gym.codegen.machine.cuda_driver import GpuError
+from pma_gym.engine.cuda.engine import CudaEngine, torch_with_gpu
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import Options
 from pma_gym.tasks import TASKS
 
 COUNTS = (262144, 1048576)

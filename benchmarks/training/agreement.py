@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.policies.network import Network, Weights
-from pma_gym.envs.observation import BOUND
+from pma_gym.engine.observation import BOUND
 
 AGREEMENT = 1e-6
 """Largest difference of two actions of -1 to 1 (5 uV of 0-10 V), but for rounding."""

@@ -13,10 +13,10 @@ from benchmarks.training.reward import bounded
 from controllers.policies.action_mapping import HIGHEST_V, Form
 from controllers.policies.batch_adapter import Pilots
 from controllers.policies.observation_spec import View
+from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAVectorEnv, Station
-from pma_gym.envs.observation import BOUND
-from pma_gym.envs.sb3 import EngineVecEnv
 from pma_gym.plant.model import load_model
+from pma_gym.sb3 import EngineVecEnv
 
 
 class PilotedVecEnv(EngineVecEnv):

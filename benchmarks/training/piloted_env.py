@@ -13,8 +13,8 @@ from benchmarks.training.stations import Stations
 from controllers.policies.action_mapping import Form
 from controllers.policies.adapter import Pilot
 from controllers.policies.observation_spec import View
+from pma_gym.engine.observation import BOUND
 from pma_gym.envs import PMAEnv
-from pma_gym.envs.observation import BOUND
 
 
 class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[Any], NDArray[Any]]):

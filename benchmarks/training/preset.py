@@ -17,8 +17,8 @@ from controllers.policies.action_mapping import Form
 from controllers.policies.adapter import base_of
 from controllers.policies.observation_spec import View
 from pma_gym.documents import is_file, read_yaml
+from pma_gym.engine.options import parse_options, parse_task
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.envs.options import parse_options, parse_task
 
 PRESETS = Path(__file__).with_name("presets")
 """Folder of the presets."""

@@ -9,7 +9,7 @@ from benchmarks.comparison.recipe import Recipe
 from benchmarks.comparison.stations import draw_station
 from benchmarks.comparison.suite import frozen_suite
 from benchmarks.suite import SuiteError
-from pma_gym.envs.options import told_model
+from pma_gym.engine.options import told_model
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EXERCISES
 

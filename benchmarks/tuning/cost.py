@@ -10,8 +10,9 @@ from benchmarks.tuning.job import Job
 from benchmarks.tuning.loop import Loop
 from controllers.controller import Reference
 from controllers.design.gains import Gains
+from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
-from controllers.pid import PID, FeedforwardPID
+from controllers.pid import PID
 from pma_gym.effects.effect import Value
 from pma_gym.envs import PMAEnv, Station
 from pma_gym.plant.model import Model

@@ -8,11 +8,12 @@ import control
 import numpy as np
 from scipy.optimize import root_scalar
 
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
+from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import Station
-from pma_gym.envs.options import motor_at_rest
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.linear import linearize_at, operating_point
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Actuator
 
 SENSORS = {"extension": "lvdt", "rotation": "potentiometer", "contraction": "lvdt"}

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.envs import Station
-from pma_gym.plant.exercise import FULL_ANGLE, own_device, resistive_moment
+from pma_gym.plant.exercise_device.device import FULL_ANGLE, own_device, resistive_moment
 from pma_gym.tasks import Exercise
 
 PRESSURES = np.arange(0.0, 601e3, 25e3)

@@ -12,7 +12,8 @@ at the start is left out: the motion begins where the first command is in force.
 
 import numpy as np
 
-from controllers.models.local_model import VOLTAGE_LIMIT, Stroke
+from controllers.models.local_model import Stroke
+from controllers.models.voltage import VOLTAGE_LIMIT
 
 JUMP_SHARE = 0.02
 """Share of the range beyond which a change within a step of the inverse, 2 ms at most, is a jump:

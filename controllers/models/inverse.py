@@ -23,14 +23,12 @@ import numpy as np
 
 from controllers.models.contraction_inverse import ContractionInverse
 from controllers.models.muscle import Muscle
-from pma_gym.effects.position_map import mapped_displacement
+from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.codegen.rebinding import lanes
+from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.envs import Station
-from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
-
-VOLTAGE_LIMIT = 10.0
-"""Largest motor voltage (V)."""
 
 STEP_S = 2e-3
 """Longest step along the reference (s); memories are exact to second order in it."""

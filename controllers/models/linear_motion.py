@@ -15,13 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import Station
-from pma_gym.envs.options import motor_at_rest
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.linear import FOLLOWING
-from pma_gym.plant.plant import OUTPUTS, Plant
-
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
+from pma_gym.plant.plant import Plant
 
 STEP, PRESSURE_STEP, VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or 1/s of them; Pa; V."""

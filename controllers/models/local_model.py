@@ -23,9 +23,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
+from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.linear import linearize_at
-from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.settle import all_at_rest
+from pma_gym.plant.plant import Plant
 
 if TYPE_CHECKING:
     import control
@@ -47,8 +49,6 @@ LARGEST_ORDER = 4
 SENSORS = {"extension": "lvdt", "contraction": "lvdt", "rotation": "potentiometer"}
 """Sensor by what is followed."""
 
-VOLTAGE_LIMIT = 10.0
-"""Largest voltage of motor and regulator (V)."""
 
 _SEARCHED = 201
 """Voltages at which the plant is put to rest in search of the places."""
@@ -169,7 +169,7 @@ def _rests(
 
     def rest(volts: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         other = np.ones_like(volts)
-        states, zeros = all_at_rest(
+        states, zeros = equilibria_at(
             plant,
             volts if motor else commands[0] * other,
             volts if regulator else commands[1] * other,

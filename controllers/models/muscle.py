@@ -4,7 +4,8 @@ import math
 
 import numpy as np
 
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 
 
 class Muscle:

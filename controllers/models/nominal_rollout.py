@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from controllers.models.local_model import VOLTAGE_LIMIT, Stroke
+from controllers.models.local_model import Stroke
 from controllers.models.operating_range import rest_voltages
+from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.envs import Station
 from pma_gym.plant.plant import Plant
 

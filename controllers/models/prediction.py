@@ -5,8 +5,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.plant.plant import Condition, Plant
-from pma_gym.plant.trial_kernel import JOB
+from pma_gym.integrator.trial_kernel import JOB
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 
 PLANS = 16
 """How many plans are tried at once: a whole number of registers of any processor."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.controller import Controller, Reference
-from controllers.pid import nominal_offset
+from controllers.models.voltage import rest_voltage
 from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, Form
 from controllers.policies.observation_spec import (
     View,
@@ -18,6 +18,7 @@ from controllers.policies.observation_spec import (
     steps_of,
 )
 from controllers.policies.scales import scales_of
+from controllers.registry import CONTROLLERS
 from pma_gym.envs import Reading, Station
 
 DIVERGED = (
@@ -131,20 +132,12 @@ def _no_number(reading: Reading, time: float) -> str:
     return f"every reading must be a number, at {time:g} s {', '.join(bad)}; check the sensor"
 
 
-def rest_voltage(station: Station) -> float:
-    """Voltage of the task's actuator at rest (V): no pull, or what holds the pressure."""
-    return 0.0 if station.task.actuator == "motor" else nominal_offset(station)
-
-
 def base_of(form: Form) -> Controller:
     """A new controller that a residual is added to.
 
     Raises:
         ValueError: no such controller.
     """
-    # Imported here: the list of controllers has the policies in it.
-    from controllers import CONTROLLERS
-
-    if form.base not in CONTROLLERS:
+    if form.base is None or form.base not in CONTROLLERS:
         raise ValueError(f"form base must be one of {', '.join(CONTROLLERS)}, got {form.base!r}")
     return CONTROLLERS[form.base]()

@@ -5,8 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from controllers.models.voltage import rest_voltage
 from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, Form
-from controllers.policies.adapter import DIVERGED, base_of, rest_voltage
+from controllers.policies.adapter import DIVERGED, base_of
 from controllers.policies.observation_spec import View, ahead, clipped, start_entry, steps_of
 from controllers.policies.scales import scales_of
 from pma_gym.envs import Reading, Station

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from controllers.controller import Reference
 from controllers.policies.scales import FINE_SHARE, Scales, heard_rows, share_of
+from pma_gym.engine.observation import BOUND, ObservationTable
+from pma_gym.engine.options import Options
 from pma_gym.envs import Reading, Station
-from pma_gym.envs.observation import BOUND, ObservationTable
-from pma_gym.envs.options import Options
 
 ViewKind = Literal["tracking", "environment"]
 VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")

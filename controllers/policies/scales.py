@@ -3,8 +3,8 @@
 from typing import Any
 
 from pma_gym.data.protocol import Protocol
+from pma_gym.engine.observation import ROTATION_SCALE, Prescribed
 from pma_gym.envs import Station
-from pma_gym.envs.observation import ROTATION_SCALE, Prescribed
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 

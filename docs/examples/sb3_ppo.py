@@ -5,7 +5,7 @@ import sys
 import numpy as np
 from stable_baselines3 import PPO
 
-from pma_gym.envs.sb3 import SB3VecEnv
+from pma_gym.sb3 import SB3VecEnv
 
 steps = int(sys.argv[1]) if len(sys.argv) > 1 else 300_000
 

@@ -15,9 +15,9 @@ from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.information import print_installation, print_model
 from pma_gym.cli.options import StrictTyper
 from pma_gym.cli.terminal import console, read, say
+from pma_gym.data.files.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.data.trial_columns import SampleError
-from pma_gym.data.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import broken_limit

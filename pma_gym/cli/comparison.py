@@ -7,7 +7,7 @@ import typer
 from rich.table import Table
 
 from pma_gym.cli.terminal import console, say, warnings_said
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.plant.model import load_model
 
 DEFAULT_MODEL = "station"

@@ -9,9 +9,9 @@ from rich.table import Table
 from rich.text import Text
 
 from pma_gym.cli.terminal import console, say
-from pma_gym.data.dataset import read_dataset
-from pma_gym.data.dataset_toml import DESCRIPTION, Description
-from pma_gym.data.drafting import SeenColumn, draft, one_line, seen_columns
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description
+from pma_gym.data.datasets.drafting import SeenColumn, draft, one_line, seen_columns
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.files import OutputError, replace_file
 from pma_gym.plant.model import Model, load_model

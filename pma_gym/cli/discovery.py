@@ -13,7 +13,8 @@ import typer
 from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
 from pma_gym.cli.terminal import say, warnings_said, warnings_said_at_once
-from pma_gym.data.dataset import Dataset, read_dataset
+from pma_gym.cli.time_left import DIAGNOSIS, FIT, TimeLeft
+from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import OutputError
 from pma_gym.plant.model import Model, dump_model, load_model
 
@@ -88,7 +89,7 @@ def diagnose(
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
-        found = _run(discovery.diagnose, trials, given, results, arguments)
+        found = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
         files = {
             "diagnosis.json": found.text().encode(),
             "model.toml": dump_model(found.model).encode(),
@@ -125,7 +126,8 @@ def fit(
     from pma_gym.discovery.trial_states import dump_states
 
     with results.opened():
-        found = _run(discovery.refit, trials, given, results, {"seed": seed, "jobs": jobs})
+        arguments = {"seed": seed, "jobs": jobs}
+        found = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
         document = found.document()
         kept = {key: document[key] for key in _FITTED}
         results.write(
@@ -162,7 +164,7 @@ def _inputs(
     with warnings_said():
         trials = read_dataset(folder)
     for path in effects or ():
-        from pma_gym.effects.own import load_effects
+        from pma_gym.effects.user_effects import load_effects
 
         load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)
@@ -181,12 +183,13 @@ def _run(
     model: Model,
     results: Results,
     arguments: dict[str, Any],
+    time_left: TimeLeft,
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
         from pma_gym.discovery.journal import JournalWarning
 
-        with StepProgress() as progress, warnings_said_at_once(JournalWarning):
+        with StepProgress(time_left) as progress, warnings_said_at_once(JournalWarning):
             return function(trials, model, progress=progress, **arguments)
     except KeyboardInterrupt:
         kept = results.journal.is_dir()

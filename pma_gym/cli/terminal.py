@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import TrialWarning, read_trial
 from pma_gym.terminal import SafeConsole, table_console
 
 

@@ -6,7 +6,7 @@ from typing import Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.kernels.generic import floor, where
+from pma_gym.codegen.generic import floor, where
 from pma_gym.units import SI_FACTORS
 
 DAQ_LIMIT = 10.0

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.kernels.random import philox, sine_cosine, uniform
+from pma_gym.codegen.random import philox, sine_cosine, uniform
 
 EARLY_S = 1e-9
 """How much before its time a piece begins (s): times come as multiples of a rounded period."""

@@ -13,11 +13,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.evidence import FREE_ZEROS
 from pma_gym.discovery.noise import at_rest, step_between
-from pma_gym.plant.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

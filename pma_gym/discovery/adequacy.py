@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from pma_gym.discovery.acceptance_floors import REST, AcceptanceFloor, is_summary
 from pma_gym.discovery.flexible_regression import explained, variables
 from pma_gym.discovery.noise import Whitening, at_rest, autoregression, white_noise
-from pma_gym.plant.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -40,8 +40,8 @@ from pma_gym.discovery.verdict import suspicious, verdict_of
 from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.where import localise
 from pma_gym.discovery.worsened import worsened
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
-from pma_gym.plant.plant import OUTPUTS
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from pma_gym.discovery.evidence import Evidence, Pieces
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.suspects import Suspect
-from pma_gym.plant.least_squares import inverse
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.estimation.least_squares import inverse
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

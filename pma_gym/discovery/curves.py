@@ -12,7 +12,7 @@ from pma_gym.discovery.diagnosis import Diagnosis, TrialRecord
 from pma_gym.discovery.pictures import AFTER, BEFORE, MEASURED, after_name
 from pma_gym.discovery.words import signal_name, signal_unit
 from pma_gym.pages.figures import legend_below, picture, png
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 _MOST_SIGNALS = 2

@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.assumed_range import assumed_range, at_assumed_edge, needed_reach
 from pma_gym.discovery.noise import Whitening
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, OUTPUTS
-from pma_gym.plant.residuals import Residuals, Sums
 
 Array = NDArray[np.float64]
 

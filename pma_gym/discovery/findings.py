@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.adequacy import Adequacy
 from pma_gym.discovery.fewest import Fewest
 from pma_gym.discovery.fits import Bench, Fitted

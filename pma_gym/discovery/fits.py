@@ -13,8 +13,8 @@ from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.noise import Whitening
 from pma_gym.discovery.parameters import Own, values
 from pma_gym.discovery.suspects import Suspect
-from pma_gym.plant.fitting import Search
-from pma_gym.plant.least_squares import inverse
+from pma_gym.estimation.fitting import Search
+from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 Places = NDArray[np.int64]

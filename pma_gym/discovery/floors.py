@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.acceptance_floors import difference
 from pma_gym.discovery.evidence import FREE_ZEROS
 from pma_gym.discovery.noise import (
@@ -16,10 +16,10 @@ from pma_gym.discovery.noise import (
     sparse,
     step_between,
 )
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
-from pma_gym.plant.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from pma_gym.discovery.excess import Memory, memory
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.noise import Whitening, autoregression, step_between
 from pma_gym.discovery.suspects import Suspect
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

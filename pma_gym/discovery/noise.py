@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz
 
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from pma_gym.data import clipping
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.quality import clipping
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.held_out import FOLDS, stretches
-from pma_gym.plant import sensors, slide
+from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
+from pma_gym.plant.rigs import slide
 
 PIECE_S = 1.0
 """Longest trial of a free slide (s): an error of its force leads it away with the square of time,

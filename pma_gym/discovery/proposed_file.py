@@ -5,14 +5,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
+from pma_gym.data.files.trial_formats import encode_csv
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import (
     BY_QUANTITY,
     VOLTAGE_RANGE,
     Source,
 )
-from pma_gym.data.trial_formats import encode_csv
 from pma_gym.discovery.data_checks.proposals import file_sources
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant

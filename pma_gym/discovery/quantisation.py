@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Estimate, NamedEffect
 from pma_gym.discovery.floors import Level
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 COARSER = 1.5

@@ -10,8 +10,8 @@ from pma_gym.discovery.diagnosis import Floor, Gap, Judgement, TrialRecord
 from pma_gym.discovery.evidence import FREE_ZEROS
 from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.parameters import values
-from pma_gym.plant.logged import Logged
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Map
 from pma_gym.discovery.ticks import Ticks
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from pma_gym.discovery.findings import Findings
 from pma_gym.discovery.leftovers import residuals
 from pma_gym.discovery.noise import slow_part, sparse
 from pma_gym.discovery.quantisation import is_coarse
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 LEAST_SLOW = 0.02
 """Mean square of a signal's slow residual over that of its noise, below which there is none."""

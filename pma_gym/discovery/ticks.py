@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
@@ -21,8 +21,9 @@ from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.parameters import unit
 from pma_gym.discovery.suspects import Suspect
 from pma_gym.documents import read_toml
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

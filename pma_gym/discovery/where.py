@@ -23,7 +23,7 @@ from pma_gym.discovery.leftovers import left_over
 from pma_gym.discovery.regions import LARGEST, SMALLEST, Region, single_regions
 from pma_gym.discovery.residual_maps import residual_map
 from pma_gym.discovery.ticks import PIECE_TICKS, Ticks, ticks_of
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -5,7 +5,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.codegen.threads.sharing import linear_algebra_alone
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.acceptance_floors import Stated, acceptance_floors
@@ -29,9 +30,8 @@ from pma_gym.discovery.rivals import rivals
 from pma_gym.discovery.selection import Selection, select
 from pma_gym.discovery.suspects import suspects
 from pma_gym.discovery.verdict import suspicious
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
-from pma_gym.plant.sharing import linear_algebra_alone
 
 Progress = Callable[[str, int, int], None]
 
@@ -54,7 +54,7 @@ def diagnose(
     The same trials, model and seed give the same answer, whatever the number of jobs or cores.
 
     Args:
-        trials: measured trials, or a data set (`pma_gym.data.dataset.read_dataset`).
+        trials: measured trials, or a data set (`pma_gym.data.datasets.dataset.read_dataset`).
         model: the model to compare with; what the data set names, else station.
         seed: of simulated chance.
         jobs: how many threads simulate.

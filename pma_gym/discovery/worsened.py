@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import TrialRecord
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -1,65 +1,65 @@
 """The catalogue: every phenomenon that a plant can have, one file each."""
 
-from pma_gym.effects.bearing_friction import BEARING_FRICTION
-from pma_gym.effects.cable import CABLE
-from pma_gym.effects.colbrunn import COLBRUNN_SPRING
-from pma_gym.effects.contractile_force import CONTRACTILE_FORCE
-from pma_gym.effects.coulomb_friction import COULOMB_FRICTION
-from pma_gym.effects.creep import CREEP, SLOW_CREEP
-from pma_gym.effects.current_imbalance import CURRENT_IMBALANCE
-from pma_gym.effects.damping import DAMPING, SYMMETRIC_DAMPING
+from pma_gym.effects.cable.cable import CABLE
+from pma_gym.effects.cable.hanging_load import HANGING_LOAD
+from pma_gym.effects.cable.leg import LEG
 from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
-from pma_gym.effects.drive import DRIVE
-from pma_gym.effects.drive_dead_zone import DRIVE_DEAD_ZONE
-from pma_gym.effects.drive_lag import DRIVE_LAG
-from pma_gym.effects.drive_saturation import DRIVE_SATURATION
+from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
+from pma_gym.effects.drive.current_imbalance import CURRENT_IMBALANCE
+from pma_gym.effects.drive.drive import DRIVE
+from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_ZONE
+from pma_gym.effects.drive.drive_lag import DRIVE_LAG
+from pma_gym.effects.drive.drive_saturation import DRIVE_SATURATION
+from pma_gym.effects.drive.position_map import POSITION_MAP
+from pma_gym.effects.drive.rotor import ROTOR
+from pma_gym.effects.drive.servo import SERVO, SERVO_INERTIA
+from pma_gym.effects.drive.torque_ripple import TORQUE_RIPPLE
+from pma_gym.effects.drive.two_way_drive import TWO_WAY_DRIVE
 from pma_gym.effects.effect import Effect
-from pma_gym.effects.filling import FILLING
-from pma_gym.effects.geometric_force import (
+from pma_gym.effects.limits import LIMITS, VALIDITY
+from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
+from pma_gym.effects.muscle.contractile_force import CONTRACTILE_FORCE
+from pma_gym.effects.muscle.creep import CREEP, SLOW_CREEP
+from pma_gym.effects.muscle.damping import DAMPING, SYMMETRIC_DAMPING
+from pma_gym.effects.muscle.geometric_force import (
     CALDWELL_FORCE,
     CHOU_HANNAFORD_FORCE,
     SCHULTE_FORCE,
     SCHULZ_FORCE,
     TONDU_LOPEZ_FORCE,
 )
-from pma_gym.effects.hanging_load import HANGING_LOAD
-from pma_gym.effects.hysteresis import HYSTERESIS
-from pma_gym.effects.leg import LEG
-from pma_gym.effects.limits import LIMITS, VALIDITY
-from pma_gym.effects.load_dependent_damping import LOAD_DEPENDENT_DAMPING
-from pma_gym.effects.nonlinear_stiffness import NONLINEAR_STIFFNESS
-from pma_gym.effects.operator import OPERATOR
-from pma_gym.effects.passive_stretch import PASSIVE_STRETCH
-from pma_gym.effects.position_map import POSITION_MAP
-from pma_gym.effects.potentiometer_backlash import POTENTIOMETER_BACKLASH
-from pma_gym.effects.pressure_curvature import PRESSURE_CURVATURE
-from pma_gym.effects.regulator import REGULATOR_LAG, REGULATOR_LINE
-from pma_gym.effects.regulator_asymmetry import REGULATOR_ASYMMETRY
-from pma_gym.effects.regulator_deadband import REGULATOR_DEADBAND
-from pma_gym.effects.regulator_rate_limit import REGULATOR_RATE_LIMIT
-from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
+from pma_gym.effects.muscle.hysteresis import HYSTERESIS
+from pma_gym.effects.muscle.load_dependent_damping import LOAD_DEPENDENT_DAMPING
+from pma_gym.effects.muscle.nonlinear_stiffness import NONLINEAR_STIFFNESS
+from pma_gym.effects.muscle.passive_stretch import PASSIVE_STRETCH
+from pma_gym.effects.muscle.pressure_curvature import PRESSURE_CURVATURE
+from pma_gym.effects.muscle.repperger import REPPERGER_DAMPING, REPPERGER_SPRING
+from pma_gym.effects.muscle.sarosi import SAROSI_FORCE
+from pma_gym.effects.muscle.stiffness import STIFFNESS
+from pma_gym.effects.muscle.warm_up import WARM_UP
+from pma_gym.effects.regulator.filling import FILLING
+from pma_gym.effects.regulator.regulator import REGULATOR_LAG, REGULATOR_LINE
+from pma_gym.effects.regulator.regulator_asymmetry import REGULATOR_ASYMMETRY
+from pma_gym.effects.regulator.regulator_deadband import REGULATOR_DEADBAND
+from pma_gym.effects.regulator.regulator_rate_limit import REGULATOR_RATE_LIMIT
 from pma_gym.effects.residual_law import (
     RESIDUAL_FORCE_OF_CONTRACTION,
     RESIDUAL_FORCE_OF_PRESSURE,
     RESIDUAL_FORCE_OF_VELOCITY,
     RESIDUAL_LOAD,
 )
-from pma_gym.effects.rotor import ROTOR
-from pma_gym.effects.sarosi import SAROSI_FORCE
-from pma_gym.effects.sensor_errors import (
+from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
+from pma_gym.effects.sensors.sensor_errors import (
     LOAD_CELL_ERROR,
     LVDT_ERROR,
     POTENTIOMETER_ERROR,
     PRESSURE_TRANSDUCER_ERROR,
 )
-from pma_gym.effects.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
-from pma_gym.effects.servo import SERVO, SERVO_INERTIA
-from pma_gym.effects.slide import SLIDE
-from pma_gym.effects.start import START
-from pma_gym.effects.stiffness import STIFFNESS
-from pma_gym.effects.torque_ripple import TORQUE_RIPPLE
-from pma_gym.effects.two_way_drive import TWO_WAY_DRIVE
-from pma_gym.effects.warm_up import WARM_UP
+from pma_gym.effects.sensors.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
+from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
+from pma_gym.effects.slide.operator import OPERATOR
+from pma_gym.effects.slide.slide import SLIDE
+from pma_gym.effects.slide.start import START
 
 CATALOGUE: dict[str, Effect] = {
     effect.name: effect

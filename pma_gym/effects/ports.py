@@ -1,8 +1,9 @@
 """What an effect that is added to a station may depend on, and what leaves the station as it is.
 
-The station (`pma_gym.plant.station`) computes its signals one after the other, and finds its rest
-without the cable; so a law sees at its port what is known there. Rates of memories come last and
-see everything. `tests/effects/test_own.py` holds this table and the station together.
+The station (`pma_gym.plant.rigs.station`) computes its signals one after the other, and finds
+its rest without the cable; so a law sees at its port what is known there. Rates of memories come
+last and see everything. `tests/effects/test_user_effects.py` holds this table and the station
+together.
 """
 
 from dataclasses import dataclass

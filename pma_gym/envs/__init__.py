@@ -2,13 +2,13 @@
 
 import gymnasium as gym
 
-from pma_gym.envs.knowledge import Reading, Reference, Station
-from pma_gym.envs.options import Options
+from pma_gym.engine.options import Options
+from pma_gym.engine.reward_function import RewardFunction
+from pma_gym.engine.snapshot import StateError
 from pma_gym.envs.pma_env import PMAEnv
-from pma_gym.envs.reward_function import RewardFunction
-from pma_gym.envs.snapshot import StateError
 from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.state import EnvState
+from pma_gym.envs.station_info import Reading, Reference, Station
 from pma_gym.envs.vector import PMAVectorEnv
 from pma_gym.tasks import EVERY_TASK
 

@@ -7,8 +7,8 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.options import Pressure, parse_pressure, parse_pressures
-from pma_gym.envs.plain_values import plain_scalar
+from pma_gym.engine.options import Pressure, parse_pressure, parse_pressures
+from pma_gym.engine.plain_values import plain_scalar
 
 
 def all_seeds(seed: int | Sequence[int | None] | None, count: int) -> list[int | None]:

@@ -4,7 +4,7 @@ import copy
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
-from pma_gym.envs.options import Options
+from pma_gym.engine.options import Options
 from pma_gym.envs.setup import Setup
 from pma_gym.pickling import Packed, packed
 

@@ -1,24 +1,58 @@
 """One environment of a batch, read as a single environment."""
 
 import copy
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NoReturn, Self
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn, Protocol, Self
 
 import numpy as np
+from gymnasium import spaces
+from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from pma_gym.envs.command import CommandLine
-from pma_gym.envs.history import History, RecordingEngine
-from pma_gym.envs.options import check_known
+from pma_gym.engine.actions import CommandLine
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.options import Options, check_known
 from pma_gym.envs.pma_env import NOT_BEGUN, RESET_OPTIONS, PMAEnv
+from pma_gym.envs.rendering.history import History, RecordingEngine
 from pma_gym.envs.summary import step_info
 from pma_gym.plant.plant import Plant
-from pma_gym.tasks import limit_in_words
-
-if TYPE_CHECKING:
-    from pma_gym.envs.vector import PMAVectorEnv
+from pma_gym.tasks import Task, limit_in_words
 
 TOGETHER = "the environments of a batch share one engine"
+
+
+class Batch(Protocol):
+    """What a view of one environment uses of its batch; see `PMAVectorEnv`."""
+
+    engine: Engine
+    num_envs: int
+    options: Options
+    task: Task
+    table: ObservationTable
+    render_mode: str | None
+    metadata: dict[str, Any]
+    # In quotes: Gymnasium 1.1's Box takes no type.
+    single_observation_space: "spaces.Box[Any]"
+    single_action_space: "spaces.Box[Any]"
+    _begun: NDArray[np.bool_]
+    _ended: NDArray[np.bool_]
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """How Gymnasium made it."""
+        ...
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> tuple[NDArray[np.float32], dict[str, Any]]:
+        """Begin an episode in every environment, or in those of `reset_mask`."""
+        ...
+
+    def _drawing(self) -> Any: ...  # noqa: ANN401 - a Picture, whose module needs matplotlib
 
 
 class BatchMember(PMAEnv):
@@ -33,9 +67,9 @@ class BatchMember(PMAEnv):
         index: number of the environment, from 0.
     """
 
-    _batch: "PMAVectorEnv"
+    _batch: Batch
 
-    def __init__(self, batch: "PMAVectorEnv", index: int) -> None:
+    def __init__(self, batch: Batch, index: int) -> None:
         """Find the environment's numbers in the batch."""
         engine = batch.engine
         block, lane = divmod(index, engine.width)

@@ -11,15 +11,11 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from pma_gym.envs.advance import NOT_READ
-from pma_gym.envs.batch import parse_seed
-from pma_gym.envs.command import CommandLine
-from pma_gym.envs.copies import Copies
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.history import History
-from pma_gym.envs.kernel_writer import BAD_ACTION
-from pma_gym.envs.knowledge import Reading, Reference, Station, detached_task
-from pma_gym.envs.options import (
+from pma_gym.engine.actions import CommandLine
+from pma_gym.engine.cpu.python_step import NOT_READ
+from pma_gym.engine.cpu.step_writer import BAD_ACTION
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import (
     Pressure,
     check_known,
     check_named,
@@ -27,20 +23,25 @@ from pma_gym.envs.options import (
     parse_pressure,
     parse_task,
 )
-from pma_gym.envs.record import OPERATOR, PARTS, START, TRUTH
-from pma_gym.envs.reward_function import FunctionRewards
+from pma_gym.engine.snapshot import put, take
+from pma_gym.engine.state_layout import OPERATOR, PARTS, START, TRUTH
+from pma_gym.envs.batch import parse_seed
+from pma_gym.envs.copies import Copies
+from pma_gym.envs.function_rewards import FunctionRewards
+from pma_gym.envs.rendering.history import History
 from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
-from pma_gym.envs.snapshot import put, take
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
+from pma_gym.envs.station_info import Reading, Reference, Station, detached_task
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Events, Human, Task
 
 if TYPE_CHECKING:
-    from pma_gym.envs.picture import Picture
+    from pma_gym.envs.rendering.picture import Picture
 
 RESET_OPTIONS = ("pressure_kpa",)
 NOT_BEGUN = "no episode has begun"
@@ -630,7 +631,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     def _drawing(self) -> "Picture":
         if self._picture is None:
             # Imported here: an environment without pictures needs no matplotlib.
-            from pma_gym.envs.picture import Picture
+            from pma_gym.envs.rendering.picture import Picture
 
             self._picture = Picture(self.task)
         return self._picture

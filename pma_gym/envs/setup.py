@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from pma_gym.effects.own import source_of
-from pma_gym.envs.engine import Engine
+from pma_gym.effects.user_effects import source_of
+from pma_gym.engine.engine import Engine
 from pma_gym.plant.model import Model
 
 Setup = tuple[tuple[str, str], ...]

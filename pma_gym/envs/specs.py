@@ -12,11 +12,8 @@ from typing import Any
 import gymnasium as gym
 from gymnasium.envs.registration import EnvSpec, WrapperSpec
 
-from pma_gym.envs.plain_values import plain_options
-
-
-class DefaultSteps(int):
-    """A number of steps that follows from the options, not one that a user asked for."""
+from pma_gym.engine.options import DefaultSteps
+from pma_gym.engine.plain_values import plain_options
 
 
 class SingleEnvWrappers(tuple[WrapperSpec, ...]):

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from pma_gym.engine.snapshot import Snapshot, StateError
 from pma_gym.envs.setup import Setup, differences
-from pma_gym.envs.snapshot import Snapshot, StateError
 from pma_gym.envs.state_models import model_document, parse_model_document
 
 FORM = "pma-gym environment state 1"

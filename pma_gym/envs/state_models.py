@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.envs.snapshot import StateError
+from pma_gym.engine.snapshot import StateError
 from pma_gym.plant.model import Model, Note
 from pma_gym.units import Quantity
 

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.advance import TRUTHS
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.record import PEAKS, WORK
+from pma_gym.engine.cpu.python_step import TRUTHS
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.state_layout import PEAKS, WORK
 from pma_gym.metrics import percent_of_range
 from pma_gym.tasks import PACE, Task, limit_in_words
 from pma_gym.units import SI_FACTORS

@@ -12,15 +12,11 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from pma_gym.envs.advance import TRUTHS
-from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
-from pma_gym.envs.command import CommandLine
-from pma_gym.envs.copies import Copies
-from pma_gym.envs.engine import ActionError, Engine
-from pma_gym.envs.history import RecordingEngine
-from pma_gym.envs.member import BatchMember
-from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import (
+from pma_gym.engine.actions import CommandLine
+from pma_gym.engine.cpu.python_step import TRUTHS
+from pma_gym.engine.engine import ActionError, Engine
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.options import (
     Pressure,
     check_count,
     check_known,
@@ -29,19 +25,23 @@ from pma_gym.envs.options import (
     parse_pressures,
     parse_task,
 )
-from pma_gym.envs.plain_values import plain_scalar
-from pma_gym.envs.record import PARTS
-from pma_gym.envs.reward_function import FunctionRewards
+from pma_gym.engine.plain_values import plain_scalar
+from pma_gym.engine.snapshot import put, take
+from pma_gym.engine.state_layout import PARTS
+from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
+from pma_gym.envs.copies import Copies
+from pma_gym.envs.function_rewards import FunctionRewards
+from pma_gym.envs.member import BatchMember
+from pma_gym.envs.rendering.history import RecordingEngine
 from pma_gym.envs.seeding import SeededByReset, own_seeds
 from pma_gym.envs.setup import SINGLE, Setup, setup
-from pma_gym.envs.snapshot import put, take
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
 from pma_gym.tasks import Task, limit_in_words
 
 if TYPE_CHECKING:
-    from pma_gym.envs.picture import Picture
+    from pma_gym.envs.rendering.picture import Picture
 
 OWN = ("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa", "render_mode")
 """Keyword arguments of a batch beside the options."""
@@ -475,7 +475,7 @@ class PMAVectorEnv(
     def _drawing(self) -> "Picture":
         if self._picture is None:
             # Imported here: environments without pictures need no matplotlib.
-            from pma_gym.envs.picture import Picture
+            from pma_gym.envs.rendering.picture import Picture
 
             self._picture = Picture(self.task)
         return self._picture

@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.plant.plant import OUTPUTS, Condition, Plant
-from pma_gym.plant.station_rest import static_force
+from pma_gym.plant.compiled_model import OUTPUTS, CompiledModel
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.equilibrium.force_balance import static_force
+from pma_gym.plant.equilibrium.solver import equilibrium_at
 
 if TYPE_CHECKING:
     import control
@@ -32,7 +34,7 @@ _AWAY = 1e-6
 
 
 def linearize(
-    plant: Plant, pressure: float, contraction: float, direction: str = "relaxing"
+    plant: CompiledModel, pressure: float, contraction: float, direction: str = "relaxing"
 ) -> "control.StateSpace":
     """The plant near rest at a pressure and a contraction, as a linear system.
 
@@ -56,7 +58,10 @@ def linearize(
 
 
 def linearize_at(
-    plant: Plant, rest: Condition, commands: tuple[float, float], direction: str = "relaxing"
+    plant: CompiledModel,
+    rest: Condition,
+    commands: tuple[float, float],
+    direction: str = "relaxing",
 ) -> "control.StateSpace":
     """The plant near a condition at rest, as `linearize`; it need not be searched for.
 
@@ -94,7 +99,7 @@ def linearize_at(
 
 
 def operating_point(
-    plant: Plant, pressure: float, contraction: float
+    plant: CompiledModel, pressure: float, contraction: float
 ) -> tuple[Condition, tuple[float, float]]:
     """The condition at rest at a contraction, and the voltages that hold it.
 
@@ -103,14 +108,14 @@ def operating_point(
     """
     regulator = plant.regulator_voltage(pressure)
     motor = _holding_voltage(plant, regulator, contraction)
-    return plant.settle(motor, regulator_voltage=regulator), (motor, regulator)
+    return equilibrium_at(plant, motor, regulator), (motor, regulator)
 
 
-def _holding_voltage(plant: Plant, regulator: float, contraction: float) -> float:
+def _holding_voltage(plant: CompiledModel, regulator: float, contraction: float) -> float:
     from scipy.optimize import root_scalar
 
     def off(voltage: float) -> float:
-        state = plant.settle(voltage, regulator_voltage=regulator).state
+        state = equilibrium_at(plant, voltage, regulator).state
         return float(plant.observe(state[None, :], 0.0)["contraction"][0]) - contraction
 
     strongest = _strongest(plant, regulator)
@@ -124,18 +129,18 @@ def _holding_voltage(plant: Plant, regulator: float, contraction: float) -> floa
     return float(root_scalar(off, method="brentq", bracket=(0.0, strongest), xtol=1e-12).root)
 
 
-def _strongest(plant: Plant, regulator: float) -> float:
+def _strongest(plant: CompiledModel, regulator: float) -> float:
     """Highest motor voltage whose load the muscle balances within its stroke."""
     if plant.model.plant == "cascade":
         return 10.0
-    state = plant.settle(0.0, regulator_voltage=regulator).state
+    state = equilibrium_at(plant, 0.0, regulator).state
     most = static_force(plant, state)(-plant.model.parameters["limits"].stretch)
     drive = plant.model.parameters["drive"]
     return min(10.0, (most - drive.offset) / drive.gain)
 
 
 def _by_state(
-    plant: Plant, base: Condition, commands: tuple[float, float], kept: list[int]
+    plant: CompiledModel, base: Condition, commands: tuple[float, float], kept: list[int]
 ) -> np.ndarray:
     columns = []
     for high, low, step in _pairs(plant, base.state, kept):
@@ -145,7 +150,7 @@ def _by_state(
     return np.stack(columns, axis=1)
 
 
-def _by_input(plant: Plant, base: Condition, commands: tuple[float, float]) -> np.ndarray:
+def _by_input(plant: CompiledModel, base: Condition, commands: tuple[float, float]) -> np.ndarray:
     columns = []
     for step in _VOLTAGE_STEP * np.eye(len(INPUTS)):
         (motor, regulator), zero = commands, base.zero_contraction
@@ -155,7 +160,7 @@ def _by_input(plant: Plant, base: Condition, commands: tuple[float, float]) -> n
     return np.stack(columns, axis=1)
 
 
-def _outputs(plant: Plant, rest: Condition, kept: list[int]) -> np.ndarray:
+def _outputs(plant: CompiledModel, rest: Condition, kept: list[int]) -> np.ndarray:
     columns = []
     for high, low, step in _pairs(plant, rest.state, kept):
         seen = plant.observe(np.stack([high, low]), rest.zero_contraction)
@@ -164,7 +169,7 @@ def _outputs(plant: Plant, rest: Condition, kept: list[int]) -> np.ndarray:
 
 
 def _pairs(
-    plant: Plant, state: np.ndarray, kept: list[int]
+    plant: CompiledModel, state: np.ndarray, kept: list[int]
 ) -> list[tuple[np.ndarray, np.ndarray, float]]:
     """The state moved up and down along each kept state, and the step."""
     pairs = []

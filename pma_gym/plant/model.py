@@ -16,8 +16,8 @@ from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.limits import LimitError
-from pma_gym.plant import cascade, slide, station
-from pma_gym.plant.compose import Port
+from pma_gym.plant.composition import Port
+from pma_gym.plant.rigs import cascade, slide, station
 from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1

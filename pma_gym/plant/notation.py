@@ -8,10 +8,11 @@ from abc import abstractmethod
 from collections.abc import Callable
 from typing import Any
 
+from pma_gym.codegen.graph import HELD, Graph
+from pma_gym.codegen.rebinding import rebind
 from pma_gym.effects.effect import Effect, Parameters
-from pma_gym.kernels.graph import HELD, Graph
-from pma_gym.kernels.lanes import rebind
-from pma_gym.plant.compose import COMMANDS, ZERO, Equations
+from pma_gym.integrator.equations import COMMANDS, ZERO
+from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
 
 
@@ -33,7 +34,7 @@ class Names:
         return self._make(name)
 
 
-class Notation(Equations):
+class Notation(PlantEquations):
     """A plant's equations with values of another kind.
 
     Args:
@@ -65,7 +66,7 @@ class Notation(Equations):
 
     def call(self, effect: Effect, law: Callable, **other: Any) -> Any:  # noqa: ANN401
         """As in the equations that are compiled."""
-        return rebind(Equations.call, {"trace": self.apply})(self, effect, law, **other)
+        return rebind(PlantEquations.call, {"trace": self.apply})(self, effect, law, **other)
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
         """The memory of an effect, where it stands."""

@@ -17,11 +17,12 @@ from types import ModuleType
 
 import numpy as np
 
-from pma_gym.kernels.graph import Value
-from pma_gym.kernels.text import python_text
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.compose import COMMANDS, ZERO
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.text import python_text
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.integrator.equations import COMMANDS, ZERO
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
 
 
@@ -118,7 +119,7 @@ class PlainPlant:
     ) -> Iterator[Made]:
         """All attempts of `Plant.step`, one by one; the condition moves along with them."""
         left, zero = duration, condition.zero_contraction
-        condition.hear(motor_voltage, regulator_voltage)
+        condition.receive(motor_voltage, regulator_voltage)
         while left > 0.0:
             given = (motor_voltage, regulator_voltage)
             made = self.attempt(condition.state, given, zero, condition.size, left)

@@ -9,30 +9,33 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 
 import numpy as np
-from llvmlite import ir
 
-from pma_gym.effects.own import source_of
-from pma_gym.kernels.control import (
+from pma_gym.codegen.graph import FIXED, Value
+from pma_gym.codegen.machine.control import (
     DOUBLE,
     INTEGER,
     POINTER,
     Builder,
+    Module,
     Operand,
     function,
     integer,
     loop,
     offset,
+    real,
 )
-from pma_gym.kernels.graph import FIXED, Value
-from pma_gym.kernels.llvm import Lanes
-from pma_gym.kernels.native import compiled, simd_lanes
-from pma_gym.kernels.substitute import substitute
-from pma_gym.kernels.trace import live_inputs
-from pma_gym.plant.compose import COMMANDS, ZERO, Equations
-from pma_gym.plant.march import memory
+from pma_gym.codegen.machine.native import compiled, simd_lanes
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.substitute import substitute
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.effects.user_effects import source_of
+from pma_gym.integrator.equations import COMMANDS, ZERO
+from pma_gym.integrator.integration import memory
+from pma_gym.integrator.system import System, at_rest, rates
+from pma_gym.integrator.trial_kernel import write_simulate
+from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
-from pma_gym.plant.system import System, at_rest, rates, static_force, system
-from pma_gym.plant.trial_kernel import write_simulate
+from pma_gym.plant.system import static_force, system
 
 FIRST_S = 7e-4
 """First attempt at a step from rest (s)."""
@@ -102,9 +105,9 @@ class Program:
         return system(self.model, ramped=True)
 
     @cached_property
-    def equations(self) -> Equations:
+    def equations(self) -> PlantEquations:
         """The equations with commands held, without the arithmetic of a step."""
-        equations = Equations(self.model.effects, self.model.parameters)
+        equations = PlantEquations(self.model.effects, self.model.parameters)
         PLANTS[self.model.plant].write_equations(equations)
         return equations
 
@@ -123,8 +126,8 @@ class Program:
             self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
         self.table_size = int(get("table_size", [], whole)())
 
-    def _build(self) -> ir.Module:
-        module = ir.Module()
+    def _build(self) -> Module:
+        module = Module()
         self._table(module)
         self._derivative(module)
         self._observe(module)
@@ -145,8 +148,8 @@ class Program:
     def _simulate(self, width: int) -> Callable:
         """A library of its own: who simulates many trials of a model seldom simulates one."""
 
-        def build() -> ir.Module:
-            module = ir.Module()
+        def build() -> Module:
+            module = Module()
             write_simulate(module, self.ramped, width)
             return module
 
@@ -165,7 +168,7 @@ class Program:
             if value.level == FIXED
         }
 
-    def _table(self, module: ir.Module) -> None:
+    def _table(self, module: Module) -> None:
         """Everything that is fixed for a model, from its vector."""
         fixed = self.ramped.layout.fixed
         b, (vector, out) = function(module, "table", [("vector", POINTER), ("out", POINTER)])
@@ -177,7 +180,7 @@ class Program:
         b, _ = function(module, "table_size", [], INTEGER)
         b.ret(integer(len(fixed)))
 
-    def _derivative(self, module: ir.Module) -> None:
+    def _derivative(self, module: Module) -> None:
         """Rates of many states at once, each with its commands and x0, and its own vector."""
         eq = self.equations
         b, (count, states, inputs, vectors, stride, out) = function(
@@ -205,7 +208,7 @@ class Program:
         """Rates of all states and memories, where a step begins."""
         return rates(self.equations)
 
-    def _observe(self, module: ir.Module) -> None:
+    def _observe(self, module: Module) -> None:
         eq = self.equations
         outputs = substitute(list(eq.outputs.values()), at_rest(eq))
         b, (count, states, zero, vector, out) = function(
@@ -226,7 +229,7 @@ class Program:
                 b.store(found[value.id], offset(b, out, where))
         b.ret_void()
 
-    def _balance(self, module: ir.Module) -> None:
+    def _balance(self, module: Module) -> None:
         """Contraction at which the muscle balances a load, by halving, memories at zero."""
         eq = self.equations
         (force,) = substitute([static_force(eq)], {})
@@ -256,7 +259,7 @@ HALVINGS = 60
 
 def balanced(
     b: Builder,
-    eq: Equations,
+    eq: PlantEquations,
     force: Value,
     known: dict[int, Operand],
     load: Operand,
@@ -273,17 +276,17 @@ def balanced(
         reach: greatest stretch and contraction (m); twice these is where it searches.
     """
     low, high = memory(b, DOUBLE), memory(b, DOUBLE)
-    b.store(b.fmul(ir.Constant(DOUBLE, -2.0), reach[0]), low)
-    b.store(b.fmul(ir.Constant(DOUBLE, 2.0), reach[1]), high)
+    b.store(b.fmul(real(-2.0), reach[0]), low)
+    b.store(b.fmul(real(2.0), reach[1]), high)
     with loop(b, HALVINGS):
         a, c = b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE)
-        middle = b.fmul(ir.Constant(DOUBLE, 0.5), b.fadd(a, c))
+        middle = b.fmul(real(0.5), b.fadd(a, c))
         found = Lanes(1).emit(b, [force], {**known, eq["contraction"].id: middle})[force.id]
         pulls = b.fcmp_ordered(">", found, load)
         b.store(b.select(pulls, middle, a), low)
         b.store(b.select(pulls, c, middle), high)
     half = b.fadd(b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE))
-    return b.fmul(ir.Constant(DOUBLE, 0.5), half)
+    return b.fmul(real(0.5), half)
 
 
 _programs: dict[tuple[str, ...], Program] = {}

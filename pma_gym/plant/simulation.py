@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from pma_gym.codegen.threads.sharing import share
+from pma_gym.integrator.trial_kernel import JOB
 from pma_gym.plant.program import FIRST_S, Program
-from pma_gym.plant.sharing import share
-from pma_gym.plant.trial_kernel import JOB
 
 FEW = 4
 """Fewer trials than this run in scalar code, whose single step is faster."""

@@ -4,8 +4,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from pma_gym.codegen.rebinding import lanes
 from pma_gym.effects.effect import signals
-from pma_gym.plant.lanes import lanes
 from pma_gym.plant.model import Model
 
 _HALVINGS = 48

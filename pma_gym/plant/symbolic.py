@@ -4,15 +4,15 @@ from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from pma_gym.kernels.lanes import rebind
+from pma_gym.codegen.rebinding import rebind
+from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.notation import Names, Notation
-from pma_gym.plant.plant import Plant
 
 if TYPE_CHECKING:
     import sympy
 
 
-def symbolic(plant: Plant) -> "dict[str, sympy.Expr]":
+def symbolic(plant: CompiledModel) -> "dict[str, sympy.Expr]":
     """The plant's equations of motion.
 
     Needs SymPy (`pip install "pma-gym[symbolic]"`).

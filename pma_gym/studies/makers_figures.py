@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from pma_gym.plant.exercise_device.parallel_muscles import TESTED, muscles, scaled_force
 from pma_gym.plant.model import Model
-from pma_gym.plant.muscles import TESTED, muscles, scaled_force
 from pma_gym.plant.statics import contraction_at, muscle_force
 
 RATED_PRESSURE = 600e3

@@ -3,7 +3,13 @@
 from typing import NamedTuple
 
 from pma_gym.data.serres2008 import load_table
-from pma_gym.plant.exercise import FULL_ANGLE, Device, own_device, pressure_grid, resistive_moment
+from pma_gym.plant.exercise_device.device import (
+    FULL_ANGLE,
+    Device,
+    own_device,
+    pressure_grid,
+    resistive_moment,
+)
 from pma_gym.plant.model import Model
 from pma_gym.studies.station_limits import load_at_rotation
 from pma_gym.units import SI_FACTORS

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.kernels.random import philox, uniforms
+from pma_gym.codegen.random import philox, uniforms
 from pma_gym.units import SI_FACTORS
 
 SPACING_S = 2.5

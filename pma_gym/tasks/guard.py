@@ -25,8 +25,8 @@ Source:
 
 from typing import Any, NamedTuple
 
-from pma_gym.kernels.generic import where
-from pma_gym.plant.exercise import FULL_ANGLE
+from pma_gym.codegen.generic import where
+from pma_gym.plant.exercise_device.device import FULL_ANGLE
 from pma_gym.units import SI_FACTORS
 
 SPEED_FILTER_S = 0.04

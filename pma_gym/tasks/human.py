@@ -10,8 +10,8 @@ The intended angle is the ideal one, `reaction` late. The plan is the moment tha
 at an angle, as far as somebody knows who has done it before: what the device gives at the trial's
 first pressure where it is to hold the speed, and the prescription where it is to hold a moment. He
 errs in it by his effort. w wanders with a time constant of 0.3 s; s(angle) is the shape of the
-knee's largest torque (`pma_gym.plant.knee`), which ends beyond the straight leg; he sees it coming
-and slackens before. He extends the knee and never pulls it back.
+knee's largest torque (`pma_gym.plant.exercise_device.knee`), which ends beyond the straight leg;
+he sees it coming and slackens before. He extends the knee and never pulls it back.
 
 Where the device sets the pace he pushes and lets it move him (`stiffness` near 0); where it sets
 the moment he moves his leg where he means it to be (`stiffness` of a joint that resists).
@@ -27,9 +27,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.kernels.generic import floor, where
-from pma_gym.kernels.random import normals, philox, sine_cosine, uniforms
-from pma_gym.plant.knee import BODY_HEIGHT, BODY_MASS, GRAVITY, STRENGTH, knee_share
+from pma_gym.codegen.generic import floor, where
+from pma_gym.codegen.random import normals, philox, sine_cosine, uniforms
+from pma_gym.plant.exercise_device.knee import BODY_HEIGHT, BODY_MASS, GRAVITY, STRENGTH, knee_share
 
 WANDER_S = 0.3
 """Time constant of the unsteadiness (s): most of it lies below 2 Hz, an assumption."""
@@ -88,7 +88,7 @@ HUMAN_BOUNDS: dict[str, tuple[float, float, str]] = {
 """What a person's numbers must lie between, and their units: beyond is a slip of the pen."""
 
 TYPICAL_STRENGTH = STRENGTH * BODY_MASS * GRAVITY * BODY_HEIGHT
-"""Largest torque of a young man's knee (N m): `pma_gym.plant.knee`."""
+"""Largest torque of a young man's knee (N m): `pma_gym.plant.exercise_device.knee`."""
 
 
 class Population(NamedTuple):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from pma_gym.kernels.generic import where
+from pma_gym.codegen.generic import where
 from pma_gym.plant.model import Model
 from pma_gym.tasks.exercise import Exercise
 from pma_gym.units import SI_FACTORS

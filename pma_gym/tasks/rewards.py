@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
+from pma_gym.codegen.generic import where
 from pma_gym.effects.arithmetic import exponential
-from pma_gym.kernels.generic import where
 
 
 def absolute_reward(error_percent: Any, change: Any) -> Any:  # noqa: ANN401

@@ -17,7 +17,7 @@ from benchmarks.budget.tables import alone_rows, share_rows, waterfall_rows
 from benchmarks.budget.trial import Budget, trial_budget
 from benchmarks.rollout import make_environment, rollout
 from controllers import SerresFeedforward
-from pma_gym.effects.hysteresis import hysteresis_force
+from pma_gym.effects.muscle.hysteresis import hysteresis_force
 from pma_gym.envs import Reading, Station
 from pma_gym.metrics import rmse
 from pma_gym.plant.model import load_model

@@ -17,8 +17,9 @@ from benchmarks.comparison.suite import NOMINAL, Episode
 from benchmarks.contender import Contender, ControllerError
 from benchmarks.processes import run_all
 from benchmarks.rollout import rollout
-from benchmarks.worker import ProcessDied, TookTooLong, begin_limited, end_limited
+from benchmarks.worker import ProcessDied, TookTooLong
 from pma_gym.envs import PMAEnv
+from tests.benchmarks.pieces import exits, is_quick, loops
 
 SUITE = """
 schema = 2
@@ -104,27 +105,9 @@ def test_a_guard_lets_everything_through(tmp_path):
     assert not hasattr(controller, "repetitions")
 
 
-def loops(limit_s):
-    begin_limited("thinking", limit_s)
-    while True:
-        pass
-
-
-def is_quick():
-    begin_limited("thinking", 30.0)
-    end_limited()
-    return "quick"
-
-
-def dies():
-    import os
-
-    os._exit(3)
-
-
 def test_what_takes_too_long_is_ended_and_the_others_are_not():
     results = {}
-    works = [partial(loops, 0.3), is_quick, dies, is_quick]
+    works = [partial(loops, 0.3), is_quick, partial(exits, 3), is_quick]
     assert run_all(works, 2, results.__setitem__, wary=True)
     assert results[1] == results[3] == "quick"
     assert isinstance(results[0], TookTooLong)

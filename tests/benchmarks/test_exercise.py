@@ -11,10 +11,10 @@ from benchmarks.__main__ import app
 from benchmarks.exercise.choice import SEARCHED, Choice
 from benchmarks.exercise.job import run_exercise
 from benchmarks.exercise.profile import ProfileError, held, read_profile
-from pma_gym.plant.exercise import FULL_ANGLE, Device, own_device, resistive_moment
+from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, own_device, resistive_moment
+from pma_gym.plant.exercise_device.parallel_muscles import muscles
+from pma_gym.plant.exercise_device.prescription import UnreachableError
 from pma_gym.plant.model import load_model
-from pma_gym.plant.muscles import muscles
-from pma_gym.plant.prescription import UnreachableError
 
 PROFILE = "angle_deg,moment_nm\n0,10\n30,30\n60,30\n90,20\n"
 

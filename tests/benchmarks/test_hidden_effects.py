@@ -250,7 +250,7 @@ def test_the_truth_is_not_in_the_case(drawn):
 
 
 def test_a_case_is_a_data_set(drawn):
-    dataset = pytest.importorskip("pma_gym.data.dataset")
+    dataset = pytest.importorskip("pma_gym.data.datasets.dataset")
     data = dataset.read_dataset(drawn[0] / "cases" / "case_0002")
     assert len(data) == 3
     last = data.trials[-1]

@@ -19,8 +19,9 @@ from benchmarks.margins import (
 )
 from benchmarks.tuning.plant import linearised, sampled
 from controllers.design.gains import Gains
+from controllers.feedforward_pid import FeedforwardPID
 from controllers.improved_feedforward import ImprovedFeedforward
-from controllers.pid import PID, FeedforwardPID, linear_law
+from controllers.pid import PID, linear_law
 from pma_gym.envs import Reading, Station
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS

@@ -30,14 +30,14 @@ from benchmarks.measured.steps import Step
 from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
 from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import TRIANGLES, Held
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.serres2008 import load_table
-from pma_gym.data.trial_files import TrialWarning
 from pma_gym.discovery.diagnosis import ADDED
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.floors import initial_floors
 from pma_gym.discovery.noise import white_noise
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 
 

@@ -17,6 +17,7 @@ from benchmarks.execution import execute
 from benchmarks.processes import run_all
 from benchmarks.suite import load_suite
 from benchmarks.worker import ProcessDied
+from tests.benchmarks.pieces import awkward, dies_once, exits, kills_itself, raises
 
 ROOT = Path(__file__).parents[2]
 
@@ -48,36 +49,6 @@ if __name__ == "__main__":
     works = [partial(sleeper, folder, index) for index in range(4)]
     print(run_all(works, 2, lambda index, result: print("done", index, flush=True)), flush=True)
 """
-
-
-class Awkward(Exception):
-    """An exception that no other process can make again."""
-
-    def __init__(self, one, two):
-        super().__init__(f"{one} {two}")
-
-
-def exits(code):
-    os._exit(code)
-
-
-def kills_itself():
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-def dies_once(marker):
-    if not marker.exists():
-        marker.touch()
-        os._exit(1)
-    return "alive"
-
-
-def raises(error):
-    raise error
-
-
-def awkward():
-    raise Awkward("one", "two")
 
 
 def run(works, jobs=2):

@@ -14,7 +14,7 @@ from benchmarks.margins import load_step, loops
 from benchmarks.report.plot_style import styles_of
 from controllers import CONTROLLERS
 from controllers.models.operating_range import rest_voltages
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
 from pma_gym.envs import PMAEnv, Station
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant

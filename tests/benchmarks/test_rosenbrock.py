@@ -5,9 +5,9 @@ import pytest
 
 from benchmarks.methods import GRK4T, RODAS4, ROS4L
 from benchmarks.rosenbrock import VELDHUIZEN, step
-from pma_gym.kernels.graph import CHANGING, Graph
-from pma_gym.kernels.text import evaluate
-from pma_gym.plant.compose import State
+from pma_gym.codegen.graph import CHANGING, Graph
+from pma_gym.codegen.text import evaluate
+from pma_gym.integrator.equations import State
 from tests.plant import smooth
 
 METHODS = {

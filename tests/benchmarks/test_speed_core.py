@@ -6,10 +6,10 @@ import pytest
 from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted
 from benchmarks.speed.rows import CORE, EVALUATIONS
 from benchmarks.speed.views import views
-from pma_gym.envs.kernel_writer import Writer
-from pma_gym.kernels.graph import CHANGING
-from pma_gym.kernels.native import simd_lanes
-from pma_gym.kernels.trace import order
+from pma_gym.codegen.graph import CHANGING
+from pma_gym.codegen.machine.native import simd_lanes
+from pma_gym.codegen.trace import order
+from pma_gym.engine.cpu.step_writer import Writer
 
 
 def row(key, per_second, facts=None, right_hand_sides=None):

@@ -13,8 +13,8 @@ from benchmarks.rollout import make_environment, rollout
 from benchmarks.voltages import FEEDFORWARDS
 from controllers import CONTROLLERS
 from pma_gym.cli import app as pma_gym
+from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import TrialWarning, read_trial
 from pma_gym.plant.plant import Plant
 
 

@@ -23,7 +23,7 @@ from benchmarks.hidden_effects.ways import (
 from benchmarks.hidden_effects.ways.prepared import prepare
 from benchmarks.hidden_effects.ways.registry import WAYS
 from benchmarks.hidden_effects.ways.signatures import signature
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import bursts, leftovers, selection, workflow
 from pma_gym.discovery.fits import Bench
 from pma_gym.discovery.noise import white_noise

@@ -10,7 +10,8 @@ from controllers.design.horizon import HORIZON_S, LONGEST, block_lengths, horizo
 from controllers.models.prediction import PLANS, Commands, Foresight
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 
 LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
 DISTURBED = {"disturbances": "regulator_and_operator"}

@@ -8,7 +8,7 @@ import pytest
 
 from controllers import CONTROLLERS, PID, Controller, FeedforwardPID
 from controllers.design.gains import Gains, scheduled_gains
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controllers import SerresFeedforward, SerresReplay
-from controllers.serres import PROFILE_RADIUS
+from controllers.serres_feedforward import PROFILE_RADIUS
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.studies.voltage_profile import reachable_mm
 

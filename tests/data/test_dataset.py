@@ -6,9 +6,9 @@ import warnings
 import numpy as np
 import pytest
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import TrialWarning, write_trial
 from pma_gym.data.trial import Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning, write_trial
 
 ROWS = 60
 

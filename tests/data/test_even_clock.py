@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pma_gym.data.even_clock import even_clock
+from pma_gym.data.files.even_clock import even_clock
 
 
 @pytest.mark.parametrize(

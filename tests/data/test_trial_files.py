@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pma_gym.data import trial_files
+from pma_gym.data.files import trial_files
+from pma_gym.data.files.trial_files import TrialWarning, place_in_file, read_trial, write_trial
 from pma_gym.data.trial import COMMANDS, MEASUREMENTS, Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning, place_in_file, read_trial, write_trial
 
 SUFFIXES = [".csv", ".parquet", ".xlsx"]
 GOOD = "time_s,motor_voltage_v,contraction_mm\n0,0,40\n0.5,1,\n1,2,25.3\n"

@@ -21,8 +21,9 @@ from pma_gym.discovery.diagnosis import (
     ResidualLaw,
     TrialRecord,
 )
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import load_model
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 SIGNALS = {quantity: BY_QUANTITY[quantity] for quantity in OUTPUTS}

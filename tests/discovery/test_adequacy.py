@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.acceptance_floors import (
     Stated,
@@ -19,8 +19,9 @@ from pma_gym.discovery.held_out import fold_of_rows, folds
 from pma_gym.discovery.verdict_words import sentence
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.discovery.worsened import worsened
-from pma_gym.plant.logged import Logged
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import LEVELS, OFF, STATION, commanded, diagnosed, measured
 
 TRUE = dict(zip(OUTPUTS, LEVELS, strict=True))

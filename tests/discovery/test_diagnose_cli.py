@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
+from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import write_trial
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks.hidden_effects.groups import group
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose
 
 HIDDEN = Path(__file__).parent / "hidden"

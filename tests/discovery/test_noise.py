@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.floors import Level, initial_floors
 from pma_gym.discovery.noise import (
@@ -20,8 +20,8 @@ from pma_gym.discovery.noise import (
     white_noise,
 )
 from pma_gym.discovery.quantisation import coarse_sensors
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
-from pma_gym.plant.logged import Logged
 from tests.discovery.laboratory import LEVELS, STATION, measured
 
 CHANNELS = range(4)

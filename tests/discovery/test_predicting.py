@@ -9,8 +9,8 @@ from pma_gym.discovery import predicting
 from pma_gym.discovery.fits import Fitted
 from pma_gym.discovery.predicting import Whole, freedom, unabsorbed
 from pma_gym.discovery.workflow import diagnose
+from pma_gym.estimation.residuals import Sums
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.residuals import Sums
 from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, measured
 
 

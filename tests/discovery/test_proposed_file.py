@@ -5,9 +5,9 @@ import shutil
 import numpy as np
 import pytest
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import read_trial
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_files import read_trial
 from pma_gym.discovery.proposed_file import proposed_file
 from pma_gym.plant.plant import Plant
 from tests.discovery.data_checks.logs import GIVEN, log, write

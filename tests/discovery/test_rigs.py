@@ -12,11 +12,11 @@ from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
 from benchmarks.hidden_effects.groups import group
-from pma_gym.data.clipping import ends
-from pma_gym.data.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.files.trial_files import write_trial
+from pma_gym.data.quality.clipping import ends
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.data.trial_files import write_trial
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.model import ModelError, parse_model
 from pma_gym.plant.plant import Plant
@@ -53,7 +53,17 @@ HIDDEN = {
 """What is hidden in the sets of `rigs/`, its size, and by what share that may be missed."""
 
 
-@pytest.mark.parametrize("name", HIDDEN)
+QUICK = ("raw_volts", "one_long_trial")
+"""Sets that other tests here diagnose too."""
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in QUICK else pytest.mark.example, id=name)
+        for name in HIDDEN
+    ],
+)
 def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     effect, size = HIDDEN[name]
     found = diagnosed(name)

@@ -5,8 +5,8 @@ import pytest
 
 from pma_gym.discovery.suspects import FAR, STAND_INS, bounds, suspects
 from pma_gym.discovery.workflow import diagnose
-from pma_gym.effects import CATALOGUE, own
-from pma_gym.effects.own import load_effects
+from pma_gym.effects import CATALOGUE, user_effects
+from pma_gym.effects.user_effects import load_effects
 from tests.discovery.laboratory import LEVELS, OFF, STATION, bench, laboratory, measured
 
 SUSPECTS = suspects(STATION, [0.0, 1.0])
@@ -39,9 +39,9 @@ def trials():
 
 @pytest.fixture
 def catalogue():
-    kept, sources = dict(CATALOGUE), dict(own._sources)
+    kept, sources = dict(CATALOGUE), dict(user_effects._sources)
     yield CATALOGUE
-    for known, before in ((CATALOGUE, kept), (own._sources, sources)):
+    for known, before in ((CATALOGUE, kept), (user_effects._sources, sources)):
         known.clear()
         known.update(before)
 

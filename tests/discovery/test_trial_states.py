@@ -6,9 +6,9 @@ import tomllib
 
 import pytest
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.data.trial_files import write_trial
 from pma_gym.discovery.diagnosis import TrialState
 from pma_gym.discovery.preparation import prepared
 from pma_gym.discovery.trial_states import dump_states, misfits, read_states

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pma_gym.envs  # noqa: F401
-from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import workflow

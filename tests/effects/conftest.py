@@ -5,8 +5,9 @@ from functools import cache
 import pytest
 
 from pma_gym.effects import CATALOGUE
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
+from pma_gym.plant.plant import Plant
 
 BRAID = {"resting_length_mm": 250.0, "resting_diameter_mm": 20.0, "turns": 2.085}
 FORCE = {"force_slope_n_per_kpa": 2.91, "force_intercept_n": 44.6}

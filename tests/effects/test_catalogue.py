@@ -8,16 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from pma_gym.codegen.graph import CHANGING, Graph
+from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.text import evaluate
+from pma_gym.codegen.trace import trace
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import exponential
 from pma_gym.effects.effect import signals
-from pma_gym.kernels.graph import CHANGING, Graph
-from pma_gym.kernels.text import evaluate
-from pma_gym.kernels.trace import trace
-from pma_gym.plant import cascade, slide, station
-from pma_gym.plant.lanes import lanes
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model, shipped_models
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import cascade, slide, station
 
 SIGNALS = {
     "pressure": (0.0, 600e3),

@@ -5,8 +5,8 @@ import pytest
 
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.current_imbalance import imbalance_load
-from pma_gym.plant.settle import all_at_rest
+from pma_gym.effects.drive.current_imbalance import imbalance_load
+from pma_gym.plant.equilibrium.solver import equilibria_at
 
 RADIUS_M = 25.9e-3
 SEEN_KPA = (150.0, 250.0, 300.0, 400.0, 500.0, 575.0)
@@ -17,7 +17,7 @@ def shares(plant, pressure):
     """Swing of the load as a share of it, contraction (m) and the shaft's angle (rad)."""
     drive, radius = plant.model.parameters["drive"], plant.model.parameters["rotor"].radius
     volts = np.linspace(1.0, 7.0, 60)
-    states, zero = all_at_rest(plant, volts, np.full(60, plant.regulator_voltage(pressure)))
+    states, zero = equilibria_at(plant, volts, np.full(60, plant.regulator_voltage(pressure)))
     truth = [
         plant.observe(state[None, :], start) for state, start in zip(states, zero, strict=True)
     ]

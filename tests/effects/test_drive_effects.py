@@ -5,9 +5,9 @@ import pytest
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.arithmetic import cosine
-from pma_gym.effects.drive_dead_zone import load_beyond_dead_zone
-from pma_gym.effects.drive_lag import late_load, late_rate
-from pma_gym.effects.torque_ripple import ripple_load
+from pma_gym.effects.drive.drive_dead_zone import load_beyond_dead_zone
+from pma_gym.effects.drive.drive_lag import late_load, late_rate
+from pma_gym.effects.drive.torque_ripple import ripple_load
 
 VOLTAGES = np.array([0.0, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0])
 

@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from pma_gym.codegen.rebinding import lanes
 from pma_gym.data.serres2008 import load_table
-from pma_gym.effects.colbrunn import COLBRUNN_SPRING
-from pma_gym.effects.geometric_force import (
+from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
+from pma_gym.effects.muscle.geometric_force import (
     CALDWELL_FORCE,
     CHOU_HANNAFORD_FORCE,
     SCHULTE_FORCE,
     SCHULZ_FORCE,
     TONDU_LOPEZ_FORCE,
 )
-from pma_gym.effects.repperger import REPPERGER_DAMPING, REPPERGER_SPRING, repperger_damping
-from pma_gym.effects.sarosi import SAROSI_FORCE
-from pma_gym.plant.lanes import lanes
+from pma_gym.effects.muscle.repperger import REPPERGER_DAMPING, REPPERGER_SPRING, repperger_damping
+from pma_gym.effects.muscle.sarosi import SAROSI_FORCE
 
 MUSCLE = {"scale": 1.0, "resting_length_mm": 250.0, "resting_diameter_mm": 20.0}
 NUMBERS = {

@@ -5,7 +5,7 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.potentiometer_backlash import play, play_rate
+from pma_gym.effects.sensors.potentiometer_backlash import play, play_rate
 from pma_gym.plant.model import ModelError, load_model
 
 TIME = np.arange(0.0, 20.0, 0.01)

@@ -5,10 +5,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.creep import creep_force, creep_rate
-from pma_gym.effects.filling import ATMOSPHERE, braid_volume, filling_rate
-from pma_gym.effects.load_dependent_damping import load_factor
-from pma_gym.effects.passive_stretch import stretch_force
+from pma_gym.effects.muscle.creep import creep_force, creep_rate
+from pma_gym.effects.muscle.load_dependent_damping import load_factor
+from pma_gym.effects.muscle.passive_stretch import stretch_force
+from pma_gym.effects.regulator.filling import ATMOSPHERE, braid_volume, filling_rate
 from pma_gym.plant.statics import muscle_force
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.plant.settle import NoLoad, all_at_rest
+from pma_gym.plant.equilibrium.solver import NoLoadEquilibria, equilibria_at
 
 
 def pressures(plant, step, dense):
@@ -70,9 +70,9 @@ def test_a_wrong_sensor_reads_a_line_of_the_truth(name, quantity, gain, offset, 
 @pytest.mark.parametrize(("name", "quantity", "gain", "offset"), LINES)
 def test_many_wrong_sensors_begin_at_rest(name, quantity, gain, offset, station_with):
     plant = station_with(name)
-    assert NoLoad(plant)(np.array([300e3])) is None
+    assert NoLoadEquilibria(plant)(np.array([300e3])) is None
     voltages = np.full(2, plant.regulator_voltage(300e3))
-    states, zero = all_at_rest(plant, np.array([0.0, 2.0]), voltages)
+    states, zero = equilibria_at(plant, np.array([0.0, 2.0]), voltages)
     for motor, state, x0 in zip((0.0, 2.0), states, zero, strict=True):
         alone = plant.settle(motor, 300e3)
         np.testing.assert_array_equal(alone.state, state)

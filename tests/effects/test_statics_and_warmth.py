@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pma_gym.effects import CATALOGUE
-from pma_gym.effects.nonlinear_stiffness import stiffening_force
-from pma_gym.effects.warm_up import rested_force
+from pma_gym.effects.muscle.nonlinear_stiffness import stiffening_force
+from pma_gym.effects.muscle.warm_up import rested_force
 from pma_gym.plant.plant import Plant
 
 

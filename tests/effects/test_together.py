@@ -5,9 +5,9 @@ import pytest
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.settle import all_at_rest
 
 MANY = (
     *("nonlinear_stiffness", "warm_up", "drive_delay", "regulator_delay", "regulator_deadband"),
@@ -25,7 +25,7 @@ def test_many_rest_as_one_does(model):
     plant = Plant(model)
     regulator = np.array([plant.regulator_voltage(p) for p in (200e3, 300e3, 500e3)])
     motor = np.array([0.0, 2.0, 4.0])
-    states, zero = all_at_rest(plant, motor, regulator)
+    states, zero = equilibria_at(plant, motor, regulator)
     for i in range(3):
         alone = plant.settle(motor[i], regulator_voltage=regulator[i])
         np.testing.assert_array_equal(alone.state, states[i])

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
+from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.device_engine import DeviceEngine
+from pma_gym.engine.options import Options
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
-from pma_gym.envs.device import DeviceEngine
-from pma_gym.envs.options import Options
-from pma_gym.envs.stand_in import StandIn
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, TASKS, following, varied_station
 

@@ -8,8 +8,8 @@ import types
 import numpy as np
 import pytest
 
+from pma_gym.engine.engine import Engine
 from pma_gym.envs import PMAEnv, Reading, Reference
-from pma_gym.envs.engine import Engine
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import following
 

@@ -7,15 +7,15 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from pma_gym.codegen.random import normals, philox
+from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.device_engine import DeviceEngine
+from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.envs.device import DeviceEngine
-from pma_gym.envs.options import Options
-from pma_gym.envs.stand_in import StandIn
-from pma_gym.kernels.random import normals, philox
-from pma_gym.plant.exercise import own_device, resistive_moment
-from pma_gym.plant.knee import knee_share
+from pma_gym.plant.exercise_device.device import own_device, resistive_moment
+from pma_gym.plant.exercise_device.knee import knee_share
+from pma_gym.plant.exercise_device.prescription import UnreachableError
 from pma_gym.plant.model import load_model
-from pma_gym.plant.prescription import UnreachableError
 from pma_gym.tasks import (
     EXERCISES,
     PACE,

@@ -6,11 +6,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.device_engine import DeviceEngine
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv, Reading
-from pma_gym.envs.device import DeviceEngine
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.options import Options
-from pma_gym.envs.stand_in import StandIn
 from pma_gym.plant.model import load_model
 from pma_gym.plant.statics import contraction_at, muscle_force
 from pma_gym.tasks import ISOTONIC, TASKS, isotonic, phase_rmse

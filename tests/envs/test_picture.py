@@ -5,7 +5,7 @@ import time
 import numpy as np
 import pytest
 
-from pma_gym.envs.rig_drawing import BRAID_ANGLE, LENGTH, RADIUS, bulged_radius
+from pma_gym.envs.rendering.rig_drawing import BRAID_ANGLE, LENGTH, RADIUS, bulged_radius
 
 BLUE = np.array([21, 101, 192])
 """The curve of the true position."""

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from pma_gym.data.protocol import Phase, Protocol
-from pma_gym.envs import PMAEnv, kernel
-from pma_gym.envs.device import DeviceEngine
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.options import Options
-from pma_gym.envs.stand_in import StandIn
+from pma_gym.engine.cpu import kernel
+from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.device_engine import DeviceEngine
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import Options
+from pma_gym.envs import PMAEnv
 from pma_gym.metrics import rmse
 from pma_gym.tasks import TASKS, UNSEEN, following, multisine, phase_rmse, steps
 

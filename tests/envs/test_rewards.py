@@ -88,7 +88,7 @@ def test_batches_give_the_bits_of_single_environments(twins, fragile, mode, func
 
 
 def test_threads_and_sb3_have_the_same_rewards():
-    sb3 = pytest.importorskip("pma_gym.envs.sb3")
+    sb3 = pytest.importorskip("pma_gym.sb3.vec_env")
     made = {**MADE, "reward": smooth, "reward_scale": 0.1}
     first, other = PMAVectorEnv(20, threads=2, **made), sb3.SB3VecEnv(20, **made)
     first.reset(seed=1)
@@ -171,9 +171,9 @@ def test_numpy_numbers_are_numbers_and_options_pickle_with_their_function():
 
 
 def test_a_device_says_that_it_calls_no_function():
-    from pma_gym.envs.device import DeviceEngine
-    from pma_gym.envs.options import Options
-    from pma_gym.envs.stand_in import StandIn
+    from pma_gym.engine.cuda.cpu_device import StandIn
+    from pma_gym.engine.cuda.device_engine import DeviceEngine
+    from pma_gym.engine.options import Options
     from pma_gym.tasks import TASKS
 
     with pytest.raises(ValueError, match="reward must be a name where a device computes it"):

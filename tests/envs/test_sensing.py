@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from pma_gym.data import calibration
-from pma_gym.envs.observation import ObservationTable
-from pma_gym.envs.options import Options
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.options import Options
 from pma_gym.plant.sensors import noise_levels
 from pma_gym.tasks import TASKS
 
@@ -111,7 +111,7 @@ def test_zeros_are_the_same_however_many_readings_are_computed_at_once(monkeypat
         env = make()
         env.reset(seed=3)
         records.append(env._engine.records.copy())
-        monkeypatch.setattr("pma_gym.envs.kernel.simd_lanes", lambda: lanes)
+        monkeypatch.setattr("pma_gym.engine.cpu.kernel.simd_lanes", lambda: lanes)
     np.testing.assert_array_equal(*records)
 
 

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from pma_gym.envs import PMAVectorEnv
-from pma_gym.plant.plant import DEFAULT_TOLERANCE, Plant
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant.plant import Plant
 
 TOLERANCES = 3e-2, 1e-3, DEFAULT_TOLERANCE, 1e-5
 

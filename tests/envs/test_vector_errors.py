@@ -4,8 +4,8 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from pma_gym.engine.engine import ActionError
 from pma_gym.envs import PMAVectorEnv
-from pma_gym.envs.engine import ActionError
 
 MADE = {"model": "serres2008", "pressure_kpa": 300, "control_rate_hz": 10.0}
 

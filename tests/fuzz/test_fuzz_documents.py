@@ -18,7 +18,7 @@ from benchmarks.comparison.suite import parse_suite
 from benchmarks.training.preset import PresetError, load_preset
 from controllers.policies.document import PolicyError, parsed_document
 from controllers.policies.tensor_header import check_header
-from pma_gym.data.dataset_toml import read_description
+from pma_gym.data.datasets.dataset_toml import read_description
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.documents import parse_json, parse_toml, parse_yaml
 from pma_gym.plant.model import ModelError, dump_model, load_model, shipped_models

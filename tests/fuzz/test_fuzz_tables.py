@@ -21,8 +21,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from pma_gym.data.files.trial_files import read_trial, write_trial
 from pma_gym.data.trial import Trial, TrialError
-from pma_gym.data.trial_files import read_trial, write_trial
 
 EXAMPLES = int(os.environ.get("PMA_GYM_FUZZ_EXAMPLES", "60"))
 LONGEST_S = 20.0

@@ -216,8 +216,8 @@ class Diagnose(Command):
 
     def prepare(self) -> None:
         """Simulate two trials of the station, 2 s each."""
+        from pma_gym.data.files.trial_files import write_trial
         from pma_gym.data.trial import Trial
-        from pma_gym.data.trial_files import write_trial
         from pma_gym.plant.plant import Plant
 
         lab, plant = self.folder / "lab", Plant("station")

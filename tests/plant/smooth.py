@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.kernels.graph import CHANGING, Graph
-from pma_gym.kernels.text import evaluate
-from pma_gym.plant.compose import State
-from pma_gym.plant.exponential import Step
+from pma_gym.codegen.graph import CHANGING, Graph
+from pma_gym.codegen.text import evaluate
+from pma_gym.integrator.equations import State
+from pma_gym.integrator.exponential_rosenbrock import Step
 
 START = (2.0, 1.5)
 """Prey and predators."""

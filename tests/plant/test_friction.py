@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pma_gym.effects.coulomb_friction import friction_force, friction_path
-from pma_gym.kernels.text import python_text
-from pma_gym.kernels.trace import live_inputs
+from pma_gym.codegen.text import python_text
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.effects.slide.coulomb_friction import friction_force, friction_path
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import load_model
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
 from pma_gym.plant.simulation import Run, simulate_all
 

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from pma_gym.effects.geometric_force import SchulteForce, schulte_force
+from pma_gym.effects.muscle.geometric_force import SchulteForce, schulte_force
+from pma_gym.plant.exercise_device.parallel_muscles import (
+    TESTED,
+    Muscles,
+    MusclesError,
+    muscles,
+    scaled_force,
+)
 from pma_gym.plant.model import load_model
-from pma_gym.plant.muscles import TESTED, Muscles, MusclesError, muscles, scaled_force
 from pma_gym.plant.statics import muscle_force
 
 PRESSURE, CONTRACTION = np.meshgrid(np.linspace(150e3, 575e3, 9), np.linspace(-0.01, 0.065, 16))

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from benchmarks.reference import demanding_commands
-from pma_gym.plant.attempt import first_size
+from pma_gym.integrator.step_attempt import first_size
+from pma_gym.plant.condition import Condition
 from pma_gym.plant.plain import PlainPlant
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S
 
 MODELS = ("serres2008", "station", "cascade")

@@ -7,8 +7,8 @@ import sys
 import numpy as np
 import pytest
 
-from pma_gym.kernels import native
-from pma_gym.kernels.native import Library, compiled, simd_lanes
+from pma_gym.codegen.machine import native
+from pma_gym.codegen.machine.native import Library, compiled, simd_lanes
 from pma_gym.plant import program as program_module
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -158,7 +158,7 @@ def test_a_cache_that_cannot_be_written_is_replaced_with_one_warning():
         "for name in ('serres2008', 'station'):\n"
         "    plant = Plant(name)\n"
         "    print(plant.settle(0.0, 300e3).zero_contraction)\n"
-        "import pma_gym.kernels.cache as c; print(c.cache_directory())"
+        "import pma_gym.codegen.cache.compile_cache as c; print(c.cache_directory())"
     )
     out, error = run(code, PMA_GYM_CACHE="/proc/nope")
     first, _, folder = out.split()

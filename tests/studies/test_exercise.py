@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from pma_gym.data.serres2008 import load_table
-from pma_gym.plant.exercise import FULL_ANGLE, Device, own_device, resistive_moment
-from pma_gym.plant.knee import dissertations_knee_peak, knee_extension_torque
+from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, own_device, resistive_moment
+from pma_gym.plant.exercise_device.knee import dissertations_knee_peak, knee_extension_torque
+from pma_gym.plant.exercise_device.parallel_muscles import muscles
+from pma_gym.plant.exercise_device.prescription import UnreachableError, follow, hold, smallest
 from pma_gym.plant.model import load_model
-from pma_gym.plant.muscles import muscles
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.prescription import UnreachableError, follow, hold, smallest
 from pma_gym.plant.statics import muscle_force
 from pma_gym.studies.makers_figures import makers_figures
 from pma_gym.studies.moment_ranges import check_moments, lowest_rest_pressure, span

@@ -31,9 +31,9 @@ from controllers.policies.observation_spec import View
 from controllers.policies.policy_file import load_policy_file
 from controllers.policy import Policy
 from pma_gym.envs import Station
-from pma_gym.envs.sb3_policy import LeanMlpPolicy
-from pma_gym.envs.sb3_ppo import LeanPPO
 from pma_gym.plant.model import load_model
+from pma_gym.sb3.policy import LeanMlpPolicy
+from pma_gym.sb3.ppo import LeanPPO
 from pma_gym.tasks import TASKS
 from tests.controllers.drawn_policies import drawn_policy
 

@@ -26,10 +26,10 @@ from scipy.linalg import solve
 from scipy.signal import lfilter
 
 from benchmarks.exercise.lag.rehearsal import RATE_HZ, Course, Exertion, Rehearsals
-from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.operators import ANGLES
-from pma_gym.plant.exercise import own_device
-from pma_gym.plant.prescription import follow_from
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.reset.operators import ANGLES
+from pma_gym.plant.exercise_device.device import own_device
+from pma_gym.plant.exercise_device.prescription import follow_from
 from pma_gym.tasks import PACE
 
 BLOCKS = (4, 1)

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.options import told_model
-from pma_gym.plant.exercise import own_device, resistive_moment
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.options import told_model
+from pma_gym.plant.exercise_device.device import own_device, resistive_moment
+from pma_gym.plant.exercise_device.prescription import follow_from
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.prescription import follow_from
 from pma_gym.plant.sensors import SENSORS, noise_levels
 from pma_gym.tasks import EVERY_TASK
 from pma_gym.units import SI_FACTORS

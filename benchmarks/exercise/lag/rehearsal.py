@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.options import Pressure
 from pma_gym.envs import PMAEnv, PMAVectorEnv
-from pma_gym.envs.command import HIGHEST_VOLTAGE
-from pma_gym.envs.options import Pressure
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Human, Task

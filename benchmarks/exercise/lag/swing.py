@@ -22,7 +22,7 @@ import numpy as np
 from scipy.linalg import solve
 
 from benchmarks.exercise.lag.points import Point, points, rates
-from pma_gym.envs.command import HIGHEST_VOLTAGE
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.plant.model import Model
 from pma_gym.tasks import EVERY_TASK
 

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from benchmarks.exercise.safety_layer.wild import KINDS, PUMPING, kind_of, planned, pumped
 from benchmarks.hidden_effects.scoring import wilson
 from benchmarks.training.stations import Stations
-from pma_gym.envs.engine import Engine
-from pma_gym.envs.options import Options
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import Options
 from pma_gym.tasks import EXERCISES, LIMITS, Task
 from pma_gym.units import SI_FACTORS
 

@@ -13,7 +13,7 @@ from unittest.mock import patch
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery import bursts, diagnose, leftovers, selection, workflow
 from pma_gym.discovery.noise import Whitening, white_noise
 from pma_gym.discovery.parameters import Own

@@ -15,9 +15,9 @@ from scipy.signal import lfilter
 from benchmarks.hidden_effects.ways.prepared import Prepared
 from benchmarks.hidden_effects.ways.signatures import SLACK_N
 from pma_gym.discovery.suspects import PERIODS
+from pma_gym.effects.effect import signals
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
-from pma_gym.plant.compose import signals
-from pma_gym.plant.logged import Logged
 
 Array = NDArray[np.float64]
 Terms = dict[str, Array]

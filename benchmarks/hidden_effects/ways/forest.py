@@ -26,7 +26,7 @@ from benchmarks.hidden_effects.effects import KINDS
 from benchmarks.hidden_effects.files import case_name, write_case
 from benchmarks.hidden_effects.ways.prepared import answer, moved, prepare
 from benchmarks.hidden_effects.ways.signatures import signature
-from pma_gym.data.dataset import Dataset, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import replace_file
 
 Array = NDArray[np.float64]

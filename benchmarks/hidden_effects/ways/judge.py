@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.ways.registry import WAYS
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.files import replace_file
 
 

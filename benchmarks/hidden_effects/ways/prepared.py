@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.answer import MOVED
 from pma_gym.discovery.evidence import Evidence
 from pma_gym.discovery.fits import Bench, Fitted
@@ -16,7 +16,7 @@ from pma_gym.discovery.leftovers import left_over
 from pma_gym.discovery.noise import white_noise
 from pma_gym.discovery.parameters import own_parameters, unit, values
 from pma_gym.discovery.suspects import Suspect, suspects
-from pma_gym.plant.logged import Logged
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 
 Array = NDArray[np.float64]

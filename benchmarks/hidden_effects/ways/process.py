@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.ways.prepared import answer, moved, prepare
 from benchmarks.hidden_effects.ways.signatures import courses, means, ticks, within
-from pma_gym.data.dataset import Dataset
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.data.datasets.dataset import Dataset
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any
 
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 
 Ask = Callable[[Dataset, int, int], Mapping[str, Any]]
 """A data set, a seed and a number of threads to an answer with the keys of `diagnosis.json`."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.ways.prepared import Prepared
 from pma_gym.discovery.ticks import TICK_S, Ticks, ticks_of
-from pma_gym.plant.plant import OUTPUTS
+from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.ways.balances import Balance, balances
 from benchmarks.hidden_effects.ways.prepared import answer, moved, prepare
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 
 Array = NDArray[np.float64]
 

@@ -19,7 +19,7 @@ from benchmarks.hidden_effects.ways.prepared import (
     noise_of,
     prepare,
 )
-from pma_gym.data.dataset import Dataset
+from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.leftovers import left_over
 from pma_gym.discovery.parameters import values

@@ -4,7 +4,7 @@ A row whose part does not exist says so by `Missing` and is left out by name.
 """
 
 import ctypes
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
@@ -12,8 +12,11 @@ import numpy as np
 from benchmarks.speed.loops import ACTIONS, Missing, Prepared
 from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.envs.engine import Engine
 from pma_gym.plant.plant import Plant
+
+if TYPE_CHECKING:
+    # Earlier versions, which it measures too, have it elsewhere.
+    from pma_gym.engine.engine import Engine
 
 WATCHED = 64
 """Control steps over which evaluations are counted, fewer of large batches."""
@@ -102,7 +105,7 @@ def gpu(name: str, count: int, precision: str) -> Prepared:
         precision: `float32` or `float64`.
     """
     from benchmarks.speed.gpu import prepare
-    from pma_gym.kernels.driver import GpuError
+    from pma_gym.codegen.machine.cuda_driver import GpuError
 
     try:
         return prepare(ENVIRONMENTS[name], count, precision)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.speed.loops import EPISODE, Prepared
-from pma_gym.plant.plant import Condition, Plant
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
 
 PERIOD = 0.01
 """How long a command is held (s)."""

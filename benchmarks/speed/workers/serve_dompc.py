@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from benchmarks.speed.loops import EPISODE, Prepared
 from benchmarks.speed.workers.same_plant import PERIOD, PRESSURE, plant, prepared
-from pma_gym.kernels.trace import order
+from pma_gym.codegen.trace import order
 from pma_gym.plant.program import parameter_names
 
 PACKAGES = ("do_mpc", "casadi", "numpy")

@@ -5,6 +5,8 @@ nothing, and costs ten times the speed where another program wants its core.
 """
 
 # pyright: reportMissingImports=false
+import importlib
+from contextlib import suppress
 from typing import Any
 
 import gymnasium as gym
@@ -28,11 +30,15 @@ def batch(name: str, count: int) -> VecEnv:
     """This package's vector environment behind SB3's interface."""
     if gym.spec(name).vector_entry_point is None:
         raise Missing("this version has no vector environment")
-    try:
-        from pma_gym.envs.sb3 import SB3VecEnv
-    except ImportError:
-        raise Missing("this version has no adapter pma_gym.envs.sb3") from None
-    return SB3VecEnv(count, ENVIRONMENTS[name])
+    return _own("SB3VecEnv", "pma_gym.sb3", "pma_gym.envs.sb3")(count, ENVIRONMENTS[name])
+
+
+def _own(name: str, *modules: str) -> Any:  # noqa: ANN401 - a class of the version at hand
+    """A class of the first module that this version of the package has."""
+    for module in modules:
+        with suppress(ImportError):
+            return getattr(importlib.import_module(module), name)
+    raise Missing(f"this version has no {name} in {' or '.join(modules)}")
 
 
 KINDS = {"copies": copies, "batch": batch}
@@ -40,16 +46,8 @@ KINDS = {"copies": copies, "batch": batch}
 
 def learner(name: str, count: int, kind: str, lean: bool = False, **options: Any) -> PPO:
     """PPO that has learned nothing yet; see `rollouts`."""
-    make = _lean() if lean else PPO
+    make = _own("LeanPPO", "pma_gym.sb3", "pma_gym.envs.sb3_ppo") if lean else PPO
     return make("MlpPolicy", KINDS[kind](name, count), seed=0, device="cpu", **options)
-
-
-def _lean() -> type[PPO]:
-    try:
-        from pma_gym.envs.sb3_ppo import LeanPPO
-    except ImportError:
-        raise Missing("this version has no pma_gym.envs.sb3_ppo") from None
-    return LeanPPO
 
 
 def rollouts(name: str, count: int, kind: str, threads: int = 1, **options: Any) -> Prepared:

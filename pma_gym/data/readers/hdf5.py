@@ -34,8 +34,6 @@ def read_hdf5(content: bytes, file: str, request: Request = Request()) -> list[T
     Raises:
         TrialError: h5py is missing or cannot read it, or it is beyond a limit.
     """
-    from pma_gym.data.readers.matlab import OPAQUE
-
     h5py = needed("h5py", file)
     try:
         with h5py.File(io.BytesIO(content), "r") as source:
@@ -46,7 +44,7 @@ def read_hdf5(content: bytes, file: str, request: Request = Request()) -> list[T
     except Exception as error:
         said = str(error).partition("\n")[0][:200]
         raise UnreadableError(f"{file} is not a readable HDF5 file: {said}") from None
-    return tables_of(variables, file, request, OPAQUE)
+    return tables_of(variables, file, request)
 
 
 def _members(

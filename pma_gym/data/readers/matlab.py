@@ -13,15 +13,8 @@ import numpy as np
 
 from pma_gym.data.readers.hdf5 import SIGNATURE, read_hdf5
 from pma_gym.data.readers.table import Request, Table, UnreadableError
-from pma_gym.data.readers.variables import Variable, tables_of
+from pma_gym.data.readers.variables import OPAQUE, Variable, tables_of
 from pma_gym.limits import check_limit, limit
-
-_INTO = "in MATLAB: S = timetable2table(TT); S.(1) = seconds(S.(1) - S.(1)(1)); "
-_TABLE = "writetable(S, 'trial.csv')"
-OPAQUE = (
-    "a table, timetable or object of MATLAB, whose form in a file is not published; write a CSV "
-    f"file {_INTO}{_TABLE} (for a table T: writetable(T, 'trial.csv'))"
-)
 
 _NUMBERS = {
     1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8",
@@ -64,7 +57,7 @@ def read_mat(content: bytes, file: str, request: Request = Request()) -> list[Ta
         raise UnreadableError(
             f"{file} is not a readable MAT file: {error or type(error).__name__}; save it again"
         ) from None
-    return tables_of(variables, file, request, OPAQUE)
+    return tables_of(variables, file, request)
 
 
 def _variables(content: bytes, order: str, file: str) -> Iterator[tuple[str, Variable]]:

@@ -2,8 +2,8 @@
 
 import re
 
+from pma_gym.data.files.trial_hints import FACTORS
 from pma_gym.data.trial_columns import Column
-from pma_gym.data.trial_hints import FACTORS
 
 _NAMES = {
     "°": "deg",

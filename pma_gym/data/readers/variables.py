@@ -12,17 +12,22 @@ from pma_gym.limits import check_limit
 Variable: TypeAlias = "np.ndarray | Sequence[Mapping[str, Variable]] | str | None"
 """Numbers; the elements of a structure array; why something cannot be read; anything else."""
 
+_INTO = "in MATLAB: S = timetable2table(TT); S.(1) = seconds(S.(1) - S.(1)(1)); "
+_TABLE = "writetable(S, 'trial.csv')"
+OPAQUE = (
+    "a table, timetable or object of MATLAB, whose form in a file is not published; write a CSV "
+    f"file {_INTO}{_TABLE} (for a table T: writetable(T, 'trial.csv'))"
+)
+"""What a variable is that its format hides, and what to do."""
 
-def tables_of(
-    variables: Mapping[str, Variable], file: str, request: Request, opaque: str
-) -> list[Table]:
+
+def tables_of(variables: Mapping[str, Variable], file: str, request: Request) -> list[Table]:
     """Tables of a file's variables.
 
     Args:
         variables: by name.
         file: its name, for messages.
         request: known names, and those of a matrix's columns.
-        opaque: what a variable is, and what to do, that its format hides.
     Returns:
         One table for the variables themselves, if they are one, and one for each structure.
     Raises:
@@ -37,7 +42,7 @@ def tables_of(
     if not tables:
         hidden = [name for name, value in variables.items() if isinstance(value, str)]
         if hidden:
-            raise UnreadableError(f"{file}: {hidden[0]!r} is {opaque}")
+            raise UnreadableError(f"{file}: {hidden[0]!r} is {OPAQUE}")
         names = ", ".join(map(repr, list(variables)[:10])) or "nothing"
         raise UnreadableError(
             f"{file} holds {names}, but no vectors of one length with a name each; save time_s and "

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 
 Array = NDArray[np.float64]

@@ -8,10 +8,10 @@ be in seconds, is no matter of taste: it ends in one message with the lines that
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from pma_gym.data import gaps
-from pma_gym.data.dataset import Dataset, NamedTrial
-from pma_gym.data.even_clock import even_clock
-from pma_gym.data.identical_trials import copies
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
+from pma_gym.data.datasets.identical_trials import copies
+from pma_gym.data.files.even_clock import even_clock
+from pma_gym.data.quality import gaps
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.data_checks import timing

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.dataset import NamedTrial
+from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.data_checks.simulated import Pair, pairs
 from pma_gym.plant.model import Model
 

@@ -3,8 +3,9 @@
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from pma_gym.data.dataset import Dataset
-from pma_gym.data.drafting import quoted
+from pma_gym.data.datasets.dataset import Dataset
+from pma_gym.data.datasets.drafting import quoted
+from pma_gym.data.files.trial_files import read_header
 from pma_gym.data.trial_columns import (
     BY_QUANTITY,
     Column,
@@ -13,7 +14,6 @@ from pma_gym.data.trial_columns import (
     TrialError,
     sources,
 )
-from pma_gym.data.trial_files import read_header
 from pma_gym.units import SI_FACTORS
 
 DESCRIPTION = "dataset.toml"

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.plant import sensors
+from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
-from pma_gym.plant.plant import OUTPUTS, Plant
+from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.data.dataset import Dataset, NamedTrial
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.data_checks.absolute import both_absolute
 from pma_gym.discovery.data_checks.clock import wrong_clock

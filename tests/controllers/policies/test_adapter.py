@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.policies.action_mapping import Form
 from controllers.policies.adapter import Pilot
 from controllers.policies.observation_spec import View

@@ -2,7 +2,7 @@
 
 import pytest
 
-from controllers.pid import nominal_offset
+from controllers.models.voltage import nominal_offset
 from controllers.policies.action_mapping import Form
 from controllers.policies.adapter import Pilot
 from controllers.policies.observation_spec import View

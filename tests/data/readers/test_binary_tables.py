@@ -10,10 +10,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.io import loadmat, savemat
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.readers.table import FileFormat
 from pma_gym.data.trial import TrialError
-from pma_gym.data.trial_files import TrialWarning, read_trial
 
 ROWS = 30
 TIME = np.arange(ROWS) / 50

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import TrialWarning, place_in_file, read_trial
 from pma_gym.data.readers.table import FileFormat
 from pma_gym.data.trial import TrialError
-from pma_gym.data.trial_files import TrialWarning, place_in_file, read_trial
 
 HEADER = ["time_s", "motor_voltage_v", "contraction_mm", "load_n"]
 ROWS = 40

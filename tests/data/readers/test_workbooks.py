@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.files.trial_files import TrialWarning, place_in_file, read_trial, write_trial
 from pma_gym.data.trial import Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning, place_in_file, read_trial, write_trial
 
 openpyxl = pytest.importorskip("openpyxl")
 

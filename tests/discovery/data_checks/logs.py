@@ -4,7 +4,7 @@ import csv
 
 import numpy as np
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.data_checks import check_dataset
 from pma_gym.plant.model import load_model

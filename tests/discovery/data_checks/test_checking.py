@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pma_gym.data.dataset import read_dataset
+from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import diagnose
 from pma_gym.plant.model import load_model

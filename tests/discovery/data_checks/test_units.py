@@ -5,9 +5,9 @@ import re
 import numpy as np
 import pytest
 
-from pma_gym.data.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
+from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.trial import Trial, TrialError
-from pma_gym.data.trial_files import TrialWarning
 from pma_gym.discovery.data_checks import check_dataset
 from pma_gym.discovery.suspects import suspects
 from pma_gym.plant.plant import Plant

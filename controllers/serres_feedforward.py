@@ -1,0 +1,66 @@
+"""The dissertation's feed-forward, computed for any pressure and reference."""
+
+import math
+
+import numpy as np
+
+from controllers.controller import Reference
+from controllers.design.designs import must_give_a_position
+from controllers.design.voltage_table import VoltageTable
+from pma_gym.envs import Station
+from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
+
+PROFILE_RADIUS = 45e-3 / (math.pi / 2.0)
+"""Radius of the pulley that the rotation profiles assume: 45 mm for 90 deg, 28.65 mm (m).
+
+Serres 2008, tables I13-I20. Table I3 gives 25.4 mm; see the documentation of the physics.
+"""
+
+
+class SerresFeedforward(VoltageTable):
+    """The dissertation's feed-forward, computed for any pressure in 150-575 kPa and reference.
+
+    Every 0.2 s: the input that the cascade of motor and muscle needs for the reference (Tustin's
+    recursion, inverted), then the lower root of the map from voltage to displacement, both linear
+    in pressure between the dissertation's. In rotation it aims at the angle with its own pulley,
+    45 mm for 90 deg. At a printed pressure it gives the printed voltages.
+
+    Source:
+        Serres 2008, sections 4.2 and 5.2.1.
+    """
+
+    name = "serres_feedforward"
+
+    def reset(self, reference: Reference, station: Station) -> None:
+        """Compute the profile.
+
+        Raises:
+            ValueError: a pressure outside 150-575 kPa, or a reference beyond what the map reaches
+                there, names the reachable range; or a task that the motor does not move.
+        """
+        must_give_a_position(station)
+        if station.task.actuator != "motor":
+            raise ValueError(
+                f"{self.name} gives voltages of the motor: the task must be one of extension or "
+                f"rotation, got {station.task.name}, in which the {station.task.actuator} moves; "
+                "take improved_feedforward"
+            )
+        rotation = station.task.protocol.quantity == "rotation"
+        radius = PROFILE_RADIUS if rotation else 1.0
+        pressure_kpa = station.pressure / 1e3
+        samples = math.ceil(station.task.protocol.duration / SAMPLE_TIME - 1e-9) + 1
+        times = SAMPLE_TIME * np.arange(samples)
+        wanted = radius * np.array([reference(float(time)) for time in times])
+        try:
+            profile = feedforward(wanted, pressure_kpa)
+        except ValueError as error:
+            raise ValueError(self._explained(error, pressure_kpa, rotation)) from error
+        self._period = station.period
+        self.times, self.volts = profile.time, profile.voltage
+
+    def _explained(self, error: ValueError, pressure_kpa: float, rotation: bool) -> str:
+        """The error, with the reach as an angle where the task is one."""
+        if not rotation or not 150.0 <= pressure_kpa <= 575.0:
+            return str(error)
+        degrees = math.degrees(1e-3 * reachable_mm(pressure_kpa) / PROFILE_RADIUS)
+        return f"{error} (rotation must lie in 0-{degrees:.4g} deg: 45 mm are 90 deg here)"

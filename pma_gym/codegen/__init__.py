@@ -1,0 +1,45 @@
+"""From the text of a law to machine code: traced once, compiled for processors and GPUs alike.
+
+`graph` and `trace` call laws on values instead of numbers and remember the arithmetic; `derivative`
+differentiates it; `text` writes it as Python; `llvm` and `control` as LLVM instructions, scalar or
+in SIMD lanes; `native` compiles those for the processor and keeps the result, `ptx` for a GPU;
+`random` has random numbers that can be traced. A law, in lanes of eight:
+
+    >>> import ctypes
+    >>> import numpy as np
+    >>> from llvmlite import ir
+    >>> from pma_gym.effects.cable.cable import Cable, tension
+    >>> from pma_gym.codegen.machine.control import INTEGER, POINTER, function, loop
+    >>> from pma_gym.codegen.graph import CHANGING, Graph
+    >>> from pma_gym.codegen.machine.simd import Lanes
+    >>> from pma_gym.codegen.machine.native import compiled
+    >>> from pma_gym.codegen.trace import live_inputs, trace
+
+    >>> graph, cable = Graph(), Cable(stiffness=550e3, damping=19.4, slack=0.85e-3)
+    >>> stretch, rate = (graph.input(name, CHANGING) for name in ("stretch", "rate"))
+    >>> force = trace(tension, stretch, rate, graph.inputs("cable", cable))
+    >>> [value.data for value in live_inputs([force])]
+    ['stretch', 'rate', 'cable.stiffness', 'cable.damping', 'cable.slack']
+
+    >>> def build():
+    ...     module, lanes = ir.Module(), Lanes(8)
+    ...     arguments = [("blocks", INTEGER), ("table", POINTER), ("data", POINTER)]
+    ...     builder, (blocks, table, data) = function(module, "tension", arguments)
+    ...     inputs = live_inputs([force])
+    ...     known = {v.id: lanes.load_spread(builder, table, i) for i, v in enumerate(inputs[2:])}
+    ...     with loop(builder, blocks) as block:
+    ...         row = lanes.address(builder, data, builder.mul(block, INTEGER(3)))
+    ...         known |= {v.id: lanes.load(builder, row, i) for i, v in enumerate(inputs[:2])}
+    ...         found = lanes.emit(builder, [force], known)
+    ...         lanes.store(builder, found[force.id], row, 2)
+    ...     builder.ret_void()
+    ...     return module
+
+    >>> pointer = ctypes.c_void_p
+    >>> run = compiled(["example"], build).function("tension", [ctypes.c_int64, pointer, pointer])
+    >>> table, data = np.array(cable), np.zeros((4, 3, 8))  # [block, slot, lane]
+    >>> data[:, 0] = np.linspace(0.0, 2e-3, 32).reshape(4, 8)
+    >>> run(4, table.ctypes.data, data.ctypes.data)
+    >>> float(data[3, 2, 7].round(3))
+    632.5
+"""

@@ -1,0 +1,157 @@
+"""Where compiled code is kept, and under which name.
+
+The folder is the user's own, as a compiler's output is: whoever may write there decides what runs.
+So a folder that others own or may write is not used, and every entry carries a signature by a key
+of this user; what is damaged, or signed by nobody here, is compiled anew instead of run.
+"""
+
+import hashlib
+import os
+import tempfile
+import warnings
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+
+from pma_gym.codegen.cache.signing import SIGNATURE_BYTES, is_signed, signature, user_key
+from pma_gym.codegen.cache.trust import UntrustedError, private_folder, read_trusted
+from pma_gym.files import replace_file
+from pma_gym.home import home_folder, temporary_folder
+
+_MAGIC = b"pma_gym kernels 2\n"
+
+_FIX = "set PMA_GYM_CACHE to a writable folder that only you may write, to keep them"
+
+
+@dataclass(frozen=True)
+class _Store:
+    """A folder of compiled code that this user alone may write, and the key of its signatures."""
+
+    folder: Path
+    key: bytes = field(repr=False)
+
+
+def cache_directory() -> Path | None:
+    """Folder of compiled plants: $PMA_GYM_CACHE, else the user's cache folder.
+
+    Falls back to a temporary folder of this process, and says so once, where that cannot be made
+    or written, or where others may write it; None where there is no temporary folder either.
+    """
+    store = _store()
+    return None if store is None else store.folder.parent
+
+
+def _store() -> _Store | None:
+    """The store that the environment variables name now."""
+    asked = os.environ.get("PMA_GYM_CACHE")
+    if asked:
+        return _opened(Path(os.path.expanduser(asked)).absolute())
+    caches = os.environ.get("XDG_CACHE_HOME")
+    if caches:
+        return _opened(Path(caches).absolute() / "pma_gym")
+    home = home_folder()
+    return _opened(None if home is None else home.absolute() / ".cache" / "pma_gym")
+
+
+@cache
+def _opened(wanted: Path | None) -> _Store | None:
+    if wanted is None:
+        fault = "this user has no home folder to keep compiled plants in"
+    else:
+        try:
+            return _open(wanted)
+        except UntrustedError as error:
+            fault = f"compiled plants are not kept in {wanted}: {error}"
+        except OSError as error:
+            fault = f"cannot write compiled plants to {wanted} ({error})"
+    store = _temporary()
+    place = "in memory only" if store is None else "into a temporary folder for this process"
+    warnings.warn(f"{fault}; compiling {place}; {_FIX}", stacklevel=2)
+    return store
+
+
+def _open(wanted: Path) -> _Store:
+    private_folder(wanted, link=True)
+    kernels = wanted / "kernels"
+    private_folder(kernels, link=False)
+    # Only trying tells: a disk may be full or read-only.
+    with tempfile.TemporaryFile(dir=kernels):
+        return _Store(kernels, user_key(kernels))
+
+
+def _temporary() -> _Store | None:
+    try:
+        return _open(temporary_folder())
+    except OSError:
+        return None
+
+
+def digest(parts: Iterable[str]) -> str:
+    """A name for what is made from these texts."""
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()
+
+
+@cache
+def source_digest() -> str:
+    """A hash of the texts of all modules that compiled code is written by."""
+    package, total = Path(__file__).parents[2], hashlib.sha256()
+    # All of them: what a kernel is written by reaches from the laws to tasks and calibrations.
+    for path in sorted(package.glob("**/*.py")):
+        text = path.read_bytes()
+        total.update(f"{path.relative_to(package)} {len(text)}\n".encode() + text)
+    return total.hexdigest()
+
+
+def load(name: str) -> bytes | None:
+    """What is kept under a name.
+
+    Returns:
+        Its content; None if there is nothing, or if it is damaged, not signed by this user's key,
+        or written by another user.
+    """
+    store = _store()
+    if store is None:
+        return None
+    try:
+        content = read_trusted(_path(store, name))
+    except UntrustedError as error:
+        _say_once(store, str(error))
+        return None
+    except OSError:
+        return None
+    end = len(_MAGIC) + SIGNATURE_BYTES
+    head, signed, body = content[: len(_MAGIC)], content[len(_MAGIC) : end], content[end:]
+    return body if head == _MAGIC and is_signed(store.key, name, body, signed) else None
+
+
+def keep(name: str, body: bytes) -> None:
+    """Keep something under a name, if there is room."""
+    with suppress(OSError):
+        try:
+            _write(name, body)
+        except FileNotFoundError:
+            # Somebody emptied the cache while this process ran.
+            _opened.cache_clear()
+            _write(name, body)
+
+
+def _write(name: str, body: bytes) -> None:
+    store = _store()
+    if store is not None:
+        content = _MAGIC + signature(store.key, name, body) + body
+        replace_file(_path(store, name), content, private=True)
+
+
+_said: set[Path] = set()
+
+
+def _say_once(store: _Store, fault: str) -> None:
+    if store.folder not in _said:
+        _said.add(store.folder)
+        warnings.warn(f"{fault}; it is not run, but compiled anew", stacklevel=3)
+
+
+def _path(store: _Store, name: str) -> Path:
+    return store.folder / f"{name}.o"

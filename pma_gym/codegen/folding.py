@@ -1,0 +1,251 @@
+"""What is simplified while a graph is built.
+
+All of it keeps every bit of a finite result in double precision, except the sign of a zero and
+one rule, the reciprocal:
+
+- constants are computed; x * 1, x / 1, x + 0, x - 0, --x and |-x| are the plain value; a sign goes
+  out of a product or quotient and into a sum or difference. 0 * x stays, for it may be NaN.
+- (x + |x|) / 2, as `positive` has it, becomes a choice between x and 0, one operation for three; a
+  clip between constants becomes two independent of each other's comparison.
+- Reciprocal: x / p, where p changes less often than x, becomes x * (1 / p), and 1 / p is computed
+  as often as p changes. So is x / c for a constant c, exactly if c is a power of two. This is where
+  the graph and the text of a law differ, by a rounding.
+"""
+
+import math
+import struct
+from collections.abc import Callable
+from typing import Any
+
+from pma_gym.codegen.value import MASK, Value, ValueGraph
+
+
+def to_bits(number: float) -> int:
+    """The 64 bits of a real number, as an unsigned integer."""
+    return struct.unpack("<Q", struct.pack("<d", number))[0]
+
+
+def from_bits(bits: int) -> float:
+    """The real number of these 64 bits."""
+    return struct.unpack("<d", struct.pack("<Q", bits))[0]
+
+
+def _divide(a: float, b: float) -> float:
+    if b != 0.0:
+        return a / b
+    if a == 0.0 or math.isnan(a):
+        return math.nan
+    return math.copysign(math.inf, a) * math.copysign(1.0, b)
+
+
+_REAL: dict[str, Callable] = {
+    "add": lambda a, b: a + b,
+    "subtract": lambda a, b: a - b,
+    "multiply": lambda a, b: a * b,
+    "divide": _divide,
+    "negative": lambda a: -a,
+    "absolute": abs,
+    "square_root": lambda a: math.sqrt(a) if a >= 0.0 else math.nan,
+    "floor": lambda a: float(math.floor(a)) if math.isfinite(a) else a,
+    "bits": to_bits,
+}
+_INTEGER: dict[str, Callable] = {
+    "add": lambda a, b: (a + b) & MASK,
+    "subtract": lambda a, b: (a - b) & MASK,
+    "multiply": lambda a, b: (a * b) & MASK,
+    "shift_left": lambda a, b: (a << b) & MASK,
+    "shift_right": lambda a, b: a >> b,
+    "to_real": float,
+    "from_bits": from_bits,
+}
+_ANY: dict[str, Callable] = {
+    "less": lambda a, b: a < b,
+    "less_equal": lambda a, b: a <= b,
+    "equal": lambda a, b: a == b,
+    "not_equal": lambda a, b: a != b,
+    "and": lambda a, b: a & b,
+    "or": lambda a, b: a | b,
+    "xor": lambda a, b: a ^ b,
+    "not": lambda a: not a,
+    "select": lambda condition, yes, no: yes if condition else no,
+}
+
+
+def compute(operation: str, kind: str, numbers: list) -> Any:  # noqa: ANN401
+    """The result of an operation on plain numbers of a kind, as compiled code has it."""
+    table = _INTEGER if kind == "integer" else _REAL
+    return (table.get(operation) or _ANY[operation])(*numbers)
+
+
+def simplify(graph: ValueGraph, operation: str, operands: tuple[Value, ...]) -> Value | None:
+    """A simpler value for an operation, or None if it is to be left as it is."""
+    if all(operand.is_constant for operand in operands):
+        numbers = [operand.data for operand in operands]
+        kind = operands[-1].kind
+        result = compute(operation, kind, numbers)
+        return graph.constant(result, graph.kind_of(operation, operands))
+    rule = _RULES.get(operation)
+    simple = rule(graph, *operands) if rule else None
+    if simple is None and operation in _COMMUTES and operands[0].id > operands[1].id:
+        return graph.node(operation, operands[::-1], graph.kind_of(operation, operands))
+    return simple
+
+
+_COMMUTES = frozenset(("add", "multiply", "and", "or", "xor", "equal", "not_equal"))
+
+
+def _is(value: Value, number: float) -> bool:
+    return value.is_constant and value.data == number
+
+
+def _inside(value: Value) -> Value | None:
+    """What a value is the negative of."""
+    return value.operands[0] if value.operation == "negative" else None
+
+
+def _add(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if _is(a, 0):
+        return b
+    if _is(b, 0):
+        return a
+    plus, minus = _inside(a), _inside(b)
+    if minus is not None:
+        return a - minus if plus is None else -(plus + minus)
+    return b - plus if plus is not None else None
+
+
+def _subtract(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if _is(b, 0):
+        return a
+    if a.kind == "integer":
+        return None
+    if _is(a, 0.0):
+        return -b
+    plus, minus = _inside(a), _inside(b)
+    if minus is not None:
+        return a + minus if plus is None else minus - plus
+    return -(plus + b) if plus is not None else None
+
+
+def _multiply(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if b.is_constant:
+        a, b = b, a
+    if _is(a, 1):
+        return b
+    if a.kind == "integer":
+        return None
+    if _is(a, -1.0):
+        return -b
+    if _is(a, 0.5) and (whole := _twice_the_positive_part(b)) is not None:
+        return graph.select(whole < 0.0, 0.0, whole)
+    return _signed_product(a, b)
+
+
+def _signed_product(a: Value, b: Value) -> Value | None:
+    if b.level < a.level:
+        a, b = b, a
+    plus, minus = _inside(a), _inside(b)
+    if plus is not None and minus is not None:
+        return plus * minus
+    if minus is not None:
+        # The sign goes to the factor that is computed less often, where there is one.
+        return -a * minus if a.level < b.level else -(a * minus)
+    return -(plus * b) if plus is not None and a.level == b.level else None
+
+
+def _twice_the_positive_part(total: Value) -> Value | None:
+    if total.operation != "add":
+        return None
+    for value, size in (total.operands, total.operands[::-1]):
+        if size.operation == "absolute" and size.operands[0] is value:
+            return value
+    return None
+
+
+def _divide_values(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if b.is_constant:
+        return a * _divide(1.0, b.data)
+    above, below = _inside(a), _inside(b)
+    if above is not None:
+        return -(above / b)
+    if below is not None:
+        return -(a / below)
+    return a * (1.0 / b) if b.level < a.level else None
+
+
+def _negative(graph: ValueGraph, a: Value) -> Value | None:
+    return _inside(a)
+
+
+def _absolute(graph: ValueGraph, a: Value) -> Value | None:
+    if a.operation == "absolute":
+        return a
+    inside = _inside(a)
+    return abs(inside) if inside is not None else None
+
+
+def _not(graph: ValueGraph, a: Value) -> Value | None:
+    return a.operands[0] if a.operation == "not" else None
+
+
+def _and(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if b.is_constant:
+        a, b = b, a
+    full = True if a.kind == "truth" else MASK
+    if _is(a, full) or a is b:
+        return b
+    return a if _is(a, 0) else None
+
+
+def _or(graph: ValueGraph, a: Value, b: Value) -> Value | None:
+    if b.is_constant:
+        a, b = b, a
+    full = True if a.kind == "truth" else MASK
+    if _is(a, full):
+        return a
+    return b if _is(a, 0) or a is b else None
+
+
+def _select(graph: ValueGraph, condition: Value, yes: Value, no: Value) -> Value | None:
+    if condition.is_constant:
+        return yes if condition.data else no
+    if yes is no:
+        return yes
+    if condition.operation == "not":
+        return graph.select(condition.operands[0], no, yes)
+    return _clip(graph, condition, yes, no)
+
+
+def _clip(graph: ValueGraph, condition: Value, low: Value, inner: Value) -> Value | None:
+    """A clip, low if x < low else (high if high < x else x): the upper bound, then the lower."""
+    if inner.operation != "select" or not low.is_constant:
+        return None
+    beyond, high, value = inner.operands
+    clips = (
+        high.is_constant
+        and low.data <= high.data
+        and _is_less(condition, value, low)
+        and _is_less(beyond, high, value)
+    )
+    return graph.select(inner < low, low, inner) if clips else None
+
+
+def _is_less(condition: Value, a: Value, b: Value) -> bool:
+    if condition.operation != "less":
+        return False
+    left, right = condition.operands
+    return left is a and right is b
+
+
+_RULES: dict[str, Callable[..., Value | None]] = {
+    "add": _add,
+    "subtract": _subtract,
+    "multiply": _multiply,
+    "divide": _divide_values,
+    "negative": _negative,
+    "absolute": _absolute,
+    "not": _not,
+    "and": _and,
+    "or": _or,
+    "select": _select,
+}

@@ -1,0 +1,169 @@
+"""Arithmetic as a graph: what a law computes when it is called on values instead of numbers.
+
+A `Value` stands for one number of a calculation that is yet to run. Arithmetic on values makes more
+values; equal arithmetic makes the same value, so that nothing is computed twice. What is computed
+is what was written, rounding by rounding, with the exceptions that `folding` lists.
+"""
+
+import struct
+from typing import Any
+
+from pma_gym.codegen.folding import simplify
+from pma_gym.codegen.value import (
+    CHANGING,
+    COMPARISONS,
+    CONSTANT,
+    FIXED,
+    HELD,
+    MASK,
+    Kind,
+    Number,
+    Value,
+    ValueGraph,
+)
+
+__all__ = ["CHANGING", "CONSTANT", "FIXED", "HELD", "Graph", "Kind", "Number", "Value"]
+
+_KINDS: dict[Kind, dict[str, Kind]] = {
+    "real": {
+        **dict.fromkeys(("add", "subtract", "multiply", "divide", "negative"), "real"),
+        **dict.fromkeys(("absolute", "square_root", "floor"), "real"),
+        **dict.fromkeys(COMPARISONS, "truth"),
+        "bits": "integer",
+    },
+    "integer": {
+        **dict.fromkeys(("add", "subtract", "multiply", "and", "or", "xor"), "integer"),
+        **dict.fromkeys(("shift_left", "shift_right"), "integer"),
+        **dict.fromkeys(COMPARISONS, "truth"),
+        "to_real": "real",
+        "from_bits": "real",
+    },
+    "truth": dict.fromkeys(("and", "or", "xor", "not"), "truth"),
+}
+"""Kind of the result by kind of the operands and operation."""
+
+
+class Graph(ValueGraph):
+    """All values of one calculation; see the package for an example.
+
+    Attributes:
+        values: the values, in order of `Value.id`.
+        slopes: what a value's derivative is known to be: the value that it is by, and the
+            derivative, by the value's id.
+    """
+
+    def __init__(self) -> None:
+        self.values: list[Value] = []
+        self.slopes: dict[int, tuple[Value, Value]] = {}
+        self._known: dict[tuple, Value] = {}
+
+    def input(self, name: str, level: int, kind: Kind = "real") -> Value:
+        """A value that is given when the calculation runs.
+
+        Args:
+            name: its name; the same name and kind is the same input.
+            level: how often it changes: FIXED, HELD or CHANGING.
+            kind: "real", "integer" or "truth".
+        Raises:
+            ValueError: the name is taken by an input of another kind or level.
+        """
+        found = self._known.get(("input", name))
+        if found is None:
+            found = self._known["input", name] = self._new("input", (), kind, level, name)
+        elif (found.kind, found.level) != (kind, level):
+            raise ValueError(f"input {name} is {found.kind} of level {found.level} already")
+        return found
+
+    def inputs(self, name: str, like: Any, level: int = FIXED) -> Any:  # noqa: ANN401
+        """The same named tuple with an input for each number.
+
+        Args:
+            name: what the names of the inputs begin with: name.field, and name.field[0] in rows.
+            like: a NamedTuple of numbers and rows of numbers, such as an effect's parameters.
+            level: level of the inputs.
+        """
+
+        def one(field: str, value: float | tuple[float, ...]) -> Value | tuple[Value, ...]:
+            if isinstance(value, tuple):
+                return tuple(self.input(f"{field}[{i}]", level) for i in range(len(value)))
+            return self.input(field, level)
+
+        return like._replace(**{f: one(f"{name}.{f}", v) for f, v in like._asdict().items()})
+
+    def constant(self, number: Number, kind: Kind = "real") -> Value:
+        """A number, as a value; an integer keeps its lowest 64 bits."""
+        if kind == "real":
+            number = float(number)
+            key = struct.pack("<d", number)
+        elif kind == "integer":
+            if isinstance(number, float):
+                raise TypeError(f"an integer is not made of {number!r}")
+            key = number = int(number) & MASK
+        else:
+            key = number = bool(number)
+        found = self._known.get(("constant", kind, key))
+        if found is None:
+            found = self._new("constant", (), kind, CONSTANT, number)
+            self._known["constant", kind, key] = found
+        return found
+
+    def value(self, given: "Value | Number", kind: Kind = "real") -> Value:
+        """The value itself, or the number as a constant of this kind.
+
+        Raises:
+            ValueError: a value of another graph.
+        """
+        if not isinstance(given, Value):
+            return self.constant(given, kind)
+        if given.graph is not self:
+            raise ValueError("values of two graphs in one expression")
+        return given
+
+    def apply(self, operation: str, *operands: Value) -> Value:
+        """The value of an operation, simplified; the operators of `Value` come here.
+
+        Raises:
+            TypeError: operands of a kind that the operation does not take.
+        """
+        kind = self.kind_of(operation, operands)
+        simple = simplify(self, operation, operands)
+        return self.node(operation, operands, kind) if simple is None else simple
+
+    def node(self, operation: str, operands: tuple[Value, ...], kind: Kind) -> Value:
+        """The value of exactly this operation, as `simplify` wants it left."""
+        key = (operation, *[operand.id for operand in operands])
+        found = self._known.get(key)
+        if found is None:
+            level = max(operand.level for operand in operands)
+            found = self._known[key] = self._new(operation, operands, kind, level)
+        return found
+
+    def select(
+        self, condition: "Value | Number", yes: "Value | Number", no: "Value | Number"
+    ) -> Value:
+        """`yes` where the condition holds, else `no`."""
+        kinds: list[Kind] = [value.kind for value in (yes, no) if isinstance(value, Value)]
+        kind = kinds[0] if kinds else "real"
+        sides = self.value(yes, kind), self.value(no, kind)
+        return self.apply("select", self.value(condition, "truth"), *sides)
+
+    def _new(self, *made: Any) -> Value:
+        value = Value(self, *made)
+        self.values.append(value)
+        return value
+
+    def kind_of(self, operation: str, operands: tuple[Value, ...]) -> Kind:
+        """Kind of the result of an operation; TypeError if there is no such operation."""
+        kinds: list[Kind] = [operand.kind for operand in operands]
+        if operation == "select":
+            if kinds[0] == "truth" and kinds[1] == kinds[2]:
+                return kinds[1]
+        elif len(set(kinds)) == 1 and operation in _KINDS[kinds[0]]:
+            _check_shift(operation, operands)
+            return _KINDS[kinds[0]][operation]
+        raise TypeError(f"no {operation} of {' and '.join(kinds)}")
+
+
+def _check_shift(operation: str, operands: tuple[Value, ...]) -> None:
+    if operation.startswith("shift") and not (operands[1].is_constant and operands[1].data < 64):
+        raise TypeError("a traced integer is shifted by a plain number of 0 to 63 bits only")

@@ -1,0 +1,1 @@
+"""Machine code: traced arithmetic to LLVM (SIMD) and PTX, compiled and called."""

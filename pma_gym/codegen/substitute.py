@@ -1,0 +1,25 @@
+"""The same arithmetic on other inputs."""
+
+from collections.abc import Mapping, Sequence
+
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.trace import order
+
+
+def substitute(outputs: Sequence[Value], given: Mapping[int, Value]) -> list[Value]:
+    """What the outputs would be if some values were others.
+
+    Args:
+        outputs: traced values.
+        given: new values by the `Value.id` of those that they replace.
+    Returns:
+        The outputs, made of the new values; what depends on none of them stays the same value.
+    """
+    found = dict(given)
+    for value in order(outputs):
+        if value.id in found:
+            continue
+        parts = [found[part.id] for part in value.operands]
+        same = all(a is b for a, b in zip(parts, value.operands, strict=True))
+        found[value.id] = value if same else value.graph.apply(value.operation, *parts)
+    return [found[value.id] for value in outputs]

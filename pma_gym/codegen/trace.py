@@ -1,0 +1,99 @@
+"""Calls a law on traced values, and asks a graph what it consists of."""
+
+from collections.abc import Callable, Iterable, Sequence
+from functools import cache
+from typing import Any
+
+from pma_gym.codegen.generic import sloping, where
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.rebinding import rebind
+
+
+def trace(law: Callable, *arguments: Any, **named: Any) -> Any:  # noqa: ANN401
+    """What a law returns for traced values: its arithmetic, as values of their graph.
+
+    Args:
+        law: a function written in the arithmetic of `pma_gym.effects.arithmetic`.
+        arguments: its arguments: values, numbers, named tuples of both.
+        named: more of them, by name.
+    Returns:
+        What the law returns: a value, a tuple of values, or numbers that depend on no value.
+    """
+    return _traceable(law)(*arguments, **named)
+
+
+@cache
+def _traceable(law: Callable) -> Callable:
+    return rebind(law, {"where": where, "sloping": sloping})
+
+
+def order(outputs: Iterable[Value]) -> list[Value]:
+    """All that the outputs are made of, and themselves, operands before what is made of them."""
+    seen: dict[int, Value] = {}
+    waiting = list(outputs)
+    while waiting:
+        value = waiting.pop()
+        if value.id not in seen:
+            seen[value.id] = value
+            waiting.extend(value.operands)
+    # Values are numbered in order of making, operands first.
+    return [seen[i] for i in sorted(seen)]
+
+
+def live_inputs(outputs: Iterable[Value]) -> list[Value]:
+    """The inputs that the outputs depend on."""
+    return [value for value in order(outputs) if value.operation == "input"]
+
+
+def split(outputs: Sequence[Value], level: int) -> list[Value]:
+    """What changes no more often than a level and is used by what does, or is an output.
+
+    These are to be computed beforehand and kept. What the kept ones of a higher level need in turn
+    is kept too where it is of a lower level, so that `split(outputs, 0)` is the whole table of a
+    model's life and those of level 1 in `split(outputs, 1)` all that is to be kept beside it.
+
+    Args:
+        outputs: results of the calculation.
+        level: FIXED or HELD.
+    Returns:
+        Values of the level or below, no constants, in order; inputs only where used directly.
+    """
+    values = list(outputs)
+    kept = {value.id: value for value in values if value.level <= level}
+    for value in order(values):
+        if value.level > level:
+            kept.update({part.id: part for part in value.operands if part.level <= level})
+    return [kept[i] for i in sorted(kept) if not kept[i].is_constant]
+
+
+_SORTS: tuple[str, ...] = ("add", "multiply", "divide", "square_root", "choose", "integer")
+_COUNTED = {
+    "add": "add",
+    "subtract": "add",
+    "multiply": "multiply",
+    "divide": "divide",
+    "square_root": "square_root",
+}
+
+
+def operation_counts(outputs: Iterable[Value], level: int | None = None) -> dict[str, int]:
+    """How many operations of each sort the outputs take, each value counted once.
+
+    Args:
+        outputs: results of the calculation.
+        level: count operations of this level only; all if None.
+    Returns:
+        add (with subtractions), multiply, divide, square_root, choose (signs, comparisons,
+        choices, rounding) and integer (with conversions).
+    """
+    counts = dict.fromkeys(_SORTS, 0)
+    for value in order(outputs):
+        if value.operands and level in (None, value.level):
+            counts[_sort(value)] += 1
+    return counts
+
+
+def _sort(value: Value) -> str:
+    if value.kind == "integer" or any(operand.kind == "integer" for operand in value.operands):
+        return "integer"
+    return _COUNTED.get(value.operation, "choose")

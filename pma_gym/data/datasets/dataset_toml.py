@@ -1,0 +1,189 @@
+"""What `dataset.toml` says about a data set."""
+
+import math
+import reprlib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pma_gym.data.datasets.format_toml import file_format
+from pma_gym.data.readers.table import PART, FileFormat
+from pma_gym.data.trial_columns import COLUMNS, ColumnMap, TrialError, sources, suggestion
+from pma_gym.documents import is_file, read_toml
+from pma_gym.units import SI_FACTORS
+
+DESCRIPTION = "dataset.toml"
+_KEYS = ("title", "model", "columns", "format", "trials", "tolerance", "standard_error")
+MOST_SIZE = 1e9
+"""Sizes of signals are smaller, in any unit of the columns."""
+
+_TRIAL_KEYS = ("order", "repeat_of", "note")
+_LINE_FORM = (
+    'a line is a table, [columns], or name = value, a text in quotes: "Weg" = "contraction_mm"'
+)
+_shown = reprlib.repr
+
+
+@dataclass(frozen=True)
+class Description:
+    """The content of `dataset.toml`; all of it may be missing.
+
+    Attributes:
+        title: a line for people; empty if none is given.
+        model: name or path of a model, or None.
+        columns: the lab's column names to ours.
+        form: what the files leave open: separator, decimal mark, encoding...
+        trials: `order`, `repeat_of` and `note` by file name.
+        tolerance: misfit that is good enough, by measurement (SI): `contraction`.
+        standard_error: of readings that are rows of a table, by measurement (SI).
+    """
+
+    title: str = ""
+    model: str | None = None
+    columns: ColumnMap = field(default_factory=dict)
+    form: FileFormat = field(default_factory=FileFormat)
+    trials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    tolerance: Mapping[str, float] = field(default_factory=dict)
+    standard_error: Mapping[str, float] = field(default_factory=dict)
+
+
+def read_description(folder: Path, files: Sequence[str]) -> Description:
+    """What a folder's `dataset.toml` says; nothing if there is none.
+
+    Args:
+        folder: the data set.
+        files: names of its trials' files.
+    Raises:
+        TrialError: no TOML, unknown keys, a trial or a model file that is not there.
+    """
+    path = folder / DESCRIPTION
+    if not path.is_file():
+        near = [p.name for p in folder.glob("*.toml") if p.stem.lower() in ("dataset", "data_set")]
+        if near:
+            raise TrialError(f"{folder / near[0]} must be called {DESCRIPTION}; rename it")
+        return Description()
+    document = _parsed(path)
+    _check_keys(f"{DESCRIPTION}", document, _KEYS)
+    columns = _table(document, "columns")
+    for name in columns:
+        try:
+            # Alone: two names of one quantity are two layouts of files, if no file has both.
+            sources([name], columns, DESCRIPTION)
+        except TrialError as error:
+            raise TrialError(f"{DESCRIPTION}: {error}") from None
+    return Description(
+        title=_text(document, "title", DESCRIPTION) or "",
+        model=_model(folder, _text(document, "model", DESCRIPTION)),
+        columns=columns,
+        form=file_format(_table(document, "format")),
+        trials=_trials(_table(document, "trials"), files),
+        tolerance=_sizes(document, "tolerance", "contraction_mm = 0.2"),
+        standard_error=_sizes(document, "standard_error", "contraction_mm = 0.05"),
+    )
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    try:
+        return read_toml(path, _LINE_FORM)
+    except ValueError as error:
+        raise TrialError(str(error)) from None
+
+
+def _check_keys(place: str, found: Iterable[str], known: Sequence[str]) -> None:
+    for key in found:
+        if key not in known:
+            raise TrialError(
+                f"{place} takes {', '.join(known)}, got {key!r}{suggestion(key, known)}; remove or "
+                "rename it"
+            )
+
+
+def _table(document: Mapping[str, Any], key: str) -> dict[str, Any]:
+    table = document.get(key, {})
+    if not isinstance(table, dict):
+        raise TrialError(f"{key} in {DESCRIPTION} must be a table, [{key}], got {_shown(table)}")
+    return table
+
+
+def _text(table: Mapping[str, Any], key: str, place: str) -> str | None:
+    value = table.get(key)
+    if value is not None and (not isinstance(value, str) or not value.strip()):
+        raise TrialError(f'{key} in {place} must be a text, {key} = "...", got {_shown(value)}')
+    return value
+
+
+def _sizes(document: Mapping[str, Any], key: str, example: str) -> dict[str, float]:
+    """A table of sizes by measurement's column, in SI by quantity."""
+    known = {column.name: column for column in COLUMNS if column.kind == "measurement"}
+    table, sizes = _table(document, key), {}
+    _check_keys(f"[{key}] in {DESCRIPTION}", table, list(known))
+    for name, size in table.items():
+        number = size if isinstance(size, int | float) and not isinstance(size, bool) else math.nan
+        unit = known[name].unit
+        if not 0.0 < number < MOST_SIZE:
+            raise TrialError(
+                f"{name} in [{key}] of {DESCRIPTION} must be a number in {unit}, above 0 and below "
+                f"{MOST_SIZE:g}, got {size!r}; write {example}"
+            )
+        sizes[known[name].quantity] = float(number) * SI_FACTORS[unit]
+    return sizes
+
+
+def _model(folder: Path, given: str | None) -> str | None:
+    """The model's name, or its file as seen from here."""
+    if given is None or not (given.endswith(".toml") or "/" in given or "\\" in given):
+        return given
+    path = folder / given
+    if not is_file(path):
+        raise TrialError(
+            f"model in {DESCRIPTION} is {given!r}, but there is no file {path}; a path counts "
+            "from the data set's folder"
+        )
+    return str(path)
+
+
+def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """What is said about each trial, checked."""
+    for name, table in tables.items():
+        # Which parts a file has is known when it has been read.
+        if name not in files and name.partition(PART)[0] not in files:
+            raise TrialError(
+                f'[trials."{name}"] in {DESCRIPTION} names no file of the data set'
+                f"{suggestion(name, files)}; write the file's whole name, ending included"
+            )
+        place = f'[trials."{name}"] in {DESCRIPTION}'
+        if not isinstance(table, dict):
+            raise TrialError(f"{place} must be a table, got {_shown(table)}")
+        _check_keys(place, table, _TRIAL_KEYS)
+        _text(table, "note", place)
+        _check_order(place, table.get("order", 0.0))
+        _check_repeat(place, name, _text(table, "repeat_of", place), tables, files)
+    return {name: {**table} for name, table in tables.items()}
+
+
+def _check_order(place: str, order: object) -> None:
+    given = order if isinstance(order, int | float) and not isinstance(order, bool) else math.nan
+    if not math.isfinite(given):
+        raise TrialError(
+            f"order in {place} must be a number, the larger the later it was measured, got "
+            f"{_shown(order)}; write order = 1 for the first"
+        )
+
+
+def _check_repeat(
+    place: str, name: str, original: str | None, tables: Mapping[str, Any], files: Sequence[str]
+) -> None:
+    if original is None:
+        return
+    if original not in files and original.partition(PART)[0] not in files:
+        raise TrialError(
+            f"repeat_of in {place} is {original!r}, which names no trial"
+            f"{suggestion(original, files)}; write the file's whole name, ending included"
+        )
+    further = tables.get(original, {})
+    if original == name or (isinstance(further, dict) and further.get("repeat_of")):
+        raise TrialError(
+            f"repeat_of in {place} is {original!r}, which is itself a repeat; name the first trial "
+            "with these commands in all its repeats"
+        )

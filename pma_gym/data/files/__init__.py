@@ -1,0 +1,1 @@
+"""Trials in files: columns, units and clocks of a file to a trial in SI, and back."""

@@ -1,0 +1,1 @@
+"""Checks of what was measured: clipped sensors, gaps, readings far from all others."""

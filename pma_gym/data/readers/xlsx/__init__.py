@@ -1,0 +1,1 @@
+"""XLSX workbooks as tables, read as a stream."""

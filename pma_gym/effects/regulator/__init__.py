@@ -1,0 +1,1 @@
+"""The pressure regulator and the chamber that it fills."""

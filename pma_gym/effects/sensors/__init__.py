@@ -1,0 +1,1 @@
+"""The sensors: lag, noise, gain and offset, play."""

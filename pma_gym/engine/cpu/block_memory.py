@@ -1,0 +1,243 @@
+"""Where the numbers of environments lie for the processor: [block, place, lane].
+
+The lanes of a block are environments side by side, so that a vector holds one number of each.
+"""
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from llvmlite import ir
+
+from pma_gym.codegen.graph import Kind, Value
+from pma_gym.codegen.machine.control import (
+    DOUBLE,
+    FLOAT,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    integer,
+    offset,
+)
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.engine.graph.control_step_graph import Circuit
+from pma_gym.engine.graph.scoring import Sampling
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.state_layout import Record
+from pma_gym.integrator.integration import FUSED
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.program import Program
+
+ARGUMENTS = (
+    *("first", "last", "count", "records", "tables", "table_stride", "references"),
+    *("actions", "observations", "rewards", "terminated", "truncated", "trace", "indices"),
+    *("attempts", "voltages", "ideals", "settles", "pressures", "horizon"),
+)
+"""Entries of a call's arguments: numbers of blocks and environments, then addresses.
+
+With settles other than 0 a beginning draws pressures, from two numbers each, and settles there.
+The horizon is the number of control steps after which episodes are truncated."""
+
+BEFORE = len(ARGUMENTS)
+"""Place, behind them, of the address of those of another part that the same thread took before."""
+
+
+class Plan(Protocol):
+    """What a writer needs to know: a `Kernel`, or a kernel for other machines.
+
+    Attributes:
+        abreast: how many of the readings that zero the sensors are computed at once.
+    """
+
+    program: Program
+    record: Record
+    observed: ObservationTable
+    width: int
+    abreast: int
+    single: bool
+    draws: bool
+
+
+class BlockMemory:
+    """Reads and writes the numbers of environments.
+
+    What differs on other machines is in its methods (`pma_gym.engine.cuda.thread_memory`) and in
+    these attributes.
+
+    Args:
+        kernel: what is written, and for how many lanes.
+
+    Attributes:
+        element: type of a number in the records.
+        places: place of every number that is kept, by name.
+        fixed: what is computed once for a model, in the order of its table.
+    """
+
+    def __init__(self, kernel: Plan) -> None:
+        model: Model = kernel.program.model
+        self.kernel, self.record, self.width = kernel, kernel.record, kernel.width
+        self.element: ir.Type = DOUBLE
+        self.places = kernel.record.places
+        self.eq = PlantEquations(model.effects, model.parameters)
+        PLANTS[model.plant].write_equations(self.eq)
+        self.circuit = Circuit(kernel.record, self.eq)
+        self.fixed: list[Value] = []
+
+    def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
+        found = {}
+        numbers = ("first", "last", "count", "table_stride", "settles", "horizon")
+        for i, name in enumerate(ARGUMENTS):
+            value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
+            found[name] = value if name in numbers else b.inttoptr(value, POINTER)
+        return found
+
+    def _place(
+        self, b: Builder, records: Operand, block: Operand, name: str, lane: Operand | int
+    ) -> Operand:
+        """Address of one environment's number."""
+        row = b.mul(block, integer(self.record.size * self.width))
+        at = b.add(row, integer(self.record.places[name] * self.width))
+        return offset(b, records, b.add(at, integer(lane)))
+
+    def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
+        """How many numbers of a block lie before those of a place, or before one lane's."""
+        return integer(self.places[name] * self.width + lane)
+
+    def _cell(self, b: Builder, records: Operand, name: str, lane: Operand | int) -> Operand:
+        """Address of a number of one lane of a block."""
+        at = b.add(self._row(b, name), integer(lane))
+        return offset(b, records, at, self.element)
+
+    def _lanes(self, width: int) -> Lanes:
+        """Lanes for what is not the march."""
+        return Lanes(width, fused=FUSED)
+
+    def _load(self, b: Builder, lanes: Lanes, where: Operand, kind: Kind) -> Operand:
+        return lanes.load(b, where, 0, kind)
+
+    def _keep(self, b: Builder, lanes: Lanes, number: Operand, where: Operand, kind: Kind) -> None:
+        lanes.store(b, number, where, 0, kind)
+
+    def _count(self, b: Builder, where: Operand) -> Operand:
+        """An integer of one environment."""
+        return b.load(where, typ=INTEGER)
+
+    def _exact_times(
+        self, b: Builder, one: Sampling, known: dict[int, Operand]
+    ) -> dict[int, Operand]:
+        """Times of a sample that are not left to the march's precision."""
+        return {}
+
+    def _fixed(
+        self, b: Builder, lanes: Lanes, tables: Operand, lane: Operand | int
+    ) -> dict[int, Operand]:
+        """The table of a block, or of one lane of it."""
+        known = {}
+        alone = lanes.width == 1
+        for i, value in enumerate(self.fixed):
+            at = integer(i * self.width)
+            where = offset(b, tables, b.add(at, integer(lane)) if alone else at)
+            known[value.id] = lanes.load(b, where)
+        return known
+
+    def _known(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        values: Sequence[Value],
+        records: Operand,
+        tables: Operand,
+        lane: Operand | int,
+    ) -> dict[int, Operand]:
+        """Inputs and table of a block (or, in scalar code, of one lane of it), as far as used."""
+        known: dict[int, Operand] = {}
+        names = {self.circuit.slot(name).id: name for name in self.places}
+        alone = lanes.width == 1
+        for value in live_inputs(values):
+            if value.id in names:
+                at = self._row(b, names[value.id])
+                index = b.add(at, integer(lane)) if alone else at
+                where = offset(b, records, index, self.element)
+                known[value.id] = self._load(b, lanes, where, value.kind)
+        return known | self._fixed(b, lanes, tables, lane)
+
+    def _store(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        found: dict[int, Operand],
+        values: dict[str, Value],
+        records: Operand,
+        lane: Operand | int,
+    ) -> None:
+        alone = lanes.width == 1
+        for name, value in values.items():
+            if name not in self.places:
+                continue
+            at = self._row(b, name)
+            index = b.add(at, integer(lane)) if alone else at
+            where = offset(b, records, index, self.element)
+            self._keep(b, lanes, found[value.id], where, self.record.kind(name))
+
+    def _block(self, b: Builder, given: dict[str, Operand], block: Operand) -> tuple[Operand, ...]:
+        """Addresses of a block's records and tables."""
+        records = offset(b, given["records"], b.mul(block, integer(self.record.size * self.width)))
+        return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
+
+    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
+        if lanes.width == 1:
+            return lanes.spread(b, numbers[0])
+        vector = ir.Constant(lanes.real, ir.Undefined)
+        for k, number in enumerate(numbers):
+            vector = lanes.insert(b, vector, number, k)
+        return vector
+
+    def _references(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        records: Operand,
+        lane: Operand | int,
+        ahead: int,
+        later: int,
+    ) -> Operand:
+        """References so many steps ahead, for a block or one lane."""
+        found = []
+        for k in range(lanes.width):
+            index = self._row(b, "count", k)
+            if lanes.width == 1:
+                index = b.add(index, integer(lane))
+            steps = self._count(b, offset(b, records, index, self.element))
+            row = b.add(steps, integer(ahead + later))
+            where = offset(b, given["references"], row, self.element)
+            found.append(b.load(where, typ=self.element))
+        return self._gathered(b, lanes, found)
+
+    def _put_observation(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        given: dict[str, Operand],
+        found: dict[int, Operand],
+        entries: Sequence[Value],
+        first: Operand,
+    ) -> None:
+        for i, entry in enumerate(entries):
+            for k in range(lanes.width):
+                number = lanes.extract(b, found[entry.id], k)
+                row = b.mul(b.add(first, integer(k)), integer(len(entries)))
+                where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
+                b.store(narrowed(b, number, FLOAT), where)
+
+
+def narrowed(b: Builder, number: Operand, element: ir.Type) -> Operand:
+    """A number as one of a type that holds no more."""
+    return number if number.type == element else b.fptrunc(number, element)
+
+
+def widened(b: Builder, number: Operand) -> Operand:
+    """A number in double precision."""
+    return number if number.type == DOUBLE else b.fpext(number, DOUBLE)

@@ -1,0 +1,341 @@
+"""Writes the control step of environments: command, march, sensors, reward."""
+
+from collections.abc import Callable
+from contextlib import nullcontext
+from typing import Protocol
+
+from llvmlite import ir
+
+from pma_gym.codegen.generic import to_real
+from pma_gym.codegen.graph import FIXED, HELD
+from pma_gym.codegen.machine.control import (
+    DOUBLE,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    function,
+    integer,
+    loop,
+    offset,
+    repeat,
+    variable,
+)
+from pma_gym.codegen.machine.native import pairs
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.threads.thread_pool import write_another
+from pma_gym.codegen.trace import split
+from pma_gym.engine.cpu.block_memory import BEFORE, Plan, narrowed, widened
+from pma_gym.engine.cpu.python_step import write_advance
+from pma_gym.engine.cpu.reset_writer import BeginningWriter
+from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
+from pma_gym.integrator.integration import FUSED, Lane, Layout, march, memory
+from pma_gym.integrator.step_attempt import attempt
+from pma_gym.plant.model import PLANTS
+
+BAD_ACTION = 4
+"""What `check` returns where an action is no finite number: there `step` is not to be called."""
+
+
+class Numbers(Protocol):
+    """Numbers of their own that lanes keep during the march."""
+
+    def vector(self, what: str) -> Operand:
+        """All lanes' numbers of a name."""
+        ...
+
+    def put_vector(self, what: str, numbers: Operand) -> None:
+        """Write them."""
+        ...
+
+
+class Writer(BeginningWriter):
+    """Writes a kernel's module."""
+
+    def __init__(self, kernel: Plan) -> None:
+        super().__init__(kernel)
+        self.attempt = attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
+        self.course: Course = course(self.eq, self.attempt, kernel.record.task)
+        extra = [*self.course.values, self.attempt.taken, self.attempt.length]
+        layout = Layout.of(self.attempt, extra)
+        self.extra = extra
+        self.commanded = self.circuit.command()
+        self.sensed = self.circuit.sense(self.circuit.slot("count") + 1, first=False)
+        self.sensed["reward"] = self.circuit.reward(self.sensed)
+        later = [*self.sensed.values(), *self._trace_beginning()]
+        self._prepare()
+        fixed = {v.id: v for v in [*layout.fixed, *split(later, FIXED)]}
+        self.fixed = [fixed[i] for i in sorted(fixed)]
+        self.layout = Layout(layout.changing, layout.outputs, layout.held, layout.fixed, self.fixed)
+        self._write()
+
+    def _prepare(self) -> None:
+        """Decide what follows from all that is computed."""
+
+    def _write(self) -> None:
+        self._table()
+        self._check()
+        self._step()
+        self._begin()
+        if self.width == 1:
+            write_advance(self.module, self.record)
+
+    def _table(self) -> None:
+        b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
+        known = self.kernel.program.parameters(b, vector, self.fixed)
+        found = Lanes(1).emit(b, self.fixed, known)
+        for i, value in enumerate(self.fixed):
+            b.store(found[value.id], offset(b, out, i))
+        b.ret_void()
+        b, _ = function(self.module, "table_size", [], INTEGER)
+        b.ret(integer(len(self.fixed)))
+
+    # -- a step ------------------------------------------------------------------------------------
+
+    def _check(self) -> None:
+        """Whether all actions are finite, which a step takes for granted."""
+        b, (arguments,) = function(self.module, "check", [("arguments", POINTER)], INTEGER)
+        given = self._arguments(b, arguments)
+        bad, lanes = memory(b, INTEGER), Lanes(self.width)
+        b.store(integer(0), bad)
+        with loop(b, given["last"], given["first"]) as block:
+            for i in range(self.record.actions):
+                action = self._actions(b, lanes, given, block, i)
+                # Zero times a number that is not finite is none.
+                nothing = b.fmul(action, lanes.constant(0.0))
+                wrong = lanes.any(b, b.fcmp_unordered("uno", nothing, nothing))
+                b.store(b.or_(b.load(bad, typ=INTEGER), b.zext(wrong, INTEGER)), bad)
+        b.ret(b.mul(b.load(bad, typ=INTEGER), integer(BAD_ACTION)))
+
+    def _step(self) -> None:
+        """Step a part of the blocks, and what other parts the thread takes meanwhile."""
+        b, (part,) = function(self.module, "command", [("part", POINTER)])
+        given = self._arguments(b, part)
+        with loop(b, given["last"], given["first"]) as block:
+            self._command(b, given, block)
+        b.ret_void()
+        both = [("part", POINTER), ("crew", POINTER)]
+        b, (part, crew) = function(self.module, "step", both, INTEGER)
+        b.call(self.module.get_global("command"), [part])
+        b.store(integer(0), offset(b, part, BEFORE, INTEGER))
+        newest = variable(b, INTEGER, b.ptrtoint(part, INTEGER))
+        given = self._arguments(b, part)
+        self._march(b, given, lambda: self._take_part(b, crew, newest))
+        ended = memory(b, INTEGER)
+        b.store(integer(0), ended)
+        with repeat(b) as leave_if:
+            address = b.load(newest, typ=INTEGER)
+            leave_if(b.icmp_signed("==", address, integer(0)))
+            part = b.inttoptr(address, POINTER)
+            given = self._arguments(b, part)
+            with loop(b, given["last"], given["first"]) as block:
+                self._sense(b, given, block, ended)
+            b.store(b.load(offset(b, part, BEFORE, INTEGER), typ=INTEGER), newest)
+        b.ret(b.load(ended, typ=INTEGER))
+
+    def _take_part(self, b: Builder, crew: Operand, newest: Operand) -> tuple[Operand, Operand]:
+        """Take another part, if there is one, and command it; its first job and the one behind."""
+        first, stop = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
+        address = write_another(b, crew)
+        with b.if_then(b.icmp_signed("!=", address, integer(0))):
+            part = b.inttoptr(address, POINTER)
+            b.store(b.load(newest, typ=INTEGER), offset(b, part, BEFORE, INTEGER))
+            b.store(address, newest)
+            b.call(self.module.get_global("command"), [part])
+            given = self._arguments(b, part)
+            # Whoever took the first part counts them all.
+            b.store(integer(0), given["attempts"])
+            for place, job in zip((first, stop), self._jobs(b, given), strict=True):
+                b.store(job, place)
+        return b.load(first, typ=INTEGER), b.load(stop, typ=INTEGER)
+
+    def _jobs(self, b: Builder, given: dict[str, Operand]) -> tuple[Operand, Operand]:
+        """The first environment of a part, and the one behind the last."""
+        first, last = (b.mul(given[name], integer(self.width)) for name in ("first", "last"))
+        return first, b.select(b.icmp_signed("<", last, given["count"]), last, given["count"])
+
+    def _action(self, b: Builder, given: dict[str, Operand], index: Operand, i: int) -> Operand:
+        at = b.add(b.mul(index, integer(self.record.actions)), integer(i))
+        return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
+
+    def _actions(
+        self, b: Builder, lanes: Lanes, given: dict[str, Operand], block: Operand, i: int
+    ) -> Operand:
+        first = b.mul(block, integer(self.width))
+        return self._gathered(
+            b,
+            lanes,
+            [self._action(b, given, b.add(first, integer(k)), i) for k in range(self.width)],
+        )
+
+    def _command(self, b: Builder, given: dict[str, Operand], block: Operand) -> None:
+        lanes = self._lanes(self.width)
+        records, tables = self._block(b, given, block)
+        values = list(self.commanded.values())
+        known = self._known(b, lanes, values, records, tables, 0)
+        for i in range(self.record.actions):
+            known[self.circuit.action(i).id] = self._actions(b, lanes, given, block, i)
+        found = lanes.emit(b, values, known)
+        self._store(b, lanes, found, self.commanded, records, 0)
+
+    def _march(
+        self,
+        b: Builder,
+        given: dict[str, Operand],
+        take_part: Callable[[], tuple[Operand, Operand]],
+    ) -> None:
+        real, paired = "float" if self.kernel.single else "double", pairs(self.width)
+        lanes = Lanes(self.width, real, FUSED, paired)
+        sums = [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
+        lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
+        period = self.record.options.period
+        following, behind = (variable(b, INTEGER, job) for job in self._jobs(b, given))
+        kept = [*self.record.states, "size"]
+        values = {name: self.circuit.slot(name) for name in self.record.states}
+        values["size"] = self.attempt.size
+        own = ["sample", *sums]
+
+        def address(job: Operand, name: str) -> Operand:
+            block, k = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
+            return self._place(b, given["records"], block, name, k)
+
+        def number(job: Operand, name: str) -> Operand:
+            return b.load(address(job, name), typ=DOUBLE)
+
+        def is_left() -> Operand:
+            return b.icmp_signed("<", b.load(following, typ=INTEGER), b.load(behind, typ=INTEGER))
+
+        def take(k: Operand, again: bool = False) -> Operand:
+            if self.width > 1:
+                with b.if_then(b.not_(is_left())):
+                    for place, job in zip((following, behind), take_part(), strict=True):
+                        b.store(job, place)
+            found, job = is_left(), b.load(following, typ=INTEGER)
+            with b.if_then(found):
+                b.store(b.add(job, integer(1)), following)
+                b.store(job, lane.job(k))
+                if self.width == 1:
+                    steps = b.load(address(job, "count"), typ=INTEGER)
+                    heard = number(job, f"{self.record.task.actuator}_voltage")
+                    b.store(heard, offset(b, given["voltages"], steps))
+                for name in kept:
+                    lane.put(values[name], k, lane.narrow(number(job, name)))
+                for name in own:
+                    lane.put(name, k, lane.narrow(number(job, name)))
+                lane.put(self.attempt.left, k, ir.Constant(lanes.element, period))
+                steps = b.load(address(job, "count"), typ=INTEGER)
+                time = b.fmul(b.uitofp(steps, DOUBLE), ir.Constant(DOUBLE, period))
+                lane.put("clock", k, lane.narrow(time))
+                inputs = {
+                    self.circuit.slot(name).id: lane.narrow(number(job, name))
+                    for name in self.record.held
+                }
+                block, rest = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
+                _, tables = self._block(b, given, block)
+                # A lane that has worked has the table already if all share one.
+                stale = b.icmp_signed("!=", given["table_stride"], integer(0))
+                with b.if_then(stale) if again else nullcontext():
+                    lane.tabulate(k, offset(b, tables, rest), self.width)
+                lane.hold(k, inputs)
+            return found
+
+        def proceed(k: Operand) -> Operand:
+            job = b.load(lane.job(k), typ=INTEGER)
+            for name in kept:
+                b.store(lane.widen(lane.get(values[name], k)), address(job, name))
+            for name in own:
+                b.store(lane.widen(lane.get(name, k)), address(job, name))
+            return take(k, again=True)
+
+        def watch(found: dict[int, Operand]) -> None:
+            self._sample(b, lanes, lane, found, given)
+
+        made = march(lane, self.attempt, take, proceed, watch, self.extra)
+        b.store(b.load(made, typ=INTEGER), given["attempts"])
+
+    def _sample(
+        self,
+        b: Builder,
+        lanes: Lanes,
+        lane: Numbers,
+        found: dict[int, Operand],
+        given: dict[str, Operand],
+    ) -> None:
+        """Take every sample that lies in the attempt."""
+        options, task = self.record.options, self.record.task
+        one = sampling(self.eq, self.attempt, task, options.period)
+        graph = self.eq.graph
+        known = {self.attempt.left.id: found[self.attempt.left.id]}
+        for name, value in zip(COURSE, self.course.values, strict=True):
+            known[graph.input(f"course.{name}", 2).id] = found[value.id]
+        known[graph.input("length", 2).id] = found[self.attempt.length.id]
+        known[graph.input("taken", 2, "truth").id] = found[self.attempt.taken.id]
+        known[graph.input("clock", HELD).id] = lane.vector("clock")
+        phases = task.protocol.phases
+        with repeat(b) as leave_if:
+            for name in ("sample", *(f"sum_{phase.name}" for phase in phases)):
+                known[graph.input(f"record.{name}", 2).id] = lane.vector(name)
+            known |= self._exact_times(b, one, known)
+            outputs = [one.due, one.position, one.sample, *one.sums]
+            if one.ideal is not None:
+                # Whoever passes no sample looks nothing up.
+                known = lanes.emit(b, [one.due], known)
+                leave_if(b.not_(lanes.any(b, known[one.due.id])))
+                known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
+            taken = lanes.emit(b, outputs, known)
+            if one.ideal is None:
+                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
+            if self.traces:
+                number = known[graph.input("record.sample", 2).id]
+                index = b.fptoui(lanes.extract(b, number, 0), INTEGER)
+                where = offset(b, given["trace"], index)
+                b.store(widened(b, lanes.extract(b, taken[one.position.id], 0)), where)
+            lane.put_vector("sample", taken[one.sample.id])
+            for phase, value in zip(phases, one.sums, strict=True):
+                lane.put_vector(f"sum_{phase.name}", taken[value.id])
+
+    def _ideals(
+        self, b: Builder, lanes: Lanes, given: dict[str, Operand], samples: Operand
+    ) -> Operand:
+        """Ideal position at the next sample of every lane, from the table."""
+        found = []
+        for k in range(lanes.width):
+            index = b.fptoui(lanes.extract(b, samples, k), INTEGER)
+            where = offset(b, given["ideals"], index, self.element)
+            found.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
+        return self._gathered(b, lanes, found)
+
+    # -- what comes of it --------------------------------------------------------------------------
+
+    def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
+        lanes = self._lanes(self.width)
+        records, tables = self._block(b, given, block)
+        entries = self.circuit.observation(self.kernel.observed, self.sensed)
+        options = self.record.options
+        is_over = self.sensed["ended"] > 0.0
+        at_end = to_real(self.sensed["count"]) >= self.circuit.horizon
+        truncated = at_end & ~is_over
+        values = [*self.sensed.values(), *entries, is_over, truncated]
+        known = self._known(b, lanes, values, records, tables, 0)
+        horizon = lanes.spread(b, b.uitofp(given["horizon"], lanes.element))
+        known[self.circuit.horizon.id] = horizon
+        for ahead in range(options.preview + 1):
+            known[self.circuit.reference(ahead).id] = self._references(
+                b, lanes, given, records, 0, ahead, 1
+            )
+        found = lanes.emit(b, values, known)
+        self._store(b, lanes, found, self.sensed, records, 0)
+        first = b.mul(block, integer(self.width))
+        self._put_observation(b, lanes, given, found, entries, first)
+        for k in range(self.width):
+            index = b.add(first, integer(k))
+            reward = lanes.extract(b, found[self.sensed["reward"].id], k)
+            b.store(reward, offset(b, given["rewards"], index, self.element))
+            for name, truth in (("terminated", is_over), ("truncated", truncated)):
+                flag = b.zext(lanes.extract(b, found[truth.id], k), ir.IntType(8))
+                b.store(flag, offset(b, given[name], index, ir.IntType(8)))
+        # Lanes beyond the last environment never end: their records are copies of a rest.
+        any_over = b.zext(lanes.any(b, found[is_over.id]), INTEGER)
+        any_end = b.zext(lanes.any(b, found[truncated.id]), INTEGER)
+        both = b.or_(any_over, b.shl(any_end, integer(1)))
+        b.store(b.or_(b.load(ended, typ=INTEGER), both), ended)

@@ -1,0 +1,144 @@
+"""What environments are: numbers in blocks of lanes, and the kernel that works on them."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.codegen.machine.native import simd_lanes
+from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
+from pma_gym.engine.cpu.kernel import Kernel
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.options import Options
+from pma_gym.engine.state_layout import Record
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import Plant
+from pma_gym.tasks import Task
+
+
+class EngineMemory:
+    """Numbers of n environments, by place; see `Engine` for arguments and attributes.
+
+    Args:
+        told: the nominal model that controllers are told.
+        nominal: the Plant of the nominal model.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        options: Options,
+        told: Model,
+        nominal: Plant,
+        count: int,
+        single: bool,
+    ) -> None:
+        """Compile, and make room."""
+        self.task, self.options, self.count = task, options, count
+        self.told, self.nominal = told, nominal
+        self.record = Record(tuple(self.nominal.states), task, options)
+        self.table = ObservationTable(task, options)
+        self.width = 1 if count == 1 else simd_lanes(single)
+        program = self.nominal.program
+        self.kernel = Kernel(program, self.record, self.table, self.width, single)
+        self.models = [self.nominal.model] * count
+        self.pressures = np.zeros(count)
+        self.horizon = options.horizon(task)
+        self._allocate()
+        self._address = self._arguments.ctypes.data
+
+    def _allocate(self) -> None:
+        record, width = self.record, self.width
+        self.blocks = -(-self.count // width)
+        padded = self.blocks * width
+        options = self.options
+        self.records = np.zeros((self.blocks, record.size, width))
+        self.integers = self.records.view(np.int64)
+        self._shares_table = options.randomisation == "none"
+        rows = 1 if self._shares_table else self.blocks
+        self._tables = np.zeros((rows, self.kernel.table_size, width))
+        self._tables[:] = self._table_of(self.nominal.vector)[:, None]
+        steps = self.task.steps(options.control_rate_hz)
+        # What has ended may be stepped once more before it is reset.
+        self._references = np.pad(self.table.references, (0, 2), mode="edge")
+        self.actions = np.zeros((padded, record.actions))
+        self._all_observations = np.zeros((padded, len(self.table.rows)), np.float32)
+        self._all_rewards = np.zeros(padded)
+        self._all_flags = np.zeros((2, padded), np.bool_)
+        self.observations = self._all_observations[: self.count]
+        self.rewards = self._all_rewards[: self.count]
+        self.terminated, self.truncated = self._all_flags[:, : self.count]
+        duration = (steps + 2) * options.period
+        samples = int(duration * 384.0) + 8
+        self.trace = np.zeros(samples if width == 1 else 1)
+        moves = self.task.protocol.motion is not None
+        self._ideals = self.task.ideals(samples if moves else 1)
+        self.voltages = np.zeros(steps + 2 if width == 1 else 1)
+        self._indices = np.zeros(max(self.count, 1), np.int64)
+        self._ranges = np.zeros((max(self.count, 1), 2))
+        self._episodes = np.full(self.count, -1, np.int64)
+        self._keys = np.zeros((self.count, 2), np.int64)
+        self._arguments = np.zeros(BEFORE + 1, np.int64)
+        stride = 0 if self._shares_table else self.kernel.table_size * width
+        given = {
+            "first": 0,
+            "last": self.blocks,
+            "count": self.count,
+            "table_stride": stride,
+            "records": self.records.ctypes.data,
+            "tables": self._tables.ctypes.data,
+            "references": self._references.ctypes.data,
+            "actions": self.actions.ctypes.data,
+            "observations": self._all_observations.ctypes.data,
+            "rewards": self._all_rewards.ctypes.data,
+            "terminated": self._all_flags[0].ctypes.data,
+            "truncated": self._all_flags[1].ctypes.data,
+            "trace": self.trace.ctypes.data,
+            "indices": self._indices.ctypes.data,
+            "attempts": 0,
+            "voltages": self.voltages.ctypes.data,
+            "ideals": self._ideals.ctypes.data,
+            "settles": 0,
+            "pressures": self._ranges.ctypes.data,
+            "horizon": self.horizon,
+        }
+        self._arguments[:BEFORE] = [given[name] for name in ARGUMENTS]
+        self._count_attempts(1)
+        self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
+        self._has_idle_lanes = self.count % width != 0
+
+    def _count_attempts(self, parts: int) -> None:
+        """Make room for the attempts of so many parts of a step, a line of the cache each."""
+        self._attempts = np.zeros((parts, 8), np.int64)
+        self._arguments[ARGUMENTS.index("attempts")] = self._attempts.ctypes.data
+
+    def _table_of(self, numbers: NDArray[np.float64]) -> NDArray[np.float64]:
+        out = np.empty(self.kernel.table_size)
+        self.kernel.table(numbers.ctypes.data, out.ctypes.data)
+        return out
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """A number of every environment by its place's name, shape (n,); a copy."""
+        return self.records[:, self.record.places[name], :].reshape(-1)[: self.count].copy()
+
+    def row(self, index: int) -> list[float]:
+        """All numbers of an environment, by place."""
+        block, lane = divmod(index, self.width)
+        return self.records[block, :, lane].tolist()
+
+    def steps(self, index: int) -> int:
+        """Control steps of an environment's episode so far."""
+        block, lane = divmod(index, self.width)
+        return int(self.integers[block, self.record.places["count"], lane])
+
+    def rows(self, indices: NDArray[np.int64]) -> NDArray[np.float64]:
+        """All numbers of some environments, shape (m, size of the record); a copy."""
+        block, lane = np.divmod(indices, self.width)
+        return self.records[block, :, lane]
+
+    def _of(self, name: str, indices: NDArray[np.int64]) -> NDArray[np.float64]:
+        """A number of some environments."""
+        block, lane = np.divmod(indices, self.width)
+        return self.records[block, self.record.places[name], lane]
+
+    def counts(self) -> NDArray[np.int64]:
+        """Control steps of every episode so far, shape (n,)."""
+        return self.integers[:, self.record.places["count"], :].reshape(-1)[: self.count].copy()

@@ -1,0 +1,232 @@
+"""What happens in a control step beside the plant, as traced arithmetic: for kernels of any width.
+
+From the action to the drive, from the plant's state to reading, observation, reward and end.
+"""
+
+from collections.abc import Mapping
+from functools import cached_property
+
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.random import normals, philox
+from pma_gym.codegen.substitute import substitute
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.graph.exercise_step import Exercised, held_volts
+from pma_gym.engine.graph.scoring import position_of
+from pma_gym.engine.graph.step_inputs import StepInputs
+from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, heard_position
+from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
+from pma_gym.integrator.step_attempt import first_size
+from pma_gym.integrator.system import at_rest
+from pma_gym.plant import sensors
+from pma_gym.tasks import REWARDS, broken, missed_reward
+from pma_gym.units import SI_FACTORS
+
+FORCE_OF_A_VOLT = 100.0
+"""Jump of the operator's force (N) after which steps begin as small as after one of 1 V: about what
+the motor pulls with."""
+
+PRESSURE_TOLERANCE = 1.0
+"""How far a pressure may leave the trials' range before it counts (Pa): a settled pressure is
+exact to its last bits only."""
+
+
+class Circuit(StepInputs):
+    """Traced parts of a control step; see `StepInputs` for arguments and attributes."""
+
+    @cached_property
+    def exercised(self) -> Exercised | None:
+        """What an exercise adds."""
+        return Exercised(self) if self.record.task.exercise else None
+
+    @property
+    def prescribed(self) -> Prescribed | None:
+        """What a measured moment is compared with, in an exercise that prescribes one."""
+        return self.exercised.prescribed if self.exercised else None
+
+    def command(self) -> dict[str, Value]:
+        """From an action to what the station hears: new numbers by name."""
+        record, options = self.record, self.record.options
+        held = []
+        for i in range(record.actions):
+            asked = self.action(i)
+            held.append(where(asked < -1.0, -1.0, where(asked > 1.0, 1.0, asked)))
+        found: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
+        volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
+        if options.action_delay:
+            heard = [self.slot(f"wire_0_{i}") for i in range(record.actions)]
+            line = [
+                [self.slot(f"wire_{k}_{i}") for i in range(record.actions)]
+                for k in range(1, options.action_delay)
+            ]
+            for k, values in enumerate([*line, volts]):
+                found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
+        else:
+            heard = volts
+        if self.exercised:
+            regulator, guarded = self.exercised.keep_safe(heard[0])
+            found |= self.exercised.operate() | guarded
+        elif record.task.actuator == "regulator":
+            found["motor_voltage"], regulator = self.slot("rest_motor"), heard[0]
+        else:
+            found["motor_voltage"] = heard[0]
+            regulator = heard[1] if options.regulator_action else self.slot("rest_regulator")
+        found["regulator_voltage"] = self._disturbed(regulator)
+        change = self.graph.constant(0.0)
+        for i, value in enumerate(held):
+            moved = abs(value - self.slot(f"action_{i}"))
+            change = where(moved > change, moved, change)
+        found["reward"] = change
+        jump = abs(found["motor_voltage"] - self.slot("motor_voltage"))
+        other = abs(found["regulator_voltage"] - self.slot("regulator_voltage"))
+        jump = where(other > jump, other, jump)
+        if any(name.startswith("pulse_") for name in self.record.events):
+            found[OPERATOR] = self._pulse()
+            pulled = abs(found[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
+            jump = where(pulled > jump, pulled, jump)
+        found["size"] = first_size(self.slot("size"), jump)
+        return found
+
+    def _disturbed(self, regulator: Value) -> Value:
+        """Regulator voltage that the station hears of one that is commanded (V)."""
+        jumps = [name for name in self.record.events if name.startswith("jump_step_")]
+        if not jumps:
+            return regulator
+        now, volts = to_real(self.slot("count")), regulator
+        for name in jumps:
+            size = self.slot(name.replace("_step", ""))
+            volts = volts + where(now >= self.slot(name), size, 0.0)
+        return held_volts(volts)
+
+    def _pulse(self) -> Value:
+        """Force of the operator in the step that begins (N)."""
+        now, force = to_real(self.slot("count")), self.graph.constant(0.0)
+        for name in self.record.events:
+            if name.startswith("pulse_step_"):
+                ended = self.slot(name.replace("_step", "_end"))
+                during = (now >= self.slot(name)) & (now < ended)
+                force = force + where(during, self.slot(name.replace("_step", "")), 0.0)
+        return force
+
+    def truth(self) -> dict[str, Value]:
+        """True outputs at the plant's state."""
+        eq = self.equations
+        outputs = [eq.outputs[name] for name in TRUTH]
+        return dict(zip(TRUTH, substitute(outputs, at_rest(eq)), strict=True))
+
+    def read(self, stream: int, count: Value) -> list[Value]:
+        """What the four sensors say (SI), by random numbers of a stream."""
+        eq, truth = self.equations, self.truth()
+        lagged = [
+            eq[f"lag_{name}"] if f"lag_{name}" in self.record.states else truth[output]
+            for name, (output, _) in sensors.SENSORS.items()
+        ]
+        if not self.record.options.noise:
+            return lagged
+        words = philox(
+            (count, self.slot("episode") * 4 + stream, self.graph.constant(0, "integer"), 0),
+            (self.slot("key_0"), self.slot("key_1")),
+        )
+        said = []
+        for held, normal, (name, (_, line)) in zip(
+            lagged, normals(words), sensors.SENSORS.items(), strict=True
+        ):
+            parameters = eq.parameters.get(name)
+            level = getattr(parameters, "noise", self.graph.constant(0.0))
+            said.append(sensors.reading(held, level, normal, line.gain, line.offset))
+        return said
+
+    def sense(self, count: Value, first: bool) -> dict[str, Value]:
+        """From the plant's state to reading, end and info: new numbers by name.
+
+        Args:
+            count: control steps since the trial began, an integer.
+            first: at the trial's beginning, which has no readings before.
+        """
+        record, truth = self.record, self.truth()
+        contraction, rotation, load, pressure = self.read(NOISE, count)
+        reading = {
+            "extension": self.slot("tare_contraction") - contraction,
+            "rotation": rotation - self.slot("tare_rotation"),
+            "load": load,
+            "pressure": pressure,
+        }
+        found: dict[str, Value] = {f"true_{name}": value for name, value in truth.items()}
+        for k in range(record.readings):
+            for part in PARTS:
+                before = reading[part] if k == 0 or first else self.slot(f"{part}_{k - 1}")
+                found[f"{part}_{k}"] = before
+        ended = broken(self.equations.parameters["limits"], truth)
+        found["ended"] = self.graph.value(ended)
+        found["count"] = count
+        if self.exercised:
+            found |= self.exercised.score(found, first)
+        found |= self._info(found, to_real(count))
+        return found
+
+    def _info(self, found: Mapping[str, Value], count: Value) -> dict[str, Value]:
+        record, task = self.record, self.record.task
+        unit, quantity = task.protocol.unit, task.protocol.quantity
+        factor, position = 1.0 / SI_FACTORS[unit], self.position(found)
+        valid = self.equations.parameters["validity"]
+        low = where(valid.lowest < task.lowest_pressure, task.lowest_pressure, valid.lowest)
+        high = where(valid.highest < task.highest_pressure, valid.highest, task.highest_pressure)
+        pressure = found["true_pressure"]
+        inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
+        heard = heard_position(
+            quantity,
+            lambda part: found[f"{part}_{record.options.observation_delay}"],
+            self.prescribed,
+        )
+        values = [
+            count * record.options.period,
+            position * factor,
+            heard * factor,
+            self.reference(0) * factor,
+            (position - self.reference(0)) * factor,
+            self.slot("motor_voltage"),
+            self.slot("regulator_voltage"),
+            pressure * 1e-3,
+            found["true_load"],
+            where(inside, 0.0, 1.0),
+        ]
+        if self.exercised:
+            values += self.exercised.info(found)
+        return dict(zip(record.info, values, strict=True))
+
+    def position(self, found: Mapping[str, Value]) -> Value:
+        """True position that the task asks for (m or rad)."""
+        outputs = {name: found[f"true_{name}"] for name in TRUTH}
+        return position_of(self.equations, self.record.task, outputs)
+
+    def first_score(self, found: Mapping[str, Value]) -> dict[str, Value]:
+        """The score's numbers once the first sample, that of the beginning, is taken."""
+        phase = self.record.task.protocol.phases[0]
+        error = self.position(found) - float(phase.reference(0.0))
+        return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
+
+    def reward(self, found: Mapping[str, Value]) -> Value:
+        """Reward of a step; the action's change stands where the reward will.
+
+        It stays there for a user's function, which Python calls (`FunctionRewards`).
+        """
+        task, options = self.record.task, self.record.options
+        if callable(options.reward):
+            return self.slot("reward")
+        rule = REWARDS[options.reward]
+        error = self.position(found) - self.reference(0)
+        value = self.graph.value(rule(task.error_percent(error), self.slot("reward")))
+        missed = self.horizon - to_real(found["count"])
+        whole = where(found["ended"] > 0.0, value + missed * missed_reward(rule), value)
+        # By 1 it is the same, and takes its time.
+        return whole if options.reward_scale == 1.0 else options.reward_scale * whole
+
+    def observation(self, table: ObservationTable, found: Mapping[str, Value]) -> list[Value]:
+        """The observation's entries."""
+        entries = table.entries(
+            lambda part, k: found[f"{part}_{k}"],
+            self.reference,
+            [self.slot(f"action_{i}") for i in range(self.record.actions)],
+            self.prescribed,
+        )
+        return [where(e < -BOUND, -BOUND, where(e > BOUND, BOUND, e)) for e in entries]

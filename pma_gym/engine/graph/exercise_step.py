@@ -1,0 +1,183 @@
+"""What an exercise adds to a control step, as traced arithmetic: operator, safety, score."""
+
+import math
+from collections.abc import Mapping
+
+from pma_gym.codegen.generic import to_real, where
+from pma_gym.codegen.graph import Value
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.engine.graph.step_inputs import StepInputs
+from pma_gym.engine.observation import Prescribed
+from pma_gym.engine.state_layout import GUARDED, NOISE, plan_of_places
+from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
+from pma_gym.tasks.guard import MOMENT_FILTER_S, SPEED_FILTER_S, let_through
+from pma_gym.tasks.human import FORESIGHT_S, moved, unsteady
+from pma_gym.units import SI_FACTORS
+
+
+def held_volts(volts: Value) -> Value:
+    """Volts as a drive or a regulator takes them: 0 to 10 V."""
+    return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
+
+
+class Exercised:
+    """The operator of an exercise, its safety layer and its score.
+
+    Args:
+        inputs: of the control step that it belongs to.
+    """
+
+    def __init__(self, inputs: StepInputs) -> None:
+        self.inputs, self.record = inputs, inputs.record
+        exercise = self.record.task.exercise
+        assert exercise is not None
+        self.exercise = exercise
+        self.period = self.record.options.period
+
+    # -- what the rig's computer knows -------------------------------------------------------------
+
+    @property
+    def human(self) -> Human:
+        """The operator's numbers, as inputs."""
+        return Human(*(self.inputs.slot(f"human_{name}") for name in Human._fields))  # type: ignore[arg-type]
+
+    @property
+    def plan(self) -> Plan:
+        """Moment that the exercise takes over the angle, as he knows it, as inputs."""
+        return plan_of_places(self.inputs.slot, self.exercise)
+
+    @property
+    def prescribed(self) -> Prescribed | None:
+        """What a measured moment is compared with; None where the speed is prescribed."""
+        if self.exercise.prescription is None:
+            return None
+        return Prescribed(self.inputs.slot("told_radius"), self.plan)
+
+    # -- operator ----------------------------------------------------------------------------------
+
+    def operate(self) -> dict[str, Value]:
+        """What the operator does in the step that begins: motor voltage, and how he comes out."""
+        slot, human = self.inputs.slot, self.human
+        count = slot("count")
+        time = to_real(count) * self.period
+        intended = self._intended(time - human.reaction)
+        angle = slot("true_rotation")
+        zero = self.inputs.graph.constant(0, "integer")
+        key = slot("key_0"), slot("key_1")
+        normal = unsteady(count, slot("episode") * 4 + NOISE, key, zero)
+        moment, mind = moved(
+            human,
+            Mind(*(slot(f"mind_{name}") for name in Mind._fields)),
+            human.effort * self.plan.at(intended),
+            intended - angle,
+            angle + FORESIGHT_S * slot("spin"),
+            time,
+            normal,
+            self.period,
+            slot("human_share"),
+        )
+        load = moment / slot("told_radius")
+        volts = (load - slot("told_drive_offset")) / slot("told_drive_gain")
+        found = {f"mind_{name}": value for name, value in mind._asdict().items()}
+        return found | {"motor_voltage": held_volts(volts), "operator_moment": moment}
+
+    def _intended(self, time: Value) -> Value:
+        """Angle that somebody means to have who hears the cues at a time of his own (rad)."""
+        angle = self.inputs.graph.constant(0.0)
+        for phase in PACE.phases:
+            since = time - phase.start
+            late = where(since < 0.0, 0.0, where(since > phase.duration, phase.duration, since))
+            if phase.slope:
+                angle = angle + phase.slope * late
+        return angle
+
+    # -- safety ------------------------------------------------------------------------------------
+
+    def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
+        """Regulator voltage of one that is asked for, and what the safety layer remembers."""
+        if not self.record.options.safety:
+            return volts, {}
+        # It stands at the rig: delays lie between the agent and it.
+        slot = self.inputs.slot
+        heard = slot("extension_0")
+        radius = slot("told_radius")
+        rate = (heard - slot("guard_extension")) / (self.period * radius)
+        speed = self._filtered("guard_speed", rate, SPEED_FILTER_S)
+        moment = radius * slot("load_0")
+        slow = self._filtered("guard_moment", moment, MOMENT_FILTER_S)
+        gain, offset = slot("told_line_gain"), slot("told_line_offset")
+        before = slot("guard_pressure")
+        pressure = let_through(
+            gain * volts + offset,
+            before,
+            moment,
+            slow,
+            speed,
+            slot("rotation_0"),
+            self.exercise.safe_moment,
+            self.exercise.safe_speed,
+            self.exercise.guard,
+        )
+        there = before + slot("told_lag_share") * (pressure - before)
+        new = (there, heard, speed, slow)
+        found: dict[str, Value] = dict(zip(GUARDED, new, strict=True))
+        return held_volts((pressure - offset) / gain), found
+
+    def _filtered(self, name: str, value: Value, time_constant: float) -> Value:
+        kept = math.exp(-self.period / time_constant)
+        return kept * self.inputs.slot(name) + (1.0 - kept) * value
+
+    # -- score -------------------------------------------------------------------------------------
+
+    def score(self, found: Mapping[str, Value], first: bool) -> dict[str, Value]:
+        """What a step came to: new numbers by name.
+
+        Args:
+            found: the step's truth, and whether it broke a limit of the rig.
+            first: at the trial's beginning, where nothing has been done yet.
+        """
+        eq, slot = self.inputs.equations, self.inputs.slot
+        moment, speed = eq.parameters["rotor"].radius * found["true_load"], slot("spin")
+        if first:
+            return {"ended": self.inputs.graph.value(found["ended"])}
+        power = moment * speed
+        new: dict[str, Value] = {}
+        for name, value in (
+            ("peak_moment", moment),
+            ("peak_speed", abs(speed)),
+            ("peak_power", abs(power)),
+        ):
+            before = slot(name)
+            new[name] = where(value > before, value, before)
+        done = power * self.period
+        new["work"] = slot("work") + where(done > 0.0, done, 0.0)
+        new["returned"] = slot("returned") + where(done < 0.0, -done, 0.0)
+        new |= self._pace(found)
+        rig = found["ended"]
+        broken = unsafe(self.exercise, moment, speed)
+        return new | {"ended": where(rig > 0.0, rig, broken)}
+
+    def _pace(self, found: Mapping[str, Value]) -> dict[str, Value]:
+        """Sums of squared errors of the angle by phase, at the control steps' ends (rad^2)."""
+        time = to_real(found["count"]) * self.period
+        new = {}
+        for phase in PACE.phases:
+            error = found["true_rotation"] - (phase.initial + phase.slope * (time - phase.start))
+            end = phase.start + phase.duration
+            # Half a step beside the edges: times are whole steps, but for rounding.
+            edge = 0.5 * self.period
+            inside = (time > phase.start + edge) & (time < end + edge)
+            before = self.inputs.slot(f"pace_{phase.name}")
+            new[f"pace_{phase.name}"] = where(inside, before + error * error, before)
+        return new
+
+    def info(self, found: Mapping[str, Value]) -> list[Value]:
+        """An exercise's own numbers of the info, in order."""
+        eq, degree = self.inputs.equations, SI_FACTORS["deg"]
+        moment = eq.parameters["rotor"].radius * found["true_load"]
+        speed, rotation = self.inputs.slot("spin"), found["true_rotation"]
+        other = []
+        if self.exercise.prescription:
+            other = [rotation * (1.0 / degree), self.plan.at(rotation)]
+        asked = self.inputs.slot("operator_moment")
+        return [*other, moment, asked, speed * (1.0 / degree), moment * speed]

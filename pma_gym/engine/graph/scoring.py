@@ -1,0 +1,149 @@
+"""Scores an episode while it runs: the position at 384 Hz, between the plant's internal steps."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pma_gym.codegen.derivative import derivatives
+from pma_gym.codegen.graph import CHANGING, HELD, Value
+from pma_gym.codegen.substitute import substitute
+from pma_gym.engine.observation import Prescribed
+from pma_gym.engine.state_layout import START, plan_of_places
+from pma_gym.integrator.equations import Equations
+from pma_gym.integrator.step_attempt import Attempt
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.tasks import Plan, Task
+
+SAMPLE_PERIOD = 1.0 / SAMPLE_RATE_HZ
+"""Time between two samples (s), whatever the control rate."""
+
+
+@dataclass(frozen=True)
+class Course:
+    """How the position moves during an attempt, as traced values.
+
+    Attributes:
+        start: position at its beginning (m or rad).
+        speed: its rate there.
+        bend: the rate's rate there.
+        end: position at its end.
+        end_speed: its rate there.
+    """
+
+    start: Value
+    speed: Value
+    bend: Value
+    end: Value
+    end_speed: Value
+
+    @property
+    def values(self) -> list[Value]:
+        """All of them."""
+        return [self.start, self.speed, self.bend, self.end, self.end_speed]
+
+
+def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
+    """How the task's position moves during an attempt."""
+    position = position_of(eq, task, eq.outputs)
+    speed = _rate(eq, position)
+    bend = _rate(eq, speed)
+    begin = {**attempt.frozen, **attempt.here}
+    start = substitute([position, speed, bend], begin)
+    end = substitute([position, speed], {**attempt.frozen, **attempt.moved})
+    return Course(*start, *end)
+
+
+def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Value:
+    """The position that a task asks for (m or rad), from the plant's outputs.
+
+    Of an exercise that prescribes a moment it is the moment's excess (N m).
+    """
+    if task.protocol.quantity == "extension":
+        return eq["zero_contraction"] - outputs["contraction"]
+    if task.protocol.quantity == "contraction":
+        return outputs["contraction"] - eq.graph.input(START, HELD)
+    if task.protocol.quantity == "excess":
+        radius = eq.parameters["rotor"].radius
+        return Prescribed(radius, held_plan(eq, task)).excess(outputs["load"], outputs["rotation"])
+    return outputs["rotation"]
+
+
+def held_plan(eq: Equations, task: Task) -> Plan:
+    """The moment that an exercise prescribes over the angle, as inputs that a step holds."""
+    assert task.exercise is not None
+    return plan_of_places(lambda name: eq.graph.input(name, HELD), task.exercise)
+
+
+def _rate(eq: Equations, value: Value) -> Value:
+    (slopes,) = derivatives([value], [state.value for state in eq.states])
+    total = eq.graph.constant(0.0)
+    for slope, state in zip(slopes, eq.states, strict=True):
+        if slope is not None:
+            total = total + slope * state.rate
+    return total
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """One sample that may lie in an attempt, as traced values of a graph of their own inputs.
+
+    Attributes:
+        due: whether it lies there.
+        position: the position at it (m or rad).
+        sample: number of the next one.
+        sums: sums of squared errors by phase, with it if it is due.
+        when: time from the attempt's beginning to it (s): a difference of times since the trial
+            began, for which single precision is too little.
+        done: how much of the control step lies before the attempt (s).
+        ideal: ideal position at it (m or rad), an input that the sums need; None where they know it
+            from lines.
+    """
+
+    due: Value
+    position: Value
+    sample: Value
+    sums: list[Value]
+    when: Value
+    done: Value
+    ideal: Value | None = None
+
+
+def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Sampling:
+    """A sample in an attempt, from `course` and the record's numbers given as inputs.
+
+    The quartic through both ends' positions and rates, and the first's second rate: its error goes
+    with the fifth power of the step, as the integrator's own.
+    """
+    graph = eq.graph
+    c = Course(*(graph.input(f"course.{name}", CHANGING) for name in COURSE))
+    sample, clock = graph.input("record.sample", CHANGING), graph.input("clock", HELD)
+    length = graph.input("length", CHANGING)
+    done = period - attempt.left
+    when = sample * SAMPLE_PERIOD - clock - done
+    share = when * (1.0 / length)
+    due = attempt_due(graph.input("taken", CHANGING, "truth"), share)
+    b, d = c.speed * length, 0.5 * c.bend * (length * length)
+    # p(s) = start + b s + d s^2 + e s^3 + f s^4 with p(1) = end and p'(1) = end_speed * length.
+    rest = c.end - c.start - b - d
+    slope = c.end_speed * length - b - 2.0 * d
+    e, f = 4.0 * rest - slope, slope - 3.0 * rest
+    position = c.start + share * (b + share * (d + share * (e + share * f)))
+    sums = []
+    moved = None if task.protocol.motion is None else graph.input("ideal", CHANGING)
+    for phase in task.protocol.phases:
+        before = graph.input(f"record.sum_{phase.name}", CHANGING)
+        first = float(phase.first)
+        line = phase.initial + phase.slope * ((sample - first) * SAMPLE_PERIOD)
+        error = position - (line if moved is None else moved)
+        inside = due & (sample >= first) & (sample < first + phase.samples)
+        sums.append(graph.select(inside, before + error * error, before))
+    following = graph.select(due, sample + 1.0, sample)
+    return Sampling(due, position, following, sums, when, done, moved)
+
+
+COURSE = ("start", "speed", "bend", "end", "end_speed")
+"""Names of a course's values."""
+
+
+def attempt_due(taken: Value, share: Value) -> Value:
+    """Whether a sample lies in an attempt that is taken; up to its very end."""
+    return taken & (share <= 1.0 + 1e-6)

@@ -1,0 +1,154 @@
+"""What the agent sees: one table of entries, which packs, describes and bounds the observation."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from gymnasium import spaces
+
+from pma_gym.engine.options import Options
+from pma_gym.tasks import TASKS, Plan, Task
+from pma_gym.units import SI_FACTORS
+
+BOUND = 5.0
+"""Entries are clipped to +-5; all but runaway states stay within +-2."""
+
+EXTENSION_SCALE = TASKS["displacement"].protocol.span
+ROTATION_SCALE = TASKS["rotation"].protocol.span
+LOAD_SCALE = 1000.0
+PRESSURE_SCALE = 600e3
+"""What 1.0 stands for (m, rad, N, Pa)."""
+
+
+class Prescribed(NamedTuple):
+    """What the moment at a joint is compared with; numbers or traced values.
+
+    Attributes:
+        radius: of the pulley (m).
+        plan: moment over the angle that is prescribed.
+    """
+
+    radius: Any
+    plan: Plan
+
+    def excess(self, load: Any, angle: Any) -> Any:  # noqa: ANN401
+        """Moment that a load (N) makes, less the one that is prescribed at an angle (rad): N m."""
+        return self.radius * load - self.plan.at(angle)
+
+
+class ObservationTable:
+    """Entries of the observation for a task and options.
+
+    Args:
+        task: the task.
+        options: the environment's options.
+
+    Attributes:
+        rows: (entry, what 1.0 stands for) in order.
+        space: the observation space.
+        references: reference (m or rad) at every control step, and `preview` steps past the end.
+    """
+
+    def __init__(self, task: Task, options: Options) -> None:
+        """List the entries, and evaluate the reference at every step once."""
+        protocol = task.protocol
+        last = task.steps(options.control_rate_hz) + options.preview
+        self.references = protocol.reference(np.arange(last + 1) * options.period)
+        self.rows = _rows(task, options)
+        self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
+        self._span = protocol.span
+        self._preview = options.preview
+        self._history, self.delay = options.history, options.observation_delay
+        self._quantity = protocol.quantity
+
+    def describe(self) -> str:
+        """The table of entries as text.
+
+        >>> print(ObservationTable(TASKS["displacement"], Options(preview=1)).describe())
+        0  measured extension                      1.0 = 25 mm
+        1  measured rotation                       1.0 = 90 deg
+        2  measured load                           1.0 = 1000 N
+        3  measured pressure                       1.0 = 600 kPa
+        4  reference now                           1.0 = 25 mm
+        5  reference now less measured position    1.0 = 25 mm
+        6  reference 1 control step ahead          1.0 = 25 mm
+        7  last motor action                       1.0 = 10 V, -1.0 = 0 V
+        """
+        width = max(len(name) for name, _ in self.rows) + 4
+        digits = len(str(len(self.rows) - 1))
+        return "\n".join(
+            f"{i:{digits}}  {name:<{width}}1.0 = {unit}" for i, (name, unit) in enumerate(self.rows)
+        )
+
+    def entries(
+        self,
+        reading: Callable[[str, int], Any],
+        reference: Callable[[int], Any],
+        action: Sequence[Any],
+        prescribed: Prescribed | None = None,
+    ) -> list[Any]:
+        """The entries before they are clipped, of numbers or traced values.
+
+        Args:
+            reading: part of a reading (SI) by its name, and how many control steps ago it was
+                taken.
+            reference: reference (m or rad) so many control steps ahead.
+            action: the last action, -1 to 1.
+            prescribed: of an exercise that prescribes a moment.
+        """
+        delay = self.delay
+
+        def position(steps: int) -> Any:  # noqa: ANN401
+            return heard_position(self._quantity, lambda part: reading(part, steps), prescribed)
+
+        now = reference(0) * (1.0 / self._span)
+        error = now - position(delay) * (1.0 / self._span)
+        if prescribed is not None:
+            # An excess is an error by itself; what it is of stands in the reference's place.
+            now = prescribed.plan.at(reading("rotation", delay)) * (1.0 / self._span)
+        return [
+            reading("extension", delay) * (1.0 / EXTENSION_SCALE),
+            reading("rotation", delay) * (1.0 / ROTATION_SCALE),
+            reading("load", delay) * (1.0 / LOAD_SCALE),
+            reading("pressure", delay) * (1.0 / PRESSURE_SCALE),
+            now,
+            error,
+            *(reference(k) * (1.0 / self._span) for k in range(1, self._preview + 1)),
+            *action,
+            *(position(delay + k) * (1.0 / self._span) for k in range(1, self._history + 1)),
+        ]
+
+
+def heard_position(
+    quantity: str, reading: Callable[[str], Any], prescribed: Prescribed | None = None
+) -> Any:  # noqa: ANN401
+    """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""
+    if prescribed is not None:
+        return prescribed.excess(reading("load"), reading("rotation"))
+    return -reading("extension") if quantity == "contraction" else reading(quantity)
+
+
+def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
+    unit = task.protocol.unit
+    span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
+    volts = "10 V, -1.0 = 0 V"
+    now, less, heard = "reference now", "reference now less measured position", "position heard"
+    if task.protocol.quantity == "excess":
+        now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
+        heard = "excess of the moment heard"
+    return [
+        ("measured extension", "25 mm"),
+        ("measured rotation", "90 deg"),
+        ("measured load", "1000 N"),
+        ("measured pressure", "600 kPa"),
+        (now, span),
+        (less, span),
+        *((f"reference {_steps(k)} ahead", span) for k in range(1, options.preview + 1)),
+        (f"last {task.actuator} action", volts),
+        *([("last regulator action", volts)] if options.regulator_action else []),
+        *((f"{heard} {_steps(k)} before", span) for k in range(1, options.history + 1)),
+    ]
+
+
+def _steps(count: int) -> str:
+    return f"{count} control step{'s' if count > 1 else ''}"

@@ -1,0 +1,1 @@
+"""How episodes start: pressure, station and disturbances drawn, the plant at equilibrium."""

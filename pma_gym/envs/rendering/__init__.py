@@ -1,0 +1,1 @@
+"""Pictures of the station at work."""

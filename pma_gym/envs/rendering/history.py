@@ -1,0 +1,82 @@
+"""An engine that keeps what the pictures of a batch draw: positions and voltages by step."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.engine.engine import Engine
+from pma_gym.units import SI_FACTORS
+
+
+class History(NamedTuple):
+    """The course of an episode so far.
+
+    Attributes:
+        time: times of the positions since the trial began (s), shape (k,).
+        position: true positions that the task asks for (m, rad or N m), shape (k,).
+        voltages: voltage of the task's actuator in every control step (V), shape (steps,).
+    """
+
+    time: NDArray[np.float64]
+    position: NDArray[np.float64]
+    voltages: NDArray[np.float64]
+
+
+class RecordingEngine(Engine):
+    """An `Engine` that writes down position and voltage of every environment at every step.
+
+    Only a batch that renders has one: the step of any other batch does nothing for it.
+
+    Args:
+        arguments: as `Engine`.
+    """
+
+    def __init__(self, *arguments: Any) -> None:
+        """Compile, and make room for whole episodes."""
+        super().__init__(*arguments)
+        protocol = self.task.protocol
+        self._shown = f"{protocol.quantity}_{protocol.suffix}", SI_FACTORS[protocol.unit]
+        # A batch may step an episode that has ended once more.
+        steps = self.task.steps(self.options.control_rate_hz) + 2
+        self._every = np.arange(self.count)
+        self._positions = np.full((steps + 1, self.count), np.nan)
+        self._voltages = np.full((steps, self.count), np.nan)
+
+    def step(self) -> int:
+        """Step, see `Engine`, and write down where each environment is."""
+        self._follow()
+        ended = super().step()
+        counts = self._counts()
+        self._positions[counts, self._every] = self._present()
+        voltages = self.numbers(f"{self.task.actuator}_voltage")
+        self._voltages[np.maximum(counts - 1, 0), self._every] = voltages
+        return ended
+
+    def _counts(self) -> NDArray[np.int64]:
+        return np.minimum(self.counts(), len(self._voltages))
+
+    def _present(self) -> NDArray[np.float64]:
+        name, factor = self._shown
+        return self.numbers(name) * factor
+
+    def _follow(self) -> None:
+        """Begin the courses anew of environments that are not where they were left.
+
+        They were reset, or a state was put into them.
+        """
+        counts, present = self._counts(), self._present()
+        moved = self._every[self._positions[counts, self._every] != present]
+        if len(moved):
+            self._positions[:, moved], self._voltages[:, moved] = np.nan, np.nan
+            self._positions[counts[moved], moved] = present[moved]
+
+    def history(self, index: int) -> History:
+        """The course of an environment's episode at its control steps, NaN where unknown."""
+        self._follow()
+        count = min(self.steps(index), len(self._voltages))
+        return History(
+            np.arange(count + 1.0) * self.options.period,
+            self._positions[: count + 1, index].copy(),
+            self._voltages[:count, index].copy(),
+        )

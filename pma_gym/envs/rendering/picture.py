@@ -1,0 +1,131 @@
+"""A picture of the station at work: the rig on the left, the trial so far on the right.
+
+The only importer of matplotlib in the environments; `PMAEnv.render` imports it when first needed.
+What never changes is drawn once; each picture restores it and draws what moves on top.
+"""
+
+import math
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pma_gym.envs.rendering.history import History
+from pma_gym.envs.rendering.rig_drawing import FAINT, INK, REFERENCE, RigDrawing
+from pma_gym.envs.rendering.scene import Scene
+from pma_gym.tasks import Task
+from pma_gym.units import SI_FACTORS
+
+WIDTH, HEIGHT, DPI = 800, 400, 100
+ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
+MOST_RATE_HZ = 100.0
+"""Positions are drawn at most at about this rate: more than there are pixels."""
+
+
+_AXIS = {"excess": "moment's excess"}
+"""Labels of quantities that do not speak for themselves."""
+
+
+class Picture:
+    """Draws an environment again and again.
+
+    Args:
+        task: the task, which says what the plot's axes are.
+    """
+
+    def __init__(self, task: Task) -> None:
+        """Draw what never changes."""
+        self._factor = SI_FACTORS[task.protocol.unit]
+        self._figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI, facecolor="white")
+        self._canvas = FigureCanvasAgg(self._figure)
+        self._rig = RigDrawing(self._figure.add_axes((0.0, 0.0, 0.47, 1.0)), task)
+        self._moving: list[tuple[Axes, Artist]] = [(self._rig.axes, a) for a in self._rig.moving]
+        self._add_position_plot(task)
+        self._add_voltage_plot(task)
+        for _, artist in self._moving:
+            artist.set_animated(True)
+        self._canvas.draw()
+        self._still = self._canvas.copy_from_bbox(self._figure.bbox)
+
+    def draw(self, scene: Scene, history: History) -> NDArray[np.uint8]:
+        """The picture now.
+
+        Args:
+            scene: an environment of the task, in or after an episode.
+            history: the course of its episode.
+        Returns:
+            RGB of shape (400, 800, 3), a new array each time.
+        """
+        self._rig.update(scene)
+        stride = _stride(history.time)
+        self._actual.set_data(history.time[::stride], history.position[::stride] / self._factor)
+        self._now.set_data([scene.time], [scene.position / self._factor])
+        held = np.append(history.voltages, history.voltages[-1:])
+        self._volts.set_data(np.arange(len(held)) * scene.options.period, held)
+        self._canvas.restore_region(self._still)
+        for axes, artist in self._moving:
+            axes.draw_artist(artist)
+        return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
+
+    def _add_position_plot(self, task: Task) -> None:
+        protocol = task.protocol
+        axes = self._plot((0.545, 0.46, 0.435, 0.44), task)
+        time = np.linspace(0.0, protocol.duration, 301)
+        axes.plot(
+            time,
+            protocol.reference(time) / self._factor,
+            "--",
+            color=REFERENCE,
+            lw=1.4,
+            label="prescribed" if protocol.quantity == "excess" else "reference",
+        )
+        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
+        (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
+        # An excess lies on either side of what is prescribed.
+        lowest, highest = (-1.2, 2.4) if protocol.quantity == "excess" else (-0.12, 1.2)
+        span = protocol.span / self._factor
+        axes.set_ylim(lowest * span, highest * span)
+        axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")
+        axes.tick_params(labelbottom=False)
+        axes.legend(
+            loc="lower right",
+            bbox_to_anchor=(1.0, 1.0),
+            ncols=2,
+            frameon=False,
+            fontsize=8,
+            labelcolor=INK,
+            borderaxespad=0.1,
+        )
+        self._moving += [(axes, self._actual), (axes, self._now)]
+
+    def _add_voltage_plot(self, task: Task) -> None:
+        axes = self._plot((0.545, 0.13, 0.435, 0.27), task)
+        axes.set_ylim(-0.5, 10.5)
+        axes.set_yticks([0, 5, 10])
+        axes.set_ylabel(f"{task.actuator} (V)")
+        axes.set_xlabel("time (s)")
+        (self._volts,) = axes.plot([], [], color=VOLTAGE, lw=1.2, drawstyle="steps-post")
+        self._moving.append((axes, self._volts))
+
+    def _plot(self, place: tuple[float, float, float, float], task: Task) -> Axes:
+        axes = self._figure.add_axes(place)
+        axes.set_xlim(0.0, 1.01 * task.protocol.duration)
+        axes.spines[["top", "right"]].set_visible(False)
+        axes.spines[["left", "bottom"]].set_color(FAINT)
+        axes.tick_params(labelsize=8, color=FAINT, labelcolor=INK)
+        axes.grid(color=FAINT, lw=0.5, alpha=0.6)
+        axes.xaxis.label.set(size=8, color=INK)
+        axes.yaxis.label.set(size=8, color=INK)
+        return axes
+
+
+def _stride(time: NDArray[np.float64]) -> int:
+    """One in how many positions is drawn.
+
+    >>> _stride(np.arange(9) / 384.0), _stride(np.arange(9) / 100.0), _stride(np.zeros(1))
+    (4, 1, 1)
+    """
+    return math.ceil(0.999 / (MOST_RATE_HZ * (time[1] - time[0]))) if len(time) > 1 else 1

@@ -1,0 +1,100 @@
+"""What a controller may know: the station before a trial, the sensors' readings during it.
+
+All of it is detached: copies that hold no environment, so that neither the true state nor anything
+that the simulation reads can be reached or changed through them.
+"""
+
+import copy
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from pma_gym.data.protocol import Protocol
+from pma_gym.engine.options import rest_load
+from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
+
+
+@dataclass(frozen=True, slots=True)
+class Reference:
+    """The reference of a trial, to be called with a time (s) since the trial began.
+
+    It returns extension or contraction (m) or rotation (rad), past and future; where an exercise
+    prescribes a moment, the moment's excess (N m), which is to be 0.
+
+    Attributes:
+        protocol: a copy of the task's protocol.
+    """
+
+    protocol: Protocol
+
+    def __call__(self, time: float) -> float:
+        """The reference at a time (s)."""
+        return self.protocol.at(time)
+
+
+def detached_task(task: Task) -> Task:
+    """A copy of a task that shares nothing mutable with it, but a motion that cannot be copied."""
+    return copy.deepcopy(task)
+
+
+@dataclass(frozen=True)
+class Station:
+    """What a controller may know of the station before a trial.
+
+    Attributes:
+        model: the nominal model, also where the plant's own is drawn anew at every reset; a copy.
+        task: the task, with its protocol; a copy.
+        pressure: gauge pressure that the trial begins at (Pa).
+        period: time of a control step (s).
+        action_delay: how late a command reaches the station (s), whole periods.
+        observation_delay: how old a reading is when it is heard (s), whole periods.
+    """
+
+    model: Model
+    task: Task
+    pressure: float
+    period: float
+    action_delay: float = 0.0
+    observation_delay: float = 0.0
+
+    @property
+    def load(self) -> float:
+        """Load that the motor holds while the regulator moves (N); 0 where the motor moves.
+
+        In an exercise the load that it begins with: the motor is the operator.
+        """
+        return rest_load(self.model, self.task)
+
+    def moment(self, reading: "Reading") -> float:
+        """Moment at an exercise's joint, as the load cell says it by the nominal pulley (N m)."""
+        return self.model.parameters["rotor"].radius * reading.load
+
+    def position(self, reading: "Reading") -> float:
+        """The position that the task asks for, as the sensors say it (m, rad or N m)."""
+        quantity = self.task.protocol.quantity
+        if quantity == "rotation":
+            return reading.rotation
+        if quantity == "excess":
+            assert self.task.exercise and self.task.exercise.prescription
+            return self.moment(reading) - self.task.exercise.prescription.at(reading.rotation)
+        return -reading.extension if quantity == "contraction" else reading.extension
+
+
+class Reading(NamedTuple):
+    """What the sensors said at one instant, in SI; extension and rotation from their zeros.
+
+    Attributes:
+        time: when it was taken, since the trial began (s).
+        extension: how far the muscle was pulled out of the contraction that the trial began at (m):
+            that at no load, or under the load of a regulator's task, where it is negative while the
+            muscle shortens.
+        rotation: pulley angle (rad).
+        load: cable tension (N).
+        pressure: gauge pressure (Pa).
+    """
+
+    time: float
+    extension: float
+    rotation: float
+    load: float
+    pressure: float

@@ -1,0 +1,1 @@
+"""Parameter estimation: residuals and sensitivities of many trials, least squares, fits."""

@@ -1,0 +1,266 @@
+"""Fits a model's parameters to measured trials, all of them at once.
+
+Least squares by Levenberg and Marquardt, within the bounds of the catalogue. Each round simulates
+every trial with the parameters and with each of them moved a little (`residuals`), and needs no
+more than sums over the residuals. The first rounds use a few of the trials, to come near; the last
+step is checked by simulating without moves.
+
+How far parameters are moved: an adaptive integrator's error changes from one step control to the
+next, so simulated trials jitter by some thousandths of the sensors' noise when a parameter moves,
+however little. Each parameter is therefore moved so far that what the sensors show changes by
+`SHOWN` of their noise (root mean square over all residuals): far above that jitter, and little
+enough that the second derivative does not show.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.codegen.threads.sharing import linear_algebra_alone
+from pma_gym.data.trial import Trial
+from pma_gym.estimation.fitted import Fit, Round
+from pma_gym.estimation.least_squares import inverse, least
+from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant.model import Model
+
+__all__ = ["Fit", "Round", "fit"]
+
+Array = NDArray[np.float64]
+
+SHOWN = 0.3
+"""What moving a parameter for a difference changes, in standard deviations of the readings."""
+
+FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
+"""First, least and largest such move, as a share of the parameter's value, or of its bounds' width
+where it is near 0."""
+
+CLOSE = 1e-3
+"""A fit has converged when a further step would lower chi-square, counted in its mean per residual,
+by less than this: the parameters are within sqrt(CLOSE) = 3 % of a standard error of the best."""
+
+SHARE = 1e-5
+"""It has as well when the step would lower what chi-square has beyond noise by less than this
+share. A standard error takes residuals for independent, which those of a wrong model are not."""
+
+RUGGED, FAILURES = 1e-4, 3
+"""Beside a wrong model chi-square itself is rugged, as stick and slip and the jerks of a tightening
+cable come at other instants. When so many steps in a row fail to lower it, although they should by
+less than such a share, the fit has converged too."""
+
+ROUGH = 100.0
+"""All of these times so much for the first rounds, which use a few trials only."""
+
+MISSED = 0.1
+"""By how much chi-square may miss what the last step promised, as a share of that and of its mean
+per residual."""
+
+FEW = 8
+"""How many trials the first rounds use, drawn from all by a fixed seed, where there are twice as
+many."""
+
+MOST_ROUNDS = 50
+_FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e12
+
+
+def fit(
+    model: Model,
+    trials: Sequence[Trial],
+    free: Sequence[str],
+    threads: int = 1,
+    tolerance: float = DEFAULT_TOLERANCE,
+    joined: bool = True,
+    central: bool = False,
+    progress: Callable[[Round], None] | None = None,
+) -> Fit:
+    """Fit a model to trials, from the values that it has.
+
+    The same input gives the same bits, whatever the number of threads and of cores.
+
+    Args:
+        model: the model.
+        trials: measured trials; every quantity counts by its sensor's noise.
+        free: paths of the parameters that may change, `effect.parameter_unit`.
+        threads: how many threads simulate.
+        tolerance: of the integrator.
+        joined: whether commands are joined linearly; else each is held until the next.
+        central: move parameters both ways for differences, at twice the cost.
+        progress: called after every round; what it raises ends the fit.
+    Raises:
+        ModelError: a path that cannot be fitted.
+        ValueError: a start at which the model cannot be simulated, or trials without measurements.
+    """
+
+    def residuals(some: Sequence[Trial]) -> Residuals:
+        return Residuals(model, some, free, tolerance, joined, threads)
+
+    with linear_algebra_alone():
+        few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
+        rough = None if few is None else Search(few, central, ROUGH)
+        if rough is not None:
+            rough.run(progress)
+        search = Search(residuals(trials), central, 1.0, rough)
+        return search.result(search.run(progress))
+
+
+def _some(trials: Sequence[Trial]) -> list[Trial]:
+    chosen = np.random.Generator(np.random.Philox(0)).permutation(len(trials))[:FEW]
+    return [trials[i] for i in sorted(chosen)]
+
+
+class Search:
+    """Parameters on their way to the best.
+
+    Args:
+        residuals: the trials.
+        central: whether parameters are moved both ways.
+        rough: see `ROUGH`.
+        before: a search over fewer trials, whose result is the start.
+
+    Attributes:
+        values: the best so far, at the door, shape (p,).
+        best: the sums there.
+        damping: of the next step.
+        rate: by which factor the last step lowered what the next one should gain.
+        failures: how many steps in a row did not lower chi-square.
+        rounds, simulated: as in `Fit`.
+    """
+
+    def __init__(
+        self, residuals: Residuals, central: bool, rough: float, before: "Search | None" = None
+    ) -> None:
+        self.residuals, self.central, self.rough = residuals, central, rough
+        self.lower, self.upper = residuals.lower, residuals.upper
+        self.damping, self.rate, self.failures = _FIRST_DAMPING, 1.0, 0
+        self.rounds, self.simulated = 0, 0
+        self.values: Array = np.clip(residuals.start, self.lower, self.upper)
+        self.moves = FIRST_MOVE * self._scales(self.values)
+        if before is not None:
+            self.values, self.moves, self.rate = before.values, before.moves, before.rate
+            self.rounds, self.simulated = before.rounds, before.simulated
+        self.best = self._sums(self.values)
+        if before is not None and not np.isfinite(self.best.chi_square):
+            # What fits a few trials may balance no load in another.
+            self.values = np.clip(residuals.start, self.lower, self.upper)
+            self.best = self._sums(self.values)
+        if not np.isfinite(self.best.chi_square):
+            raise ValueError(
+                f"model {residuals.plant.model.name} cannot be simulated where the fit begins: its "
+                "muscle does not balance the load at the beginning of a trial, or it runs away"
+            )
+
+    @property
+    def mean(self) -> float:
+        """Mean squared residual, if it is more than noise."""
+        return max(1.0, self.best.chi_square / self.residuals.count)
+
+    @property
+    def surplus(self) -> float:
+        """What chi-square has beyond noise."""
+        return self.best.chi_square - self.residuals.count
+
+    def run(self, progress: Callable[[Round], None] | None, most: int = MOST_ROUNDS) -> bool:
+        """Search for so many rounds at most; whether it converged."""
+        while self.rounds < most and self.damping < _MOST_DAMPING:
+            if progress is not None:
+                trials, best = self.residuals.trials, self.best.chi_square
+                progress(Round(self.rounds, trials, best, self.named(self.values)))
+            if self.advance():
+                return True
+        return False
+
+    def named(self, values: Array) -> dict[str, float]:
+        """Numbers by path."""
+        paths = [parameter.path for parameter in self.residuals.free]
+        return {path: float(value) for path, value in zip(paths, values, strict=True)}
+
+    def advance(self) -> bool:
+        """One step; whether no other is worth while."""
+        step, promise = self._step(0.0)
+        if promise < self.rough * max(CLOSE * self.mean, SHARE * self.surplus):
+            return True
+        if self.rate * promise < CLOSE * self.mean and self._last(step, promise):
+            return True
+        damped, gain = self._step(self.damping)
+        tried = np.clip(self.values + damped, self.lower, self.upper)
+        found = self._sums(tried)
+        lowered = self.best.chi_square - found.chi_square
+        if not lowered > 0.0:
+            self.damping = max(10.0 * self.damping, _FIRST_DAMPING)
+            self.failures += 1
+            stuck = self.failures >= FAILURES
+            return stuck and promise < self.rough * RUGGED * self.best.chi_square
+        if lowered > 0.5 * gain:
+            self.damping *= 0.1
+        elif lowered < 0.1 * gain:
+            self.damping *= 5.0
+        self.values, self.best, self.failures = tried, found, 0
+        self.rate = self._step(0.0)[1] / promise
+        return False
+
+    def _last(self, step: Array, promise: float) -> bool:
+        """Take a step after which none should be needed; whether chi-square falls as promised."""
+        tried = np.clip(self.values + step, self.lower, self.upper)
+        found = self.residuals.sums(tried, np.empty(0)).chi_square
+        self.simulated += self.residuals.trials
+        if not abs(self.best.chi_square - found - promise) < MISSED * (promise + self.mean):
+            return False
+        self.values, self.best = tried, replace(self.best, chi_square=found)
+        return True
+
+    def _sums(self, values: Array) -> Sums:
+        self.rounds += 1
+        self.simulated += self.residuals.trials * (1 + len(values) * (2 if self.central else 1))
+        # Towards the inside where a bound is near.
+        inward = values + self.moves > self.upper
+        steps = np.where(inward, -self.moves, self.moves)
+        found = self.residuals.sums(values, steps, self.central)
+        if np.isfinite(found.chi_square):
+            self.moves = self._next_moves(values, found)
+        return found
+
+    def _next_moves(self, values: Array, sums: Sums) -> Array:
+        shown = np.sqrt(np.diag(sums.curvature) / self.residuals.count)
+        scales = self._scales(values)
+        with np.errstate(divide="ignore"):
+            return np.clip(SHOWN / shown, LEAST_MOVE * scales, MOST_MOVE * scales)
+
+    def _scales(self, values: Array) -> Array:
+        return np.maximum(np.abs(values), 1e-2 * (self.upper - self.lower))
+
+    def _held(self) -> NDArray[np.bool_]:
+        """Which parameters a bound keeps from falling further."""
+        downhill = -self.best.gradient
+        low = (self.values <= self.lower) & (downhill < 0.0)
+        return low | (self.values >= self.upper) & (downhill > 0.0)
+
+    def _step(self, damping: float) -> tuple[Array, float]:
+        """The best step within the bounds, and by how much it should lower chi-square."""
+        gradient, curvature = self.best.gradient, self.best.curvature
+        room = self.lower - self.values, self.upper - self.values
+        step = least(gradient, curvature, damping, *room)
+        return step, float(-(2.0 * gradient @ step + step @ curvature @ step))
+
+    def result(self, converged: bool) -> Fit:
+        """The fit at the best parameters."""
+        residuals, held = self.residuals, self._held()
+        values, size = self.named(self.values), len(self.values)
+        covariance = np.full((size, size), np.nan)
+        loose = np.flatnonzero(~held)
+        surplus = max(1.0, self.best.chi_square / max(residuals.count - size, 1))
+        part = np.ix_(loose, loose)
+        covariance[part] = surplus * inverse(self.best.curvature[part])
+        return Fit(
+            model=residuals.plant.model.replace(values),
+            values=values,
+            errors=self.named(np.sqrt(np.diag(covariance))),
+            covariance=covariance,
+            chi_square=self.best.chi_square,
+            count=residuals.count,
+            rounds=self.rounds,
+            simulated=self.simulated,
+            converged=converged,
+            at_bounds=tuple(path for path, at in zip(values, held, strict=True) if at),
+        )

@@ -1,0 +1,364 @@
+"""What a model leaves unexplained of many trials, and how that changes with its parameters.
+
+All trials, each with the parameters as they are and with every free one moved a little, are
+simulated together. Sums over residuals are made trial by trial, so that no Jacobian of a million
+rows is ever held.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import repeat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.estimation import initial_states
+from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.products import Signals, products
+from pma_gym.plant import sensors
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
+from pma_gym.plant.equilibrium import solver
+from pma_gym.plant.model import Model, ModelError
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import FIRST_S, parameter_names, table
+from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+MOST_BYTES = 1 << 28
+"""Most memory for the states of trials that are simulated together."""
+
+
+@dataclass(frozen=True)
+class Free:
+    """A parameter that a fit may change.
+
+    Attributes:
+        path: `effect.parameter_unit`, as in `Model.paths`.
+        place: its place in the vector that compiled functions read.
+        quantity: its unit and bounds.
+    """
+
+    path: str
+    place: int
+    quantity: Quantity
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Sums over the residuals r of all trials, in units of their noise; J = dr / d(parameters).
+
+    Attributes:
+        chi_square: r.r; infinite where the model cannot be simulated.
+        gradient: J^T r, shape (p,), per unit at the door.
+        curvature: J^T J, shape (p, p).
+    """
+
+    chi_square: float
+    gradient: Array
+    curvature: Array
+
+
+class Residuals:
+    """Measured trials beside a model whose free parameters are given.
+
+    A residual is simulated minus measured, in standard deviations: the sensor's noise and the
+    rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
+    does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
+    begins settled at its first commands; a slide that nothing holds, as fast as fits it best.
+
+    Args:
+        model: the model; its noise levels weigh the sensors, its drive and its regulator's line
+            say what commanded loads and pressures are in volts.
+        trials: the trials, which need measurements.
+        free: paths of the free parameters.
+        tolerance: of the integrator, as `Plant`.
+        joined: whether commands are joined linearly; else each is held until the next.
+        threads: how many threads share the work; the results' bits do not depend on it.
+
+    Attributes:
+        free: the free parameters.
+        start: their values in the model, at the door, shape (p,).
+        count: number of residuals.
+        deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
+        trials: number of trials.
+        balanced: which of the parameters tried last balance the load where trials begin.
+    Raises:
+        ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
+        ValueError: no trial, or one that measures nothing.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        free: Sequence[str],
+        tolerance: float = DEFAULT_TOLERANCE,
+        joined: bool = True,
+        threads: int = 1,
+    ) -> None:
+        self.plant, self.joined, self.threads = Plant(model, tolerance), joined, threads
+        self.free = _free(self.plant.model, free)
+        places = [parameter.place for parameter in self.free]
+        self._factors = np.array([parameter.quantity.factor for parameter in self.free])
+        self.start: Array = self.plant.vector[places] / self._factors
+        self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
+        self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
+        steps = np.array([line.resolution for _, line in sensors.SENSORS.values()])
+        rounding = steps / math.sqrt(12.0)
+        self.deviations: Array = np.hypot(sensors.noise_levels(self.plant.model), rounding)
+        self.trials = len(trials)
+        if not trials:
+            raise ValueError("a fit needs at least one trial")
+        self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
+        self.count = sum(logged.count for logged in self._trials)
+        self._weights = [
+            [counts / width for counts, width in zip(logged.counts, self.deviations, strict=True)]
+            for logged in self._trials
+        ]
+        self._buffer = np.empty(0)
+        self.balanced: NDArray[np.bool_] = np.ones(1, bool)
+        self._own: list[tuple[int, Array]] = []
+        self._begun: list[tuple[int, Array]] = []
+        if self.plant.model.plant == "slide":
+            where, speed = initial_states.starts(self._trials)
+            paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
+            self._begun = self._places({path: list(row) for path, row in paths.items()})
+
+    def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
+        """Sums at parameters, with the Jacobian by finite differences.
+
+        Args:
+            values: the parameters at the door, shape (p,).
+            steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
+            central: move each both ways, which costs twice as much.
+        """
+        size = len(steps)
+        total = np.zeros((size + 1, size + 1))
+
+        def multiply(
+            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
+        ) -> list[Array]:
+            return self._multiplied(block, spaces, zeros, vectors, central)
+
+        for product in self._by_block(_moved(values, steps, central), multiply):
+            total += product
+        widths = np.concatenate([[1.0], steps])
+        total /= np.outer(widths, widths)
+        if not np.isfinite(total).all() or not self._settled:
+            return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
+        return Sums(float(total[0, 0]), total[1:, 0], total[1:, 1:])
+
+    def each(self, values: Array) -> list[Array]:
+        """Residuals of each trial at parameters, shape (rows, 4) in the order of outputs.
+
+        Raises:
+            ValueError: the model cannot balance the load at the beginning of a trial.
+        """
+        return [found[0] for found in self._dense(values, np.ones(0), central=False)]
+
+    def jacobian(self, values: Array, steps: Array, central: bool = False) -> list[Array]:
+        """Derivatives of each trial's residuals, shape (p, rows, 4), as `sums` uses them."""
+        return [found[1:] / steps[:, None, None] for found in self._dense(values, steps, central)]
+
+    def _dense(self, values: Array, steps: Array, central: bool) -> list[Array]:
+        def copy(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            found = self._differences(logged, states, zeros, vectors, central)
+            return (found / self.deviations[:, None]).transpose(0, 2, 1)
+
+        found = self._each(_moved(values, steps, central), copy)
+        if not self._settled:
+            raise ValueError("no contraction balances the load at the beginning of a trial")
+        return found
+
+    def _each(
+        self, tried: Array, work: Callable[[Logged, Array, Array, Array], Array]
+    ) -> list[Array]:
+        """Simulate all trials at all parameters; what `work` makes of each trial, in their order.
+
+        It gets states of shape (tried, rows, states), x0 of shape (tried,) and their vectors.
+        """
+
+        def trials(
+            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
+        ) -> list[Array]:
+            logs = [self._trials[i] for i in block]
+            with ThreadPoolExecutor(self.threads) as pool:
+                # A thread costs more than the work of a small trial does.
+                each = pool.map if self.threads > 1 else map
+                return list(each(work, logs, spaces, zeros, repeat(vectors)))
+
+        return self._by_block(tried, trials)
+
+    def _by_block(
+        self, tried: Array, work: Callable[[list[int], list[Array], Array, Array], list[Array]]
+    ) -> list[Array]:
+        """As `_each`, but `work` gets several trials at once, by their numbers."""
+        vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
+        for column, parameter in enumerate(self.free):
+            vectors[:, parameter.place] = tried[:, column] * self._factors[column]
+        count, number = len(tried) + bool(self._begun), len(self.plant.states)
+        every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
+        if self._begun:
+            every[len(tried) :: count, self._begun[-1][0]] += initial_states.MOVE
+        tables = self._tables(every, count)
+        first = np.array([logged.first for logged in self._trials])
+        commands = np.repeat(first, count, axis=0).T
+        states, zeros = solver.equilibria_at(self.plant, commands[0], commands[1], every)
+        found: list[Array] = []
+        shape = (len(self._trials), count)
+        finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
+        self._settled = bool(finite.all())
+        self.balanced = np.asarray(finite.reshape(shape).all(axis=0))
+        if not self._settled:
+            return found
+        states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
+        for block in self._blocks(8 * number * count):
+            runs, spaces = [], self._spaces(block, count)
+            for i, space in zip(block, spaces, strict=True):
+                logged = self._trials[i]
+                columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                runs += [
+                    Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
+                    for k in range(count)
+                ]
+            simulate_all(self.plant.program, runs, self.threads)
+            if self._begun:
+                spaces = list(map(self._met, spaces, (self._trials[i] for i in block)))
+            found += work(block, spaces, zeros[block, : len(tried)], vectors)
+        return found
+
+    def _met(self, space: Array, logged: Logged) -> Array:
+        """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
+        column = self.plant.sensor_columns[0]
+        at = column if column >= 0 else self.plant.states.index("contraction")
+        initial_states.meet(space, space[:, :, at].copy(), logged)
+        return space[:-1]
+
+    def _every(self, vectors: Array) -> Array:
+        """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
+        every = np.tile(vectors, (len(self._trials), 1))
+        for place, values in (*self._begun, *self._own):
+            every[:, place] = np.repeat(values, len(vectors))
+        return every
+
+    def _tables(self, every: Array, count: int) -> list[list[Array]]:
+        """Tables of every trial; the same ones where trials have no parameters of their own."""
+        program = self.plant.program
+        if not self._own:
+            return [[table(program, vector) for vector in every[:count]]] * len(self._trials)
+        parts = np.split(every, len(self._trials))
+        return [[table(program, vector) for vector in part] for part in parts]
+
+    def _places(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
+        """Where values (SI) go that a parameter has in each trial, by its path."""
+        found = _free(self.plant.model, list(own))
+        return [(each.place, np.asarray(own[each.path], float)) for each in found]
+
+    def _blocks(self, bytes_a_row: int) -> list[list[int]]:
+        """Trials that fit into memory together."""
+        blocks, room = [], 0
+        for i, logged in enumerate(self._trials):
+            needed = bytes_a_row * len(logged.time)
+            if not blocks or needed > room:
+                blocks.append([])
+                room = MOST_BYTES
+            blocks[-1].append(i)
+            room -= needed
+        return blocks
+
+    def _spaces(self, block: list[int], count: int) -> list[Array]:
+        """Room for the states of a block's trials, shape (count, rows, states) each; used again."""
+        shapes = [(count, len(self._trials[i].time), len(self.plant.states)) for i in block]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
+        if len(self._buffer) < ends[-1]:
+            self._buffer = np.empty(ends[-1])
+        parts = np.split(self._buffer[: ends[-1]], ends[:-1])
+        return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+
+    def _differences(
+        self, logged: Logged, states: Array, zeros: Array, vectors: Array, central: bool
+    ) -> Array:
+        """Simulated minus measured, then what moving each parameter changes (SI).
+
+        Shape (1 + p, 4, rows).
+        """
+        held = self._held(states, zeros, vectors)
+        count, rows = len(states), len(logged.time)
+        moved = (count - 1) // 2 if central else count - 1
+        found = np.zeros((1 + moved, len(OUTPUTS), rows))
+        for channel, signal in enumerate(held):
+            if not logged.measures[channel]:
+                continue
+            there = found[:, channel]
+            np.subtract(signal[0], logged.measured[channel], out=there[0])
+            if central:
+                np.subtract(signal[1 : 1 + moved], signal[1 + moved :], out=there[1:])
+                there[1:] *= 0.5
+            else:
+                np.subtract(signal[1:], signal[0], out=there[1:])
+            if logged.missing[channel].size:
+                there[:, logged.missing[channel]] = 0.0
+        return found
+
+    def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
+        """What the sensors hold, shape (tried, rows) each."""
+        columns, program = self.plant.sensor_columns, self.plant.program
+        count, rows, _ = states.shape
+        truth = np.empty((count, rows, len(OUTPUTS)) if min(columns) < 0 else (0, 0, 0))
+        for i, out in enumerate(truth):
+            addresses = (vectors[i].ctypes.data, out.ctypes.data)
+            program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)
+        return [states[:, :, at] if at >= 0 else truth[:, :, i] for i, at in enumerate(columns)]
+
+    def _multiplied(
+        self,
+        block: list[int],
+        spaces: list[Array],
+        zeros: Array,
+        vectors: Array,
+        central: bool,
+    ) -> list[Array]:
+        """Products of all differences with each other, in units of noise, (1 + p, 1 + p) each."""
+        trials = []
+        for number, states, zero in zip(block, spaces, zeros, strict=True):
+            logged, weights = self._trials[number], self._weights[number]
+            channels = [i for i, known in enumerate(logged.measures) if known]
+            held = self._held(states, zero, vectors)
+            trials.append(
+                Signals(
+                    [held[i] for i in channels],
+                    [logged.measured[i] for i in channels],
+                    [weights[i] for i in channels],
+                    central,
+                )
+            )
+        return products(trials, self.threads)
+
+
+def _moved(values: Array, steps: Array, central: bool) -> Array:
+    """The parameters, then with each of them moved, shape (tried, p)."""
+    moves = np.diag(steps) if steps.size else np.empty((0, len(values)))
+    both = [np.zeros((1, len(values))), moves, -moves]
+    return values + np.concatenate(both if central else both[:2])
+
+
+def _free(model: Model, paths: Sequence[str]) -> list[Free]:
+    names, found = parameter_names(model), []
+    # Its message names the nearest that there is.
+    model.replace({path: 0.0 for path in paths if path not in set(model.paths())})
+    for path in paths:
+        effect, _, door = path.partition(".")
+        law = model.effects[effect]
+        stem = law.names_at_the_door()[door]
+        if stem in law.rows or (effect in sensors.SENSORS and stem == "noise"):
+            raise ModelError(
+                f"{path} cannot be fitted: it is "
+                + ("a row of numbers" if stem in law.rows else "what residuals are counted in")
+            )
+        found.append(Free(path, 1 + names.index(f"{effect}.{stem}"), law.quantities[stem]))
+    return found

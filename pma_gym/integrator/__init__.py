@@ -1,0 +1,1 @@
+"""Numerical integration: one step attempt, step-size control, events, whole trials."""

@@ -1,0 +1,252 @@
+"""Where a step ends because the equations are others beyond: switches, and bends of the laws.
+
+At a switch a step ends exactly, or its order would be lost: what has passed one is tried anew. At a
+bend, where a law only curves otherwise, it ends about there, so that no step learns of it by being
+refused. Both are foreseen from where things stand and how fast they move as a step begins.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from pma_gym.codegen.generic import square_root, where
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.substitute import substitute
+from pma_gym.integrator.equations import Equations, State, Switch
+from pma_gym.integrator.exponential_rosenbrock import Step
+
+AIMED = 0.9995
+"""Share of a step behind which a switch has been aimed at."""
+
+BEYOND = 1.0001
+"""How far a step goes on to be surely past a switch, as a factor of the way there."""
+
+PAST = 1.01
+"""Share of the rest of the way to a switch that is made."""
+
+SHORT = 0.96
+"""Share of the way to a switch that is made first: the rest, foreseen anew, is known exactly."""
+
+CLOSE = 0.1
+"""A switch within this share of the proposed step is the end of the next."""
+
+BEND = 1.02
+"""Share of the way to a bend that is made."""
+
+SPENT = 0.1
+"""Share of the way by which a step may miss where the slide turns that is left of it where it has
+as good as turned."""
+
+NEGLIGIBLE = 0.05
+"""Bends within this share of the proposed step are not waited for."""
+
+LEAST_AIM_S = 3e-7
+"""No step is made shorter than this (s) to end at a switch."""
+
+FAR_S = 1e9
+"""Time to a switch (s) where there is none."""
+
+
+@dataclass(frozen=True)
+class Ahead:
+    """What lies ahead of a step.
+
+    Attributes:
+        length: how long a step may be (s).
+        landing: whether that takes it to a switch.
+    """
+
+    length: Value
+    landing: Value
+
+
+def ahead(
+    eq: Equations, size: Value, frozen: Mapping[int, Value], here: Mapping[int, Value]
+) -> Ahead | None:
+    """How long a step may be, as far as that can be foreseen; None where nothing lies ahead.
+
+    Args:
+        eq: the plant's equations.
+        size: proposed size of the step (s).
+        frozen: what is fixed for the step, by id.
+        here: what holds at its beginning, by id.
+    """
+    if not eq.switches and not eq.bends and not eq.ways:
+        return None
+    graph, begin = eq.graph, {**frozen, **here}
+    along = graph.constant(1.0)
+    if eq.travelled is not None:
+        # By the speed alone, which is there at once: it is wrong only where the slide turns, and
+        # how long a step may be is waited for by all else.
+        begin[eq["direction"].id] = along = where(eq.travelled[1] < 0.0, -1.0, 1.0)
+    considered: list[tuple[Value, Value, Value]] = []
+
+    def consider(is_ahead: Value, its_way: Value, its_speed: Value, is_switch: bool) -> None:
+        far = (graph.constant(1.0), graph.constant(1.0 / FAR_S))
+        way, speed = (where(is_ahead, a, b) for a, b in zip((its_way, its_speed), far, strict=True))
+        considered.append((way, speed, graph.constant(is_switch, "truth")))
+
+    for switch in eq.switches:
+        value, (rate,) = switch.value, substitute([switch.rate], begin)
+        coming = (value * rate < 0.0) & (abs(value) > switch.overshoot)
+        if switch.turning:
+            coming = (value * rate < 0.0) & ~turns(switch, value, rate)
+        consider(coming, abs(value), abs(rate), True)
+    for bend in eq.bends:
+        value, rate = substitute([bend.value, bend.rate], begin)
+        left = abs(value) > (NEGLIGIBLE * size) * abs(rate)
+        consider((value * rate < 0.0) & left, abs(value), abs(rate), False)
+    for its_way in eq.ways:
+        # At the mean of the speeds here and there, with the acceleration as it is here.
+        assert eq.travelled is not None
+        (rate,) = substitute([eq.rate_of(eq.travelled[1])], begin)
+        (its_way,) = substitute([its_way], begin)
+        now = along * eq.travelled[1]
+        square = now * now + 2.0 * its_way * (along * rate)
+        twice = now + square_root(where(square > 0.0, square, 0.0))
+        left = 2.0 * its_way > (NEGLIGIBLE * size) * twice
+        consider((square > 0.0) & left, 2.0 * its_way, twice, False)
+    way, speed, exact = _soonest(considered)
+    soon = way / speed
+    landing = exact & (soon < CLOSE * size)
+    length = soon * where(landing, PAST, where(exact, SHORT, BEND))
+    return Ahead(where(length > LEAST_AIM_S, length, LEAST_AIM_S), landing)
+
+
+def _soonest(considered: list[tuple[Value, Value, Value]]) -> tuple[Value, Value, Value]:
+    """The soonest of ways and speeds, and its truth: in rounds, of two that stand side by side.
+
+    They are compared as quotients, so that it takes one division whatever there is.
+    """
+    while len(considered) > 1:
+        won = []
+        for first, second in zip(considered[::2], considered[1::2], strict=False):
+            sooner = second[0] * first[1] < first[0] * second[1]
+            won.append(tuple(where(sooner, b, a) for a, b in zip(first, second, strict=True)))
+        considered = won + considered[2 * len(won) :]
+    return considered[0]
+
+
+def turns(switch: Switch, speed: Value, rate: Value) -> Value:
+    """Whether what moves has as good as turned, by its speed and the rate of that."""
+    return (speed * rate < 0.0) & (speed * speed < (SPENT * switch.overshoot) * abs(rate))
+
+
+def passed(
+    eq: Equations,
+    leading: Sequence[State],
+    made: Step,
+    length: Value,
+    frozen: Mapping[int, Value],
+    here: Mapping[int, Value],
+    moved: Mapping[int, Value],
+) -> tuple[Value, Value]:
+    """Share of the step at which a switch is passed, and whether it may not be missed.
+
+    The share is that of the last of the switches that are passed; the others come in turn.
+
+    Args:
+        eq: the plant's equations.
+        leading: the states that the step is made with.
+        made: the step.
+        length: how long it is (s).
+        frozen: what is fixed for it, by id.
+        here: what holds at its beginning, by id.
+        moved: what states are at its end, by the id of what they were.
+    """
+    graph = eq.graph
+    missed = twice = graph.constant(False, "truth")
+    start = rate = end = graph.constant(1.0)
+    for switch in eq.switches:
+        at_end, at_start, speed = (
+            *substitute([switch.value], {**frozen, **moved}),
+            switch.value,
+            *substitute([switch.rate], {**frozen, **here}),
+        )
+        if switch.turning:
+            sign = frozen[eq["direction"].id]
+        else:
+            still = where(speed < 0.0, -1.0, 1.0)
+            sign = where(at_start > 0.0, 1.0, where(at_start < 0.0, -1.0, still))
+        twice = twice | _passed_twice(leading, switch, made, length, frozen, sign)
+        beyond = -sign * at_end
+        # Way beyond the point of turning, or penetration times its share of the step, by the speed
+        # at which the parabola through both ends comes there.
+        over = beyond * beyond * (0.5 * length if switch.turning else 1.0)
+        coming = 2.0 * (at_end - at_start) - speed * length
+        is_passed = (beyond > 0.0) & (over > switch.overshoot * abs(coming))
+        if switch.turning:
+            # As good as turned, it may go on as it did for longer than was thought.
+            turns_late = sign * at_start < 0.0
+            twice = twice | (turns_late & (beyond * length > switch.overshoot))
+            is_passed = is_passed & ~turns_late
+        missed = missed | is_passed
+        start = where(is_passed, sign * at_start, start)
+        rate = where(is_passed, sign * speed, rate)
+        end = where(is_passed, sign * at_end, end)
+    slope = rate * length
+    bend = end - start - slope
+    inside = slope * slope - 4.0 * bend * start
+    root = square_root(where(inside > 0.0, inside, 0.0))
+    # The form of the solution that adds what has one sign: where a switch first moves off, from as
+    # good as zero, the difference of root and slope has no digit that is right, and may be zero.
+    off = slope > 0.0
+    share = where(off, root + slope, 2.0 * start) / where(off, -2.0 * bend, root - slope)
+    # What lies in the last bit of the step has been aimed at: no step aims twice.
+    aimed = start + AIMED * (slope + AIMED * bend) >= 0.0
+    missed = (missed & ~aimed) | twice
+    # From rest the way back may begin at once: 0 / 0, which is no share above 0.05. Whatever is
+    # not taken is tried again shorter, or it would be tried for ever.
+    share = where((end < 0.0) & ~aimed, where(share > 0.05, BEYOND * share, 0.05), 0.5)
+    unseen, bent = _unseen(eq, leading, made, frozen, here, moved)
+    return where(unseen & ~missed, BEND * bent, share), missed | unseen
+
+
+def _unseen(
+    eq: Equations,
+    leading: Sequence[State],
+    made: Step,
+    frozen: Mapping[int, Value],
+    here: Mapping[int, Value],
+    moved: Mapping[int, Value],
+) -> tuple[Value, Value]:
+    """Whether a bend lies behind the last stage, which no rate saw; and its share of the step."""
+    graph, begin = eq.graph, {**frozen, **here}
+    unseen, share = graph.constant(False, "truth"), graph.constant(1.0)
+    stage = {s.value.id: value for s, value in zip(leading, made.visited[-1], strict=True)}
+    courses = [
+        [substitute([bend.value], {**frozen, **at})[0] for at in ({}, stage, moved)]
+        for bend in eq.bends
+    ]
+    for way in eq.ways:
+        assert eq.travelled is not None
+        (first,) = substitute([way], begin)
+        place, along = eq.travelled[0], frozen[eq["direction"].id]
+        courses.append(
+            [first, *(first - along * (at[place.id] - place) for at in (stage, moved))],
+        )
+    for first, there, last in courses:
+        # Not what has been aimed at.
+        far = abs(last) > NEGLIGIBLE * abs(first)
+        is_unseen = (first * there > 0.0) & (first * last < 0.0) & far
+        unseen = unseen | is_unseen
+        share = where(is_unseen, first / (first - last), share)
+    return unseen, share
+
+
+def _passed_twice(
+    leading: Sequence[State],
+    switch: Switch,
+    made: Step,
+    length: Value,
+    frozen: Mapping[int, Value],
+    sign: Value,
+) -> Value:
+    """Whether a switch was passed and passed again on the way, such as by turning twice."""
+    least = switch.overshoot * (10.0 if switch.turning else 1.0)
+    found = []
+    for states in made.visited:
+        given = {state.value.id: value for state, value in zip(leading, states, strict=True)}
+        (there,) = substitute([switch.value], {**frozen, **given})
+        beyond = (-0.25 * sign) * there
+        found.append((beyond * length if switch.turning else beyond) > least)
+    return found[0] | found[1]

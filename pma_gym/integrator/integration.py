@@ -1,0 +1,226 @@
+"""Marches many plants, each with steps of its own, in SIMD lanes.
+
+A lane that has come to the end of its span takes the next piece of work at once, so that lanes with
+short steps hold up nobody, and what becomes of a plant depends on no other.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from llvmlite import ir
+
+from pma_gym.codegen.graph import FIXED, HELD, Value
+from pma_gym.codegen.machine.control import (
+    DOUBLE,
+    INTEGER,
+    POINTER,
+    Builder,
+    Operand,
+    integer,
+    loop,
+    offset,
+    repeat,
+    variable,
+)
+from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.trace import split
+from pma_gym.integrator.step_attempt import Attempt
+
+FUSED = True
+"""Products and sums are rounded once, as IEEE 754 has it (fused multiply-add), and a sum's terms
+are added as they come to be there: the same bits at every width and on every machine, and a third
+faster."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What a lane works on, in order.
+
+    Attributes:
+        changing: values that an attempt changes: states and memories, size, left.
+        outputs: what becomes of them.
+        held: values that are fixed for a span.
+        fixed: values that are fixed for a model.
+        table: where those stand in memory: themselves, among what else is fixed for a model.
+    """
+
+    changing: list[Value]
+    outputs: list[Value]
+    held: list[Value]
+    fixed: list[Value]
+    table: list[Value]
+
+    @classmethod
+    def of(cls, attempt: Attempt, extra: Sequence[Value] = ()) -> "Layout":
+        """The layout of an attempt, and of other values that are computed beside it."""
+        outputs = [*attempt.states, attempt.next_size, attempt.next_left]
+        both = [*outputs, *extra]
+        fixed = split(both, FIXED)
+        return cls(
+            changing=[*attempt.before, attempt.size, attempt.left],
+            outputs=outputs,
+            held=[value for value in split(both, HELD) if value.level == HELD],
+            fixed=fixed,
+            table=fixed,
+        )
+
+    @property
+    def slots(self) -> list[Value]:
+        """All of a lane's values."""
+        return [*self.changing, *self.held, *self.fixed]
+
+
+class Lane:
+    """The lanes' memory while code is written that works on one lane.
+
+    Args:
+        builder: where to write.
+        lanes: width and type.
+        layout: what a lane works on.
+        own: further numbers that a lane keeps, by name.
+    """
+
+    def __init__(
+        self, builder: Builder, lanes: Lanes, layout: Layout, own: Sequence[str] = ()
+    ) -> None:
+        self.builder, self.lanes, self.layout = builder, lanes, layout
+        self.at = {value.id: i for i, value in enumerate(layout.slots)}
+        self.own = {name: len(self.at) + i for i, name in enumerate(own)}
+        size = len(self.at) + len(own)
+        self.memory = memory(builder, ir.ArrayType(lanes.real, size))
+        self.jobs = memory(builder, ir.ArrayType(INTEGER, lanes.width))
+        self.one = Lanes(1, {8: "double", 4: "float"}[lanes.size], FUSED)
+
+    def slot(self, what: Value | str) -> int:
+        """Place of a value or of a number by name."""
+        return self.own[what] if isinstance(what, str) else self.at[what.id]
+
+    def cell(self, what: Value | str, lane: Operand | int) -> Operand:
+        """Address of a lane's number."""
+        first = integer(self.slot(what) * self.lanes.places)
+        where = self.builder.add(first, integer(lane))
+        return offset(self.builder, self.memory, where, self.lanes.element)
+
+    def put(self, what: Value | str, lane: Operand | int, number: Operand) -> None:
+        """Write a lane's number."""
+        if self.lanes.width == 1:
+            self.put_vector(what, self.lanes.spread(self.builder, number))
+        else:
+            self.builder.store(number, self.cell(what, lane))
+
+    def get(self, what: Value | str, lane: Operand | int) -> Operand:
+        """Read a lane's number."""
+        return self.builder.load(self.cell(what, lane), typ=self.lanes.element)
+
+    def vector(self, what: Value | str) -> Operand:
+        """All lanes' numbers."""
+        return self.lanes.load(self.builder, self.memory, self.slot(what))
+
+    def put_vector(self, what: Value | str, numbers: Operand) -> None:
+        """Write all lanes' numbers."""
+        self.lanes.store(self.builder, numbers, self.memory, self.slot(what))
+
+    def narrow(self, number: Operand) -> Operand:
+        """A number in double precision as the lanes have it."""
+        single = self.lanes.element is not DOUBLE
+        return self.builder.fptrunc(number, self.lanes.element) if single else number
+
+    def widen(self, number: Operand) -> Operand:
+        """A lane's number in double precision."""
+        single = self.lanes.element is not DOUBLE
+        return self.builder.fpext(number, DOUBLE) if single else number
+
+    def job(self, lane: Operand | int) -> Operand:
+        """Address of the number of a lane's job; negative for none."""
+        return offset(self.builder, self.jobs, integer(lane), INTEGER)
+
+    def tabulate(self, lane: Operand, table: Operand, spacing: int = 1) -> None:
+        """Write what is fixed for a model: the table's numbers.
+
+        Args:
+            lane: number of the lane.
+            table: address of the model's table, numbers in double precision.
+            spacing: how many numbers lie from one of the table to the next.
+        """
+        places = {value.id: i for i, value in enumerate(self.layout.table)}
+        for value in self.layout.fixed:
+            where = offset(self.builder, table, places[value.id] * spacing)
+            self.put(value, lane, self.narrow(self.builder.load(where, typ=DOUBLE)))
+
+    def hold(self, lane: Operand, given: dict[int, Operand]) -> None:
+        """Write what follows for a span, once the table is there.
+
+        Args:
+            lane: number of the lane.
+            given: inputs of level HELD, by id.
+        """
+        known = {value.id: self.get(value, lane) for value in self.layout.fixed} | given
+        found = self.one.emit(self.builder, self.layout.held, known)
+        for value in self.layout.held:
+            self.put(value, lane, found[value.id])
+
+
+def memory(builder: Builder, type_: ir.Type) -> Operand:
+    """Memory of a function, behind a plain pointer."""
+    made = variable(builder, type_)
+    made.type = POINTER
+    return made
+
+
+def march(
+    lane: Lane,
+    attempt: Attempt,
+    take: Callable[[Operand], Operand],
+    proceed: Callable[[Operand], Operand],
+    watch: Callable[[dict[int, Operand]], None] | None = None,
+    extra: Sequence[Value] = (),
+) -> Operand:
+    """Write the march.
+
+    Args:
+        lane: the lanes.
+        attempt: the attempt at a step.
+        take: writes how a lane takes its first work; returns whether it found any.
+        proceed: writes what a lane does at the end of a span; returns whether it goes on.
+        watch: writes what is to be seen of an attempt, from all that it computes, before the lanes
+            move on.
+        extra: what else is computed for it.
+    Returns:
+        Address of how many attempts were made, all lanes at once.
+    """
+    b, lanes, layout = lane.builder, lane.lanes, lane.layout
+    active = memory(b, INTEGER)
+    attempts = memory(b, INTEGER)
+    b.store(integer(0), active)
+    b.store(integer(0), attempts)
+    zero = ir.Constant(lanes.element, 0.0)
+    with loop(b, lanes.width) as k:
+        # Numbers that an idle lane can be computed with, whatever they mean.
+        for i in range(len(lane.at) + len(lane.own)):
+            where = b.add(integer(i * lanes.places), k)
+            b.store(zero, offset(b, lane.memory, where, lanes.element))
+        found = take(k)
+        b.store(b.select(found, b.load(lane.job(k), typ=INTEGER), integer(-1)), lane.job(k))
+        b.store(b.add(b.load(active, typ=INTEGER), b.zext(found, INTEGER)), active)
+    with repeat(b) as leave_if:
+        leave_if(b.icmp_signed("<=", b.load(active, typ=INTEGER), integer(0)))
+        b.store(b.add(b.load(attempts, typ=INTEGER), integer(1)), attempts)
+        known = {value.id: lane.vector(value) for value in layout.slots}
+        found = lanes.emit(b, [*layout.outputs, *extra], known)
+        if watch is not None:
+            watch(found)
+        for value, new in zip(layout.changing, layout.outputs, strict=True):
+            lane.put_vector(value, found[new.id])
+        left = found[attempt.next_left.id]
+        finished = b.fcmp_ordered("<=", left, lanes.constant(0.0))
+        with b.if_then(lanes.any(b, finished)):
+            with loop(b, lanes.width) as k:
+                there = b.icmp_signed(">=", b.load(lane.job(k), typ=INTEGER), integer(0))
+                ended = b.fcmp_ordered("<=", lane.get(attempt.left, k), zero)
+                with b.if_then(b.and_(there, ended)):
+                    goes_on = proceed(k)
+                    stops = b.zext(b.not_(goes_on), INTEGER)
+                    b.store(b.sub(b.load(active, typ=INTEGER), stops), active)
+                    own = lane.job(k)
+                    b.store(b.select(goes_on, b.load(own, typ=INTEGER), integer(-1)), own)
+    return attempts

@@ -1,0 +1,48 @@
+"""A model's equations with the arithmetic of one step, and what they say where it begins."""
+
+from dataclasses import dataclass
+
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.substitute import substitute
+from pma_gym.integrator.equations import COMMANDS, Equations
+from pma_gym.integrator.integration import Layout
+from pma_gym.integrator.step_attempt import Attempt
+
+
+@dataclass(frozen=True)
+class System:
+    """A model's equations with the arithmetic of one step.
+
+    Attributes:
+        equations: the equations.
+        attempt: one attempt at a step.
+        layout: what a lane works on.
+    """
+
+    equations: Equations
+    attempt: Attempt
+    layout: Layout
+
+
+def at_rest(eq: Equations) -> dict[int, Value]:
+    """What paths and their direction are where a step begins, by id."""
+    here = {path.after.id: path.value for path in eq.paths}
+    if eq.travelled is not None and eq.paths:
+        here[eq["origin"].id] = eq.travelled[0]
+    return here
+
+
+def rates(eq: Equations) -> list[Value]:
+    """Rates of states, then of memories of the way: their slope along it, times the speed."""
+    from pma_gym.codegen.derivative import derivative
+    from pma_gym.integrator.step_attempt import beginning
+
+    frozen, here = beginning(eq)
+    own = [state.rate for state in eq.states if state.name not in COMMANDS]
+    found = substitute(own, {**frozen, **here})
+    for path in eq.paths:
+        assert eq.travelled is not None
+        (slope,) = derivative(path.after, [eq.travelled[0]])
+        assert slope is not None
+        found.append(substitute([slope], frozen)[0] * eq.travelled[1])
+    return found

@@ -1,0 +1,137 @@
+"""A model's compiled equations of motion: rates and outputs of given states."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.program import program, table, vector
+
+DEFAULT_TOLERANCE = 2.3e-4
+"""Largest error of an internal step, as a share of the states' scales, chosen by measured error:
+`python -m benchmarks accuracy` holds the result against scipy at rtol 1e-11."""
+
+OUTPUTS = ("contraction", "rotation", "load", "pressure")
+
+
+class CompiledModel:
+    """A model's equations of motion, compiled.
+
+    Args:
+        model: a Model, the name of a shipped one, or the path of a TOML file.
+        tolerance: largest error of an internal step, as a share of what the plant's states are
+            counted against; a station's positions are held to 0.1 % of it.
+
+    Attributes:
+        model: the Model.
+        tolerance: the tolerance.
+        program: the compiled functions of all models of this structure.
+        vector: tolerance and parameters, as compiled functions read them.
+        table: what is fixed for a model, as compiled functions read it.
+        states: names of the states, in the order of the state vector.
+        outputs: names of the true outputs: contraction (m), rotation (rad), load (N),
+            pressure (Pa).
+    """
+
+    def __init__(
+        self, model: str | Path | Model = "serres2008", tolerance: float = DEFAULT_TOLERANCE
+    ) -> None:
+        """Compile the model's equations, or load them from the cache.
+
+        Raises:
+            ModelError: no such model, or one that cannot be used.
+            ValueError: a tolerance that is none.
+        """
+        check_tolerance(tolerance)
+        self.model = load_model(model)
+        self.tolerance = tolerance
+        self.program = program(self.model)
+        self.states = list(self.program.states)
+        self.vector = vector(self.model, tolerance)
+        self.table = table(self.program, self.vector)
+        self.outputs = OUTPUTS
+        self.sensor_columns = [
+            self.states.index(f"lag_{name}") if f"lag_{name}" in self.states else -1
+            for name in sensors.SENSORS
+        ]
+
+    def __reduce__(self) -> "tuple[type[CompiledModel], tuple[Model, float]]":
+        """Copy and pickle by construction: compiled functions belong to their process."""
+        return type(self), (self.model, self.tolerance)
+
+    def regulator_voltage(self, pressure: float) -> float:
+        """Regulator voltage (V) that settles at a pressure (Pa).
+
+        Raises:
+            ValueError: if the regulator would need less than 0 or more than 10 V.
+        """
+        return regulator_voltage(self.model, pressure)
+
+    def derivative(
+        self,
+        state: np.ndarray,
+        motor_voltage: float,
+        regulator_voltage: float,
+        zero_contraction: float,
+    ) -> np.ndarray:
+        """Time derivative of the state vector (SI per s)."""
+        inputs = np.array([motor_voltage, regulator_voltage, zero_contraction], float)
+        state, out = np.ascontiguousarray(state, float), np.empty(len(self.states))
+        addresses = (a.ctypes.data for a in (state, inputs, self.vector))
+        self.program.derivative(1, *addresses, 0, out.ctypes.data)
+        return out
+
+    def observe(self, states: np.ndarray, zero_contraction: float) -> dict[str, np.ndarray]:
+        """True outputs of states.
+
+        Args:
+            states: shape (rows, states).
+            zero_contraction: contraction x0 that extension counts from (m).
+        Returns:
+            contraction, rotation, load, pressure and extension (SI), shape (rows,) each.
+        """
+        states = np.ascontiguousarray(states, float)
+        out = np.empty((states.shape[0], len(OUTPUTS)))
+        addresses = (a.ctypes.data for a in (self.vector, out))
+        self.program.observe(len(states), states.ctypes.data, zero_contraction, *addresses)
+        truth = {name: out[:, i] for i, name in enumerate(OUTPUTS)}
+        truth["extension"] = zero_contraction - truth["contraction"]
+        return truth
+
+    def extrapolates(self, pressure: float) -> bool:
+        """Whether a pressure (Pa) lies outside what the model was identified on."""
+        valid = self.model.parameters["validity"]
+        return not valid.lowest <= pressure <= valid.highest
+
+
+def regulator_voltage(model: Model, pressure: float) -> float:
+    """Regulator voltage (V) of a model that settles at a pressure (Pa).
+
+    Raises:
+        ValueError: if the regulator would need less than 0 or more than 10 V.
+    """
+    line = model.parameters["regulator_line"]
+    voltage = (pressure - line.offset) / line.gain
+    if not 0.0 <= voltage <= 10.0:
+        low, high = max(0.0, line.offset), 10.0 * line.gain + line.offset
+        raise ValueError(
+            f"pressure must lie in {low / 1e3:g} to {high / 1e3:g} kPa, what the regulator "
+            f"reaches with 0-10 V; got {pressure / 1e3:g} kPa; give another pressure, or a model "
+            "whose regulator reaches it"
+        )
+    return voltage
+
+
+def check_tolerance(tolerance: object) -> None:
+    """Refuse what is no tolerance of the integrator.
+
+    Raises:
+        ValueError: it is no number, or too small or large for one.
+    """
+    # `not`: NaN is out of every range, as is true or false.
+    if not (isinstance(tolerance, int | float | np.floating) and 1e-10 <= tolerance <= 0.1):
+        raise ValueError(
+            f"tolerance must be a share in 1e-10 to 0.1 of the states' scales, got "
+            f"{tolerance!r}; the default is {DEFAULT_TOLERANCE:g}"
+        )

@@ -1,0 +1,188 @@
+"""A plant's equations of motion while they are being put together from the laws of its effects.
+
+A plant (`station.py`, `cascade.py`) says which ports it has and how their results balance; the
+effects that a model has fill the ports. What comes out is traced arithmetic, from which compiled
+code, Python text and derivatives are made.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.trace import trace
+from pma_gym.effects import Effect
+from pma_gym.effects.effect import Parameters, signals
+from pma_gym.integrator.equations import Bend, Equations, Path
+
+LAG_SHARE = 5.0
+"""Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where effects act on a plant.
+
+    Attributes:
+        result: what the effects there contribute, and what becomes of it.
+        least: fewest effects that it takes.
+        most: most effects that it takes.
+        only: names of the effects that it takes; any of this port if empty.
+    """
+
+    result: str
+    least: int = 0
+    most: float = math.inf
+    only: tuple[str, ...] = ()
+
+    @property
+    def takes(self) -> str:
+        """How many effects it takes, or which, in words."""
+        if self.only:
+            return " and ".join(self.only)
+        if self.most == 1:
+            return "exactly one effect" if self.least else "at most one effect"
+        return f"{self.least} or more effects"
+
+
+class PlantEquations(Equations):
+    """A plant's right-hand side, put together from the laws of its effects.
+
+    Args:
+        effects: the model's effects by name.
+        parameters: their parameters by name; only how many there are matters here.
+        ramped: commands change linearly in time; else they are held.
+
+    Attributes:
+        effects: the model's effects by name.
+    """
+
+    def __init__(
+        self,
+        effects: Mapping[str, Effect],
+        parameters: Mapping[str, Parameters],
+        ramped: bool = False,
+    ) -> None:
+        super().__init__(parameters, ramped)
+        self.effects = dict(effects)
+
+    def at(self, port: str) -> list[Effect]:
+        """The model's effects at a port, in catalogue order."""
+        return [effect for effect in self.effects.values() if effect.port == port]
+
+    def call(self, effect: Effect, law: Callable, **other: Value) -> Any:  # noqa: ANN401
+        """What a law returns; `other` gives a signal another value."""
+        own = {"p": self.parameters[effect.name], **other}
+
+        def signal(name: str) -> Value:
+            if name in own:
+                return own[name]
+            if name == "memory":
+                return self.memory(effect)
+            return self[name]
+
+        return trace(law, *(signal(name) for name in signals(law)))
+
+    def memory(self, effect: Effect) -> Any:  # noqa: ANN401
+        """The memory of an effect; one of the way travelled, as far as the step has come."""
+        if effect.path is None:
+            values = tuple(self[name] for name in effect.memory_names)
+            return values if effect.memories > 1 else values[0]
+        (name,) = effect.memory_names
+        for path in self.paths:
+            if path.name == name:
+                return path.after
+        assert self.travelled is not None
+        start, parameters = self[name], self.parameters[effect.name]
+        direction = self["direction"]
+        self.travel = self.travelled[0] - self["origin"]
+        after = trace(effect.path, start, self.travel, direction, parameters)
+        self.paths.append(Path(name, start, after, effect.memory_scale))
+        if effect.path_bend:
+            self.ways.append(trace(effect.path_bend, start, direction, parameters))
+        return after
+
+    def total(self, port: str) -> Value:
+        """The sum over the effects at a port."""
+        terms: list[Value] = [
+            self.call(effect, effect.law) for effect in self.at(port) if effect.law
+        ]
+        return sum(terms[1:], terms[0]) if terms else self.graph.constant(0.0)
+
+    def product(self, port: str) -> Value:
+        """The product over the effects at a port."""
+        factor = self.graph.constant(1.0)
+        for effect in self.at(port):
+            if effect.law:
+                factor = factor * self.call(effect, effect.law)
+        return factor
+
+    def chain(self, port: str, name: str, value: Value) -> Value:
+        """A value that the effects at a port change one after the other, in catalogue order.
+
+        Args:
+            port: the port.
+            name: the signal by which their laws know the value.
+            value: the value before them.
+        """
+        for effect in self.at(port):
+            if effect.law:
+                value = self.call(effect, effect.law, **{name: value})
+        return value
+
+    def one(self, port: str, **other: Value) -> Any:  # noqa: ANN401
+        """What the law of the only effect at a port returns."""
+        (effect,) = self.at(port)
+        assert effect.law is not None
+        return self.call(effect, effect.law, **other)
+
+    def passed(self, port: str, name: str) -> Value:
+        """A named value as the effect at a port passes it on; as it is if there is none."""
+        return self.one(port) if self.at(port) else self[name]
+
+    def add_decaying(
+        self, name: str, rate: tuple[Value, Value], scale: float | None, beside: str = ""
+    ) -> None:
+        """Add a state whose rate law returns (source, decay), and rates of a port `beside` it."""
+        source, decay = rate
+        self.add_state(name, source - decay * self[name] + self.total(beside), scale)
+
+    def add_memories(self, ports: Sequence[str]) -> None:
+        """Add the memory of every effect that has one at these ports."""
+        for effect in self.effects.values():
+            if effect.port in ports and effect.rate:
+                self._add_memory(effect, effect.rate)
+
+    def _add_memory(self, effect: Effect, law: Callable) -> None:
+        found = self.call(effect, law)
+        rates = found if effect.memories > 1 else (found,)
+        for name, rate in zip(effect.memory_names, rates, strict=True):
+            self.add_decaying(name, rate, effect.memory_scale)
+
+    def add_bends(self) -> None:
+        """Add the bends of the effects' laws; all states must have been added."""
+        for effect in self.effects.values():
+            if effect.bend:
+                value = self.call(effect, effect.bend)
+                self.bends.append(Bend(value, self._slope(value)))
+
+    def add_sensors(self, scales: Mapping[str, float]) -> None:
+        """Add the lag of every sensor, by what an error of its output is counted against.
+
+        It follows its output, and whatever errors stand at the same port, with their memories.
+        """
+        for effect in self.effects.values():
+            if effect.port.startswith("sensor:") and effect.rate and not effect.law:
+                output = effect.port.removeprefix("sensor:")
+                truth = self.outputs[output]
+                errors = [
+                    self.call(error, error.law, signal=truth)
+                    for error in self.at(effect.port)
+                    if error.law
+                ]
+                rate = self.call(effect, effect.rate, signal=sum(errors, truth))
+                self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])
+                for error in self.at(effect.port):
+                    if error.law and error.rate:
+                        self._add_memory(error, error.rate)

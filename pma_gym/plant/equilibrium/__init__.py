@@ -1,0 +1,1 @@
+"""Equilibria of plants: the states that stand still at constant commands."""

@@ -1,0 +1,132 @@
+"""The equilibrium problem of many plants of one structure: their states so far, and their rates."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pma_gym.plant.compiled_model import CompiledModel
+
+
+class EquilibriumProblem:
+    """States on their way to equilibrium; x0 is 0 until it is known.
+
+    Attributes:
+        plant: one of the plants.
+        names: places of the states by name.
+        vectors: parameters of each, shape (n, numbers); None where all have the plant's own.
+        inputs: motor and regulator command (V) and x0 (m), shape (n, 3).
+        state: the states (SI), shape (n, states).
+        unbalanced: why there is no equilibrium, in words; empty so far.
+    """
+
+    def __init__(
+        self,
+        plant: CompiledModel,
+        motor: np.ndarray,
+        regulator: np.ndarray,
+        vectors: np.ndarray | None,
+    ) -> None:
+        self.plant = plant
+        self.names = {name: i for i, name in enumerate(plant.states)}
+        self.vectors = None if vectors is None else np.ascontiguousarray(vectors, float)
+        self.inputs = np.stack([motor, regulator, np.zeros(len(motor))], axis=1).astype(float)
+        self.state = np.zeros((len(motor), len(self.names)))
+        numbers = plant.vector if self.vectors is None else self.vectors
+        self._stride = 0 if self.vectors is None else self.vectors.shape[1]
+        # A solution takes thousands of rates: looking its addresses up takes as long as they do.
+        self._state_at, self._numbers_at = self.state.ctypes.data, numbers.ctypes.data
+        self._numbers = numbers
+        self._columns: dict[str, dict[str, np.ndarray]] = {}
+        self.unbalanced = ""
+
+    @property
+    def zero(self) -> np.ndarray:
+        """Contractions x0 (m), shape (n,), to be written to."""
+        return self.inputs[:, 2]
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        return self.state[:, self.names[name]]
+
+    def __setitem__(self, name: str, value: np.ndarray | float) -> None:
+        self.state[:, self.names[name]] = value
+
+    def rate(self, name: str, zero: np.ndarray | None = None) -> np.ndarray:
+        """Rate of a state, shape (n,)."""
+        inputs = self.inputs
+        if zero is not None:
+            inputs = inputs.copy()
+            inputs[:, 2] = zero
+        out = np.empty_like(self.state)
+        commands, at = inputs.ctypes.data, out.ctypes.data
+        given = self._state_at, commands, self._numbers_at, self._stride
+        self.plant.program.derivative(len(out), *given, at)
+        return out[:, self.names[name]]
+
+    def relax(self, name: str, of: str = "", about: np.ndarray | float = 0.0) -> None:
+        """Put a state where a rate vanishes that is linear in it `about` a value.
+
+        The rate is its own, or that `of` another.
+        """
+        rates = []
+        for value in (0.0, 1.0):
+            self[name] = about + value
+            rates.append(self.rate(of or name))
+        slope = rates[1] - rates[0]
+        self[name] = about - rates[0] / slope
+        # From there again: the difference above has lost digits, and a rate may have a kink.
+        for _ in range(3):
+            self[name] -= self.rate(of or name) / slope
+
+    def follow(self, name: str, rate: np.ndarray) -> None:
+        """Put a state, which rests, where it changes at a rate; its own is linear in it."""
+        still, rest = self.rate(name), self[name].copy()
+        self[name] = rest + 1.0
+        self[name] = rest + rate / (self.rate(name) - still)
+
+    def relax_memory(self, port: str) -> None:
+        """Put the memory of the effect at a port that follows a command where it rests."""
+        for effect in self.plant.model.effects.values():
+            if effect.port == port and effect.memories > 1:
+                self._relax_together(effect.memory_names)
+            elif effect.port == port and effect.rate:
+                self.relax(effect.memory_names[0])
+
+    def _relax_together(self, names: Sequence[str]) -> None:
+        """Put states where their rates vanish, which are linear in them."""
+        for name in names:
+            self[name] = 0.0
+        still = self._rates(names)
+        slopes = np.empty((len(still), len(names), len(names)))
+        for i, name in enumerate(names):
+            self[name] = 1.0
+            slopes[:, :, i] = self._rates(names) - still
+            self[name] = 0.0
+        # From there again: the differences above have lost digits.
+        for _ in range(4):
+            change = np.linalg.solve(slopes, self._rates(names)[..., None])[..., 0]
+            for i, name in enumerate(names):
+                self[name] -= change[:, i]
+
+    def _rates(self, names: Sequence[str]) -> np.ndarray:
+        return np.stack([self.rate(name) for name in names], axis=1)
+
+    def parameters(self, effect: str) -> dict[str, np.ndarray]:
+        """An effect's parameters, one each or one for all."""
+        if effect not in self._columns:
+            self._columns[effect] = effect_parameters(self.plant, self.vectors, effect)
+        return self._columns[effect]
+
+    def force(self, contraction: np.ndarray) -> np.ndarray:
+        """Force of the muscle (N) at a contraction (m), without the cable, shape (n,)."""
+        # With the zero at the contraction itself the cable is slack.
+        self["contraction"] = contraction
+        return self.parameters("slide")["mass"] * self.rate("velocity", zero=contraction)
+
+
+def effect_parameters(
+    plant: CompiledModel, vectors: np.ndarray | None, effect: str
+) -> dict[str, np.ndarray]:
+    """An effect's parameters, one each or one for all."""
+    numbers = plant.vector[None, :] if vectors is None else vectors
+    fields, places = plant.model.parameters[effect]._fields, plant.program.places
+    return {field: numbers[:, places[f"{effect}.{field}"]] for field in fields}

@@ -1,0 +1,1 @@
+"""The resistive exercise device: its moments, prescriptions for it, and the knee."""

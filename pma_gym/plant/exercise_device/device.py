@@ -1,0 +1,138 @@
+"""The resistive exercise device at rest: the moment at the joint by angle, pressure and muscles.
+
+A lever turns a pulley of radius r by theta, 0-90 deg, and winds in the cables of n muscles. With x
+the contraction, x0 the one at theta = 0, F the force of all muscles (`plant.muscles`) and k the
+stiffness of their cables:
+
+    T = F(P, x) = k max(0, r theta - slack - (x0 - x)),   M = r T
+
+Two ways to set the cable's length:
+
+    constant pressure    x0 = x0(P), the contraction at P without a load: the dissertation's way
+    scheduled pressure   x0 = x0(P_rest), set once; P then follows the angle
+
+Static: hysteresis, friction, damping and weight are left out. Each muscle has a cable of its own,
+as much stiffer than the station's as the muscle is stronger: our assumption, which lets moments
+scale with n d^2.
+
+Source:
+    Serres 2008, 3.3 and 6.3; cable and pulley as `effects.cable`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from pma_gym.plant.exercise_device.parallel_muscles import TESTED, Muscles, scaled_force
+from pma_gym.plant.model import Model
+from pma_gym.plant.statics import contraction_at, muscle_force
+from pma_gym.units import SI_FACTORS, Quantity
+
+RADIUS = Quantity("mm", 5, 300, "Serres 2008, table I3: 25.4; model `station`: 25.89", usual=25.4)
+FULL_ANGLE = 90.0 * SI_FACTORS["deg"]
+"""From the leg hanging at 90 deg of knee flexion to the straight leg (Serres 2008, 4.3.1)."""
+
+_SHORTEST, _LONGEST = -0.03, 0.09
+"""Contractions (m) of the tested muscle between which a balance is sought."""
+
+
+class Device(NamedTuple):
+    """What a designer chooses.
+
+    Attributes:
+        muscles: on the pulley.
+        radius: of the pulley (m).
+    """
+
+    muscles: Muscles
+    radius: float
+
+    def __str__(self) -> str:
+        """In words, for messages: `2 muscles of 20 mm x 250 mm on 25.9 mm`."""
+        number, diameter, length = self.muscles
+        name = "muscle" if number == 1 else "muscles"
+        size = f"{1e3 * diameter:g} mm x {1e3 * length:g} mm"
+        return f"{number} {name} of {size} on a pulley of {1e3 * self.radius:.4g} mm"
+
+
+class Moments(NamedTuple):
+    """Moments at the joint; arrays of one shape.
+
+    Attributes:
+        moment: against the operator (N m).
+        contraction: of the muscles from their resting length (m), negative when stretched.
+        allowed: whether the muscles stay within their resting length, beyond which table I3 has
+            few rows, and tension (scaled with the muscles) and pressure within the model's limits.
+    """
+
+    moment: NDArray[np.float64]
+    contraction: NDArray[np.float64]
+    allowed: NDArray[np.bool_]
+
+
+def own_device(model: Model) -> Device:
+    """The dissertation's own muscle on the model's pulley."""
+    return Device(TESTED, model.parameters["rotor"].radius)
+
+
+def pressure_grid(model: Model, step: float = 2.5e3) -> NDArray[np.float64]:
+    """Pressures (Pa) of the model's validity, evenly spaced by about a step (Pa)."""
+    ends = model.parameters["validity"]
+    count = round((ends.highest - ends.lowest) / step) + 1
+    return np.linspace(ends.lowest, ends.highest, count)
+
+
+def resistive_moment(
+    model: Model,
+    device: Device,
+    pressure: ArrayLike,
+    angle: ArrayLike,
+    rest_pressure: ArrayLike | None = None,
+    rest_moment: ArrayLike = 0.0,
+) -> Moments:
+    """Static moment of a device at the joint.
+
+    Args:
+        model: a model of the dissertation's station, `station` by nature.
+        device: muscles and pulley.
+        pressure: gauge pressures (Pa), any shape.
+        angle: of the pulley (rad), broadcast with the pressures.
+        rest_pressure: gauge pressure (Pa) at which the cable was set, to hang with its slack at
+            angle 0; None sets it anew at every pressure, as the dissertation did.
+        rest_moment: moment (N m) at angle 0 and the pressure of rest, for which the cable was
+            drawn in further; broadcast too. 0: it hangs slack there.
+    Returns:
+        Moments, of the broadcast shape.
+    """
+    size = device.muscles.length / TESTED.length
+    force = scaled_force(muscle_force(model), device.muscles)
+    set_at = pressure if rest_pressure is None else rest_pressure
+    pressures, angles, rests, held = np.broadcast_arrays(
+        *(np.asarray(value, dtype=np.float64) for value in (pressure, angle, set_at, rest_moment))
+    )
+    ends = size * _SHORTEST, size * _LONGEST
+    drawn = held / device.radius
+    start = contraction_at(force, rests, drawn, *ends)
+    cable = model.parameters["cable"]
+    stiffness = device.muscles.ratio * cable.stiffness
+    slack = np.where(drawn > 0.0, -drawn / stiffness, cable.slack)
+    wound = device.radius * angles - slack - start
+
+    def unbalanced(at: np.ndarray, contraction: np.ndarray) -> np.ndarray:
+        return force(at, contraction) - stiffness * np.maximum(0.0, wound + contraction)
+
+    contraction = contraction_at(unbalanced, pressures, np.zeros_like(pressures), *ends)
+    # Where the cable hangs slack the muscle stands where it has no force, to rounding.
+    tension = np.where(wound + contraction > 0.0, np.maximum(0.0, force(pressures, contraction)), 0)
+    allowed = _allowed(model, device, pressures, contraction, tension)
+    return Moments(device.radius * tension, contraction, allowed)
+
+
+def _allowed(
+    model: Model, device: Device, pressure: NDArray, contraction: NDArray, tension: NDArray
+) -> NDArray[np.bool_]:
+    """No muscle beyond its resting length; tension and pressure within the model's limits."""
+    limits = model.parameters["limits"]
+    held = tension <= limits.tension * device.muscles.ratio
+    return (contraction >= 0.0) & held & (pressure <= limits.pressure)

@@ -1,0 +1,109 @@
+"""The cascade: the dissertation's own linear model of motor, then muscle (Serres 2008, 3.2).
+
+    x_in = map(V, P)                                   static map of table 18
+    u' = (K_M / B_M) (x_in - u)                        servo, or with inertia Eq. 10
+    y' = (u - y) K / B                                 muscle, tau = B / K at the pressure
+    x = F_ce / K - y                                   contraction
+
+One-way: the muscle does not load the motor. With J = 0 and one pressure this is Eq. 22. The load
+cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
+"""
+
+from collections.abc import Mapping
+
+from pma_gym.codegen.trace import trace
+from pma_gym.effects.effect import Parameters
+from pma_gym.effects.muscle.contractile_force import contractile_force
+from pma_gym.effects.muscle.stiffness import spring_stiffness
+from pma_gym.plant.composition import PlantEquations, Port
+
+PORTS: dict[str, Port] = {
+    "muscle_force": Port(
+        "force of the muscle (N), from its two elements",
+        least=2,
+        most=2,
+        only=("contractile_force", "stiffness"),
+    ),
+    "muscle_damping": Port("damping coefficient of the muscle (N s/m)", least=1, most=1),
+    "position_map": Port("displacement that a voltage leads to (m)", least=1, most=1),
+    "servo": Port("rate of the motor's displacement (m/s)", least=1, most=1),
+    "servo_inertia": Port("acceleration of the motor's displacement (m/s^2)", most=1),
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": Port("factor on the regulator's rate, multiplied"),
+}
+"""Ports of the cascade: how many effects each takes, and what becomes of their results."""
+
+REFUSED: dict[str, str] = {
+    "repperger_damping": (
+        "its damping grows with the velocity, of which a cascade knows only the sign; take "
+        "[damping] or [symmetric_damping], or plant = 'station'"
+    ),
+    "potentiometer_backlash": (
+        "a cascade's motor has an angle but no spin to move it by; take plant = 'station'"
+    ),
+}
+"""Effects that would fit a port and mean nothing there, and why."""
+
+PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
+"""Effects that the cascade reads itself and cannot do without."""
+
+POSITIONS: dict[str, float] = {"extension": 0.003, "servo": 0.01}
+"""States that are asked for more exactly than the others, and their tolerance beside theirs."""
+
+SCALES: dict[str, float] = {
+    "contraction": 25e-3,
+    "extension": 25e-3,
+    "servo": 25e-3,
+    "servo_rate": 1.0,
+    "pressure": 500e3,
+    "rotation": 1.0,
+    "load": 500.0,
+}
+"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+
+
+def write_equations(equations: PlantEquations) -> None:
+    """Write the dissertation's cascade, with the model's effects at its ports."""
+    eq = equations
+    stiffness, force = eq.parameters["stiffness"], eq.parameters["contractile_force"]
+    eq.let("pressure_asked", eq.one("regulator_line"))
+    eq.let("pressure_command", eq.passed("regulator_delay", "pressure_asked"))
+    eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
+    eq.let("regulator_pace", eq.product("regulator_pace"))
+    eq.let("displacement_input", eq.one("position_map"))
+    eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))
+    no_load = trace(contractile_force, eq["pressure"], force) / eq["muscle_stiffness"]
+    eq.let("contraction", no_load - eq["extension"])
+    # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
+    eq.let("velocity", eq["extension"] - eq["servo"])
+    eq.let("resistance", eq.one("muscle_damping"))
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "rotation": eq["servo"] / eq.parameters["servo"].radius,
+        "load": eq["muscle_stiffness"] * eq["extension"],
+        "pressure": eq["pressure"],
+    }
+    pull = eq["muscle_stiffness"] / eq["resistance"] * (eq["servo"] - eq["extension"])
+    eq.add_state("extension", pull, SCALES["extension"])
+    _write_servo(eq)
+    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
+    eq.add_memories(("regulator_delay",))
+    eq.add_sensors(SCALES)
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """Frequency (rad/s) of the motor on its position loop; 0 without inertia."""
+    inertial = parameters.get("servo_inertia")
+    return (parameters["servo"].stiffness / inertial.inertia) ** 0.5 if inertial else 0.0
+
+
+def _write_servo(eq: PlantEquations) -> None:
+    if not eq.at("servo_inertia"):
+        eq.add_decaying("servo", eq.one("servo"), SCALES["servo"])
+        return
+    signals = {"displacement": eq["servo"], "displacement_rate": eq["servo_rate"]}
+    acceleration = eq.one("servo_inertia", servo=eq.parameters["servo"], **signals)
+    eq.add_state("servo", eq["servo_rate"], SCALES["servo"])
+    eq.add_state("servo_rate", acceleration, SCALES["servo_rate"])

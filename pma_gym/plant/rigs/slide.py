@@ -1,0 +1,69 @@
+"""The slide: a rig without a muscle, moved by a rigid drive that pushes and pulls.
+
+    m x'' + B x' = F(x, x', memories) - L       x contraction, L the load that the drive gives
+
+Nothing holds it, so no command has a rest: a trial begins where [start] says, as fast as it says.
+There is no pulley and no pressure; L is a command, so a load cell in the link tells nothing new.
+"""
+
+from collections.abc import Mapping
+
+from pma_gym.effects.effect import Parameters
+from pma_gym.plant.composition import PlantEquations, Port
+from pma_gym.plant.rigs.station import SCALES, TURNING_M
+
+PORTS: dict[str, Port] = {
+    "slide_force": Port("force on the slide (N), added; positive in the direction of contraction"),
+    "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
+    "two_way_drive": Port("load that the drive asks for (N)", least=1, most=1),
+    "drive_delay": Port("load that the drive has heard of (N)", most=1),
+    "drive_lag": Port("load that arrives at the slide (N)", most=1),
+}
+"""Ports of the slide: how many effects each takes, and what becomes of their results."""
+
+REFUSED: dict[str, str] = {
+    "operator": "nobody settles a slide that nothing holds; take plant = 'station'",
+    "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
+}
+"""Effects that would fit a port and mean nothing there, and why."""
+
+PARTS: tuple[str, ...] = ("slide", "start")
+"""Effects of port `part` that the slide reads itself and cannot do without."""
+
+SILENT: tuple[str, ...] = ("rotation", "load", "pressure")
+"""Outputs that it does not have: the load is what it is told."""
+
+POSITIONS: dict[str, float] = {"contraction": 0.001}
+"""States that are asked for more exactly than the others, and their tolerance beside theirs."""
+
+
+def write_equations(equations: PlantEquations) -> None:
+    """Write the balance of the slide, with the model's effects at its ports."""
+    eq = equations
+    slide = eq.parameters["slide"]
+    eq.travelled = (eq["contraction"], eq["velocity"])
+    eq.let("pressure", eq.graph.constant(0.0))
+    eq.let("load_asked", eq.one("two_way_drive"))
+    eq.let("load_command", eq.passed("drive_delay", "load_asked"))
+    eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
+    eq.let("slide_force", eq.total("slide_force"))
+    eq.let("resistance", eq.total("muscle_damping"))
+    nothing = eq.graph.constant(0.0)
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "rotation": nothing,
+        "load": nothing,
+        "pressure": nothing,
+    }
+    force = eq["slide_force"] - eq["load_arriving"] - eq["resistance"] * eq["velocity"]
+    eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
+    eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
+    eq.add_memories(tuple(PORTS))
+    eq.add_sensors(SCALES)
+    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
+    eq.add_bends()
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """0: nothing swings."""
+    return 0.0

@@ -1,0 +1,140 @@
+"""The station: muscle and slide, cable, rotor, regulator, sensors; a balance of forces.
+
+    m x'' + B x' = F(P, x, memories) - T              muscle and slide, x contraction
+    J theta'' + B_M theta' = r (L - T)                 rotor, L the load that the drive gives
+    T = tension(s, s'),  s = r theta - (x0 - x)        cable, x0 the contraction at no load
+    P' from the regulator's lag                        regulator
+
+The tension T is what the load cell reads. Effects add to these balances at their ports.
+"""
+
+from collections.abc import Mapping
+
+from pma_gym.codegen.graph import Value
+from pma_gym.codegen.trace import trace
+from pma_gym.effects.cable.hanging_load import hanging_inertia
+from pma_gym.effects.cable.leg import leg_torque
+from pma_gym.effects.effect import Parameters
+from pma_gym.plant.composition import PlantEquations, Port
+
+PORTS: dict[str, Port] = {
+    "muscle_force": Port("force on the slide (N), added; positive shortens the muscle", least=1),
+    "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
+    "damping_factor": Port("factor on the damping coefficient, multiplied"),
+    "slide_force": Port("force on the slide (N), added; positive shortens the muscle"),
+    "cable": Port("tension of the cable (N)", least=1, most=1),
+    "drive": Port("load that the drive asks for (N)", least=1, most=1),
+    "drive_shape": Port("that load (N), changed by one effect after the other"),
+    "drive_delay": Port("load that the drive has heard of (N)", most=1),
+    "drive_lag": Port("load that arrives at the pulley (N)", most=1),
+    "drive_ripple": Port("load on top of what arrives (N), added"),
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": Port("factor on the regulator's rate, multiplied"),
+    "chamber": Port("rate of the pressure beside the regulator's (Pa/s), added"),
+}
+"""Ports of the station: how many effects each takes, and what becomes of their results."""
+
+PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
+"""Effects of port `part` that the station reads itself and cannot do without."""
+
+POSITIONS: dict[str, float] = {"contraction": 0.001, "angle": 0.001}
+"""States that are asked for more exactly than the others, and their tolerance beside theirs: dry
+friction turns an error of 1 nm into one of a ten-thousandth of its force."""
+
+SCALES: dict[str, float] = {
+    "contraction": 25e-3,
+    "velocity": 0.4,
+    "angle": 1.0,
+    "spin": 4.0,
+    "pressure": 500e3,
+    "rotation": 1.0,
+    "load": 500.0,
+}
+"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+
+
+TURNING_M, TIGHTENING_M = 2e-10, 1e-8
+"""Ways (m) by which a step may miss where the slide turns, and where cable or muscle tighten."""
+
+
+def write_equations(equations: PlantEquations) -> None:
+    """Write the balance of the station, with the model's effects at its ports."""
+    eq = equations
+    rotor = eq.parameters["rotor"]
+    eq.travelled = (eq["contraction"], eq["velocity"])
+    _write_drive(eq)
+    eq.let("pressure_asked", eq.one("regulator_line"))
+    eq.let("pressure_command", eq.passed("regulator_delay", "pressure_asked"))
+    eq.let("regulator_time_constant", eq.parameters["regulator_lag"].time_constant)
+    eq.let("regulator_pace", eq.product("regulator_pace"))
+    eq.let("stretch", rotor.radius * eq["angle"] + (eq["contraction"] - eq["zero_contraction"]))
+    eq.let("motor_angle", eq["angle"] - eq["zero_contraction"] / rotor.radius)
+    eq.let("stretch_rate", rotor.radius * eq["spin"] + eq["velocity"])
+    eq.let("cable_tension", eq.one("cable"))
+    eq.let("muscle_force", eq.total("muscle_force"))
+    eq.let("slide_force", eq.total("slide_force"))
+    eq.let("resistance", eq.total("muscle_damping") * eq.product("damping_factor"))
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "rotation": eq["angle"],
+        "load": eq["cable_tension"],
+        "pressure": eq["pressure"],
+    }
+    _write_states(eq)
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """Frequency (rad/s) at which slide and rotor swing against each other on the cable."""
+    rotor, slide = parameters["rotor"], parameters["slide"]
+    return (
+        parameters["cable"].stiffness * (1.0 / slide.mass + rotor.radius**2 / rotor.inertia)
+    ) ** 0.5
+
+
+def _write_drive(eq: PlantEquations) -> None:
+    """The load on its way from the command to the pulley."""
+    eq.let("load_asked", eq.chain("drive_shape", "load", eq.one("drive")))
+    eq.let("load_command", eq.passed("drive_delay", "load_asked"))
+    eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
+
+
+def _inertia(eq: PlantEquations) -> Value:
+    """Inertia at the pulley (kg m^2): the rotor's, of what hangs on the cable, of a leg."""
+    rotor = eq.parameters["rotor"]
+    inertia = rotor.inertia
+    if "hanging_load" in eq.parameters:
+        hanging = eq.parameters["hanging_load"]
+        inertia = inertia + trace(hanging_inertia, eq["load_asked"], rotor.radius, hanging)
+    return inertia + eq.parameters["leg"].inertia if "leg" in eq.parameters else inertia
+
+
+def _drag(eq: PlantEquations) -> Value:
+    """Torque that turning costs (N m): the rotor's damping, and a knee's."""
+    drag = eq.parameters["rotor"].damping * eq["spin"]
+    if "leg" not in eq.parameters:
+        return drag
+    return drag + trace(leg_torque, eq["spin"], eq.parameters["leg"])
+
+
+def _write_states(eq: PlantEquations) -> None:
+    rotor, slide = eq.parameters["rotor"], eq.parameters["slide"]
+    force = eq["muscle_force"] + eq["slide_force"] - eq["cable_tension"]
+    load = eq["load_arriving"] + eq.total("drive_ripple")
+    torque = rotor.radius * (load - eq["cable_tension"])
+    eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
+    eq.add_state(
+        "velocity", (force - eq["resistance"] * eq["velocity"]) / slide.mass, SCALES["velocity"]
+    )
+    eq.add_state("angle", eq["spin"], SCALES["angle"])
+    eq.add_state("spin", (torque - _drag(eq)) / _inertia(eq), SCALES["spin"])
+    eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
+    eq.add_memories(tuple(PORTS))
+    eq.add_sensors(SCALES)
+    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
+    for effect in (*eq.at("cable"), *eq.at("muscle_force")):
+        if effect.switch:
+            name = effect.switch.__name__
+            eq.add_switch(name, eq.call(effect, effect.switch), TIGHTENING_M)
+    eq.add_bends()

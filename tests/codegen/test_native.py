@@ -1,0 +1,191 @@
+"""Compiled libraries: calls, and what is kept on disk and found again."""
+
+import ctypes
+import gc
+import os
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+
+from pma_gym.codegen.cache import compile_cache
+from pma_gym.codegen.machine import native
+from pma_gym.codegen.machine.control import DOUBLE, INTEGER, function, integer, loop, variable
+from pma_gym.codegen.machine.native import Library, compiled
+
+TEXT = "define double @{name}(double %x) {{ %y = fmul double %x, {factor}\nret double %y }}"
+
+
+def text(name="scaled", factor=2.0):
+    return TEXT.format(name=name, factor=factor)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("PMA_GYM_CACHE", str(tmp_path))
+    monkeypatch.setattr(native, "_libraries", {})
+    return tmp_path / "kernels"
+
+
+def scaled(library):
+    return library.function("scaled", [ctypes.c_double], ctypes.c_double)
+
+
+def test_a_library_is_kept_and_found_by_its_text(folder):
+    first = Library(text(factor=3.0))
+    again, other = Library(text(factor=3.0)), Library(text(factor=4.0))
+    assert (first.was_kept, again.was_kept, other.was_kept) == (False, True, False)
+    assert [scaled(library)(1.5) for library in (first, again, other)] == [4.5, 4.5, 6.0]
+    assert len(list(folder.glob("*.o"))) == 2
+    assert not list(folder.glob("*.partial"))
+
+
+def test_what_is_kept_is_not_built_again(folder, monkeypatch):
+    built = []
+
+    def build():
+        built.append(1)
+        return text()
+
+    first = compiled(["model", "a"], build)
+    assert compiled(["model", "a"], build) is first
+    monkeypatch.setattr(native, "_libraries", {})
+    second = compiled(["model", "a"], build)
+    assert second is not first and second.was_kept
+    assert scaled(second)(2.0) == 4.0
+    assert built == [1]
+    compiled(["model", "b"], build)
+    # Where one part ends matters.
+    compiled(["mode", "lb"], build)
+    assert built == [1] * 3
+
+
+@pytest.mark.parametrize("collects", [True, False])
+def test_garbage_is_collected_after_compiling_as_before(folder, collects):
+    seen = []
+
+    def build():
+        seen.append(gc.isenabled())
+        return text(factor=float(len(seen)))
+
+    def broken():
+        raise ValueError
+
+    (gc.enable if collects else gc.disable)()
+    try:
+        compiled(["collects", str(collects)], build)
+        assert seen == [False] and gc.isenabled() == collects
+        with pytest.raises(ValueError):
+            compiled(["broken", str(collects)], broken)
+        assert gc.isenabled() == collects
+    finally:
+        gc.enable()
+
+
+@pytest.mark.parametrize("damage", ["truncated", "empty", "one bit", "other"])
+def test_a_damaged_file_is_compiled_anew(folder, damage):
+    Library(text())
+    (path,) = folder.glob("*.o")
+    whole = path.read_bytes()
+    flipped = bytearray(whole)
+    flipped[-100] ^= 1
+    path.write_bytes(
+        {"truncated": whole[:-50], "empty": b"", "one bit": flipped, "other": b"x" * 500}[damage]
+    )
+    library = Library(text())
+    assert not library.was_kept
+    assert scaled(library)(3.0) == 6.0
+    assert path.read_bytes() == whole
+
+
+def test_a_full_disk_costs_only_the_keeping(folder, monkeypatch):
+    def refuse(*_, **__):
+        raise OSError("no space left")
+
+    monkeypatch.setattr(compile_cache, "replace_file", refuse)
+    assert scaled(Library(text(factor=5.0)))(2.0) == 10.0
+    assert not list(folder.glob("*.o"))
+
+
+def test_another_processor_or_an_edit_makes_another_key(folder, monkeypatch):
+    compiled(["m"], text)
+    for name, value in (("host", lambda: ("generic", "")), ("source_digest", lambda: "edited")):
+        monkeypatch.setattr(native, "_libraries", {})
+        with monkeypatch.context() as patch:
+            patch.setattr(native, name, value)
+            assert not compiled(["m"], text).was_kept
+    monkeypatch.setattr(native, "_libraries", {})
+    assert compiled(["m"], text).was_kept
+
+
+def test_the_key_covers_every_text_that_code_is_written_by(tmp_path, monkeypatch):
+    for name in ("effects", "codegen/cache", "plant"):
+        (tmp_path / name).mkdir(parents=True)
+        (tmp_path / name / "law.py").write_text("x = 1\n")
+    monkeypatch.setattr(
+        compile_cache, "__file__", str(tmp_path / "codegen" / "cache" / "compile_cache.py")
+    )
+    digests = [compile_cache.source_digest.__wrapped__()]
+    for name in ("effects", "codegen/cache", "plant"):
+        (tmp_path / name / "law.py").write_text("x = 2\n")
+        digests.append(compile_cache.source_digest.__wrapped__())
+    (tmp_path / "effects" / "new.py").write_text("")
+    digests.append(compile_cache.source_digest.__wrapped__())
+    assert len(set(digests)) == 5
+
+
+def test_mistakes_are_named(folder):
+    with pytest.raises(KeyError, match="no function other in library small"):
+        Library(text(), "small").function("other", [])
+    with pytest.raises(RuntimeError, match="expected"):
+        Library("define nonsense")
+    assert len(list(folder.glob("*.o"))) == 1
+
+
+def test_a_module_may_call_the_c_library(folder):
+    from llvmlite import ir
+
+    module = ir.Module()
+    builder, (x,) = function(module, "run", [("x", DOUBLE)], DOUBLE)
+    cosine = ir.Function(module, ir.FunctionType(DOUBLE, [DOUBLE]), "cos")
+    builder.ret(builder.call(cosine, [x]))
+    assert Library(module).function("run", [ctypes.c_double], ctypes.c_double)(0.0) == 1.0
+
+
+def test_other_threads_run_during_a_call(folder):
+    from llvmlite import ir
+
+    module = ir.Module()
+    builder, (count,) = function(module, "run", [("count", INTEGER)], INTEGER)
+    state = variable(builder, INTEGER, integer(1))
+    with loop(builder, count):
+        now = builder.load(state, typ=INTEGER)
+        shifted = builder.xor(now, builder.shl(now, integer(13)))
+        shifted = builder.xor(shifted, builder.lshr(shifted, integer(7)))
+        builder.store(builder.xor(shifted, builder.shl(shifted, integer(17))), state)
+    builder.ret(builder.load(state, typ=INTEGER))
+    run = Library(module).function("run", [ctypes.c_int64], ctypes.c_int64)
+    thread = threading.Thread(target=run, args=(10**8,))
+    thread.start()
+    time.sleep(0.01)
+    assert thread.is_alive()
+    thread.join()
+
+
+def test_a_fresh_process_finds_what_another_kept_without_tracing(folder):
+    code = (
+        "import ctypes, sys\n"
+        "from pma_gym.codegen.machine.native import compiled\n"
+        f"library = compiled(['x'], lambda: {text()!r})\n"
+        "run = library.function('scaled', [ctypes.c_double], ctypes.c_double)\n"
+        "print(library.was_kept, run(2.0), 'pma_gym.codegen.graph' in sys.modules)"
+    )
+    env = {**os.environ, "PMA_GYM_CACHE": str(folder.parent)}
+    for kept in ("False", "True"):
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.split()[:2] == [kept, "4.0"]

@@ -1,0 +1,279 @@
+"""Effects of one's own: a file named by its user, checked, added, simulated."""
+
+import inspect
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pma_gym.codegen.trace import live_inputs
+from pma_gym.data.trial import Trial
+from pma_gym.effects import CATALOGUE, Effect, user_effects
+from pma_gym.effects.ports import EVERYTHING, PLACES
+from pma_gym.effects.user_effects import OwnEffectError, load_effects, source_of
+from pma_gym.integrator.equations import COMMANDS, ZERO
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import structure
+from pma_gym.plant.rigs.station import PORTS, write_equations
+from pma_gym.plant.statics import muscle_force
+
+HEAD = """
+from typing import Annotated, NamedTuple
+from pma_gym.effects import Effect
+from pma_gym.effects.arithmetic import where
+from pma_gym.units import Quantity
+"""
+DRAG = (
+    HEAD
+    + '''
+class Drag(NamedTuple):
+    """Parameters of `drag`."""
+
+    factor: Annotated[
+        float, Quantity("N s^2/mm^2", 0, 1, "assumption: 0.02", 0.0, usual=0.02)
+    ]
+
+def drag(velocity, p):
+    """Force as the square of speed."""
+    return -p.factor * velocity * abs(velocity)
+
+DRAG = Effect("drag", "slide_force", Drag, drag, signature="force as the square of speed")
+'''
+)
+
+
+@pytest.fixture(autouse=True)
+def only_what_was_there():
+    catalogue, sources = dict(CATALOGUE), dict(user_effects._sources)
+    yield
+    for known, before in ((CATALOGUE, catalogue), (user_effects._sources, sources)):
+        known.clear()
+        known.update(before)
+
+
+@pytest.fixture
+def write(tmp_path):
+    def written(text, name="mine.py"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return written
+
+
+def way(plant):
+    """Extension while the motor jumps, without noise."""
+    time = np.linspace(0.0, 0.5, 251)
+    commands = {
+        "motor_voltage": np.where(time > 0.0, 4.0, 2.0),
+        "regulator_voltage": np.full(len(time), plant.regulator_voltage(300e3)),
+    }
+    logged = plant.simulate(Trial(time=time, commands=commands, measurements={}), noise=False)
+    return logged.truth["extension"]
+
+
+def test_an_effect_of_ones_own_is_simulated(write, station):
+    (drag,) = load_effects(write(DRAG))
+    assert isinstance(drag, Effect) and CATALOGUE["drag"] is drag
+    assert "velocity * abs(velocity)" in inspect.getsource(drag.law)
+    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}})
+    slow, plain = way(Plant(model)), way(station)
+    assert (plain - slow).max() > 1e-3
+    assert slow[-1] == pytest.approx(plain[-1], abs=2e-5)
+    absent = Plant(station.model.with_effects(["drag"]))
+    np.testing.assert_array_equal(way(absent), plain)
+
+
+def test_the_example_of_the_documentation_works(write):
+    page = Path(__file__).parents[2] / "docs" / "physics" / "effects.md"
+    (example,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
+    (drag,) = load_effects(write(example))
+    assert drag.name == "drag" and drag.usual.factor == pytest.approx(2e4)
+
+
+def test_loading_a_file_again_changes_nothing(write):
+    path = write(DRAG)
+    first, second = load_effects(path), load_effects(str(path))
+    assert [a is b for a, b in zip(first, second, strict=True)] == [True]
+
+
+def test_a_changed_file_is_compiled_anew(write, station):
+    path, given = write(DRAG), {"drag": {"factor_n_s2_per_mm2": 0.02}}
+    load_effects(path)
+    before = (
+        structure(station.model.with_effects(given)),
+        way(Plant(station.model.with_effects(given))),
+    )
+    write(DRAG.replace("-p.factor *", "-3.0 * p.factor *"))
+    load_effects(path)
+    after = (
+        structure(station.model.with_effects(given)),
+        way(Plant(station.model.with_effects(given))),
+    )
+    assert before[0] != after[0]
+    assert (before[1] - after[1]).max() > 1e-3
+    assert source_of("hysteresis") == ""
+
+
+def test_numbers_from_elsewhere_are_part_of_the_key(write, tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "mine_constants.py").write_text("SHARE = 0.5\n")
+    text = DRAG.replace("-p.factor", "-SHARE * p.factor") + "\n"
+    path = write("from mine_constants import SHARE\n" + text)
+    load_effects(path)
+    first = source_of("drag")
+    del CATALOGUE["drag"], user_effects._sources["drag"]
+    import mine_constants
+
+    monkeypatch.setattr(mine_constants, "SHARE", 0.7)
+    load_effects(path)
+    assert source_of("drag") != first
+
+
+def test_a_force_of_the_muscle_that_depends_on_speed_has_a_static_force(write, station):
+    load_effects(write(DRAG.replace("slide_force", "muscle_force")))
+    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}})
+    at = np.array([300e3]), np.array([0.03])
+    assert muscle_force(model)(*at) == muscle_force(station.model)(*at)
+    Plant(model).settle(2.0, 300e3)
+
+
+def broken(old, new):
+    assert old in DRAG
+    return DRAG.replace(old, new)
+
+
+NEUTRAL = '"assumption: 0.02", 0.0, usual=0.02'
+BROKEN = {
+    "text": ("def drag(:", r"cannot be run: SyntaxError.*line 1"),
+    "name": ("x = 1 / 0", r"cannot be run: ZeroDivisionError: division by zero \(line 1\)"),
+    "exit": ("raise SystemExit(3)", r"cannot be run: SystemExit"),
+    "nothing": (HEAD, r"defines no effect; write NAME = Effect"),
+    "taken": (broken('"drag"', '"creep"'), r"\[creep\] has a name that the catalogue has already"),
+    "word": (broken('"drag"', '"my drag"'), r"needs a name of letters, digits and _"),
+    "port": (
+        broken("slide_force", "muscle"),
+        r"acts at port 'muscle'; effects can be added at mus",
+    ),
+    "replaced": (broken("slide_force", "cable"), r"acts at port 'cable'; effects can be added at"),
+    "signal": (
+        broken("drag(velocity, p)", "drag(velocity, load, p)"),
+        r"cannot know load; at port",
+    ),
+    "memory": (broken("drag(velocity, p)", "drag(memory, velocity, p)"), r"cannot know memory"),
+    "neutral": (broken(NEUTRAL, NEUTRAL.replace(" 0.0,", " None,")), r"is never absent"),
+    "usual": (broken(", usual=0.02", ""), r"gives no usual value to factor"),
+    "same": (broken("usual=0.02", "usual=0"), r"is absent at its usual values"),
+    "held": (
+        broken("drag, sig", 'drag, held=("width",), sig'),
+        r"holds width, which are none of fac",
+    ),
+    "plain": (broken("factor: Annotated", "factor: float\n    other: Annotated"), r"no NamedTuple"),
+    "branch": (broken("return -", "return 0.0 if velocity > 0.0 else -"), r"cannot be compiled"),
+    "math": (broken("abs(velocity)", "__import__('math').sin(velocity)"), r"use \+ - \* / abs"),
+    "default": (
+        broken("usual=0.02)\n    ]", "usual=0.02)\n    ] = 3.0"),
+        r"gives factor a default of 3.0 \(SI\) and another usual value, 0.02 N s\^2/mm\^2",
+    ),
+    "there": (broken("return -", "return 5.0 - "), r"gives 5 at velocity 0.1 \(SI\), and 0 would"),
+    "lawless": (broken("Drag, drag, sig", "Drag, sig"), r"has no law; give law="),
+    "twice": (DRAG + "\nMORE = Effect('drag', 'slide_force', Drag, drag)\n", r"is there twice"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_cannot_be_used_is_refused_with_its_mend(name, write):
+    text, message = BROKEN[name]
+    path, before = write(text), dict(CATALOGUE)
+    with pytest.raises(OwnEffectError, match=message) as told:
+        load_effects(path)
+    assert str(path) in str(told.value)
+    assert before == CATALOGUE
+
+
+def test_a_file_that_is_none_is_refused(tmp_path):
+    with pytest.raises(OwnEffectError, match=r"cannot be read .*; name a Python file"):
+        load_effects(tmp_path / "nothing.py")
+    (tmp_path / "notes.txt").write_text("x = 1")
+    with pytest.raises(OwnEffectError, match=r"its name must end in .py"):
+        load_effects(tmp_path / "notes.txt")
+
+
+def test_two_files_cannot_have_one_name(write):
+    first = write(DRAG)
+    load_effects(first)
+    with pytest.raises(OwnEffectError, match=r"has a name that .*mine.py has already; choose"):
+        load_effects(write(DRAG, "other.py"))
+
+
+MEMORY = (
+    HEAD
+    + """
+class Branch(NamedTuple):
+    size: Annotated[float, Quantity("1", 0, 10, "assumption: 1", 0.0, usual=1)]
+
+def law({signals}memory, p):
+    return {absent} + p.size * memory
+
+def rate({everything}, memory, p):
+    return 1e-9 * ({sum}), 1.0 + 0.0 * memory
+
+BRANCH = Effect("branch", "{port}", Branch, law, rate=rate)
+"""
+)
+
+
+@pytest.mark.parametrize("port", PLACES)
+def test_laws_may_know_what_the_table_says(port, write, station):
+    """Every signal at every port is one that the station has when it gets there."""
+    assert port in PORTS or port.startswith("sensor:")
+    place = PLACES[port]
+    known = {
+        "signals": "".join(f"{name}, " for name in place.signals),
+        "absent": place.absent if isinstance(place.absent, str) else f"{place.absent!r}",
+        "everything": ", ".join(EVERYTHING),
+        "sum": " + ".join(EVERYTHING),
+        "port": port,
+    }
+    if isinstance(place.absent, float):
+        used = " + ".join(f"0.0 * {name}" for name in place.signals)
+        known["absent"] = f"{place.absent!r} + ({used})"
+    (effect,) = load_effects(write(MEMORY.format(**known)))
+    model = station.model.with_effects({"branch": {}})
+    equations = PlantEquations(model.effects, model.parameters)
+    write_equations(equations)
+    states = {entry.name for entry in equations.remembered}
+    inputs = live_inputs([state.rate for state in equations.states])
+    inner = {"origin", "direction"}
+    plain = {v.data for v in inputs if "." not in v.data}
+    assert plain <= states | set(COMMANDS) | inner | {ZERO}
+    assert set(effect.memory_names) <= states
+    assert np.all(np.isfinite(Plant(model).settle(2.0, 300e3).state))
+
+
+def test_an_effect_with_a_memory_settles_and_runs(write, station):
+    text = DRAG.replace("def drag(velocity, p):", "def drag(memory, p):").replace(
+        "return -p.factor * velocity * abs(velocity)", "return -memory"
+    )
+    text = text.replace("drag, sig", "drag, rate=rate, sig").replace(
+        "DRAG =",
+        "def rate(velocity, p):\n    return 1e-3 * p.factor * velocity, 1.0 + 0.0 * velocity\n\n"
+        "DRAG =",
+    )
+    load_effects(write(text))
+    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 1.0}})
+    plant = Plant(model)
+    assert "memory_drag" in plant.states
+    assert (way(station) - way(plant)).max() > 1e-4
+
+
+def test_a_model_file_may_name_it(write, tmp_path, station):
+    from pma_gym.plant.model import dump_model
+
+    load_effects(write(DRAG))
+    model = station.model.with_effects({"drag": {"factor_n_s2_per_mm2": 0.02}})
+    (tmp_path / "model.toml").write_text(dump_model(model))
+    assert load_model(tmp_path / "model.toml").parameters["drag"] == model.parameters["drag"]

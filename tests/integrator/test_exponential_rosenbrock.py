@@ -1,0 +1,150 @@
+"""The exponential Rosenbrock method: its quotients, its order, and its stability."""
+
+from fractions import Fraction
+from math import factorial
+
+import numpy as np
+import pytest
+
+from benchmarks.convergence import FixedStep, orders, smooth_plant
+from pma_gym.codegen.graph import CHANGING, Graph
+from pma_gym.codegen.text import evaluate
+from pma_gym.integrator.equations import State
+from pma_gym.integrator.exponential_rosenbrock import (
+    BENT_PHI,
+    GAMMA,
+    HALF_PHI,
+    LINEAR_SHARE,
+    PHI,
+    STAGE,
+    STAGE_PHI,
+    TERMS,
+    step,
+)
+from tests.plant import smooth
+
+POLE = float(GAMMA)
+
+
+def phi(order, z):
+    """phi_order(z) by its power series."""
+    return sum(z**j / factorial(j + order) for j in range(40))
+
+
+def quotient(terms, z):
+    """sum_k b_k S^k W of a number z."""
+    w = 1.0 / (1.0 - POLE * z)
+    return POLE * w * sum(b * (w - 1.0) ** k for k, b in enumerate(terms))
+
+
+@pytest.mark.parametrize(
+    ("terms", "truth"),
+    [
+        (PHI, lambda z: phi(1, z)),
+        (STAGE_PHI, lambda z: 0.75 * phi(1, 0.75 * z)),
+        (HALF_PHI, lambda z: 0.5 * phi(1, 0.5 * z)),
+        (BENT_PHI, lambda z: 32 / 9 * phi(3, z)),
+    ],
+)
+def test_a_quotient_is_its_function_to_as_many_powers_as_it_has_terms(terms, truth):
+    sizes = np.array([0.2, 0.1, 0.05]) * np.exp(2.0j)
+    errors = np.abs([quotient(terms, z) - truth(z) for z in sizes])
+    assert np.log2(errors[:-1] / errors[1:]) == pytest.approx(len(terms), abs=0.2)
+
+
+def growth(z):
+    """What a step makes of exp(z)."""
+    return 1.0 + z * quotient(PHI, z)
+
+
+def test_the_error_of_the_exponential():
+    for z in (0.1, 0.1j, -0.1):
+        assert abs(growth(z) - np.exp(z)) == pytest.approx(1.4e-5 * 0.1**7, rel=0.1)
+
+
+def test_it_is_stable_up_to_84_degrees_and_damps_what_is_fast():
+    sizes = np.logspace(-3, 8, 2001)
+    for degrees in (0.0, 45.0, 60.0, 80.0, 84.0):
+        direction = -np.exp(1j * np.radians(degrees))
+        assert np.abs(growth(sizes * direction)).max() <= 1.0
+    assert abs(growth(-1e12)) == pytest.approx(0.457, abs=1e-3)
+    # An oscillation without any damping is let grow by steps that are too long for it.
+    assert 1.2 < np.abs(growth(1j * sizes)).max() < 1.3
+
+
+def test_the_stage_overshoots_nothing_that_is_fast():
+    # Less than twice the way to where it comes to rest, and nearly there at h rate = 5.
+    assert abs(1.0 - 1e12 * quotient(STAGE_PHI, -1e12)) < 2.0
+    assert abs(1.0 - 5.0 * quotient(STAGE_PHI, -5.0)) < 0.1
+    assert Fraction(0) < STAGE < 1
+
+
+def test_order_four_on_predator_and_prey():
+    found = smooth.orders(smooth.predator_and_prey(step))
+    assert np.all((3.7 < found) & (found < 4.5))
+
+
+def test_the_estimate_is_of_order_two_and_larger_than_the_error():
+    estimates, truths = smooth.in_one_step(smooth.predator_and_prey(step))
+    # In one step: h^3 of what is not linear, h^5 of order 4.
+    assert np.log2(estimates[:-1] / estimates[1:])[-2:] == pytest.approx(3.0, abs=0.1)
+    assert np.log2(truths[:-1] / truths[1:])[-2:] == pytest.approx(5.0, abs=0.4)
+    assert np.all(5.0 * truths < estimates)
+
+
+def test_half_a_step_is_known_on_the_way():
+    made = smooth.predator_and_prey(step)
+    errors = []
+    for size in (0.1, 0.05, 0.025):
+        half = evaluate(made.visited[0], {"x": 2.0, "y": 1.5, "size": size})
+        truth = smooth.marched(made, 0.5 * size, 64)
+        errors.append(np.abs(np.array([float(v) for v in half]) - truth).max())
+    # Without what is not linear: h^3.
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(3.0, abs=0.2)
+
+
+@pytest.mark.parametrize("rate", [1.0, 1e3, 1e8])
+def test_what_is_linear_decays_whatever_its_rate(rate):
+    graph = Graph()
+    x, size = graph.input("x", CHANGING), graph.input("size", CHANGING)
+    made = step([State("x", x, -rate * x, 1.0)], size, {}, {})
+    (after,) = evaluate(made.states, {"x": 1.0, "size": 0.1})
+    assert float(after) == pytest.approx(growth(-0.1 * rate), abs=1e-10)
+    assert abs(float(after)) <= 1.0
+
+
+def test_an_oscillation_is_exact_to_order_six():
+    graph = Graph()
+    x, v, size = (graph.input(name, CHANGING) for name in ("x", "v", "size"))
+    made = step([State("x", x, v, 1.0), State("v", v, -x, 1.0)], size, {}, {})
+    errors, estimates = [], []
+    for length in (1.0, 0.5, 0.25):
+        given = {"x": 1.0, "v": 0.0, "size": length}
+        place, speed = (float(value) for value in evaluate(made.states, given))
+        errors.append(np.hypot(place - np.cos(length), speed + np.sin(length)))
+        there, faster = (float(error) for error in evaluate(made.errors, given))
+        estimates.append(np.hypot(there, faster))
+    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(7.0, abs=0.2)
+    assert np.log2(np.divide(estimates[:-1], estimates[1:])) == pytest.approx(TERMS, abs=0.4)
+    assert LINEAR_SHARE < 1.0 and np.all(np.array(errors) < estimates)
+
+
+@pytest.mark.parametrize("damping", [0.05, 2.9, 14.5])
+def test_order_four_on_the_plant(damping):
+    # 14.5 N s/mm is 29 000 1/s of damping over mass: 116 times these steps, and no loss of order.
+    # Most of the plant is linear, and of order 6.
+    errors, found = orders(damping, np.array([4e-3, 2e-3, 1e-3]))
+    assert np.all(3.8 < found)
+    assert errors[0].max() < 1e-6
+
+
+def test_the_plants_estimate_is_of_order_two():
+    plant = smooth_plant(2.9)
+    rest, regulator = plant.settle(4.0, 400e3), plant.regulator_voltage(400e3)
+    fixed = FixedStep(plant)
+    estimates = []
+    for size in 4e-4 * 0.5 ** np.arange(4):
+        _, errors = fixed(rest.state, (4.5, 0.0), (regulator, 0.0), rest.zero_contraction, size)
+        estimates.append(abs(errors[plant.states.index("spin")]))
+    found = np.log2(np.divide(estimates[:-1], estimates[1:]))
+    assert np.all(2.8 < found)

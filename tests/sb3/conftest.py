@@ -1,0 +1,5 @@
+"""Models as those of `tests/envs`."""
+
+from tests.envs.conftest import fragile
+
+__all__ = ["fragile"]
