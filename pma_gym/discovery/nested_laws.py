@@ -4,10 +4,11 @@ The profile of a parameter is chi-square with the parameter held and all others 
 stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far above all speeds),
 the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
 value is given for it, only the bound that the profile has on the other side. An effect may also
-say that a simpler law of its own sets one parameter equal to another (`Effect.ties`).
+say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
+stays where it explains more than its further parameters cost.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,7 +18,8 @@ from pma_gym.discovery.errors import covariance
 from pma_gym.discovery.fits import Bench, Fitted
 from pma_gym.discovery.parameters import unit, values
 from pma_gym.discovery.profile_limits import limits
-from pma_gym.discovery.suspects import Suspect, bounds
+from pma_gym.discovery.suspect_fits import cost
+from pma_gym.discovery.suspects import Suspect
 from pma_gym.effects import CATALOGUE
 
 FLAT = 4.0
@@ -28,6 +30,9 @@ UNSURE = 3.0
 
 EQUAL = 1e-3
 """Share by which two parameters that are held equal may differ in the end."""
+
+ROUNDS = 5
+"""How often they are held equal anew, each time at what the other became."""
 
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
@@ -50,22 +55,18 @@ class Nested:
     undetermined: Mapping[str, Undetermined]
 
 
-def nested(
-    bench: Bench, fit: Fitted, chosen: Chosen, progress: Callable[[int, int], None]
-) -> Nested:
+def nested(bench: Bench, fit: Fitted, chosen: Chosen) -> Nested:
     """Take from effects what the trials do not determine, one parameter after the other.
 
     Args:
         bench: the trials, with the noise that the fit leaves.
         fit: of the model with the effects.
         chosen: the effects.
-        progress: called with the number of parameters that were looked at, and of all.
     """
     state = Nested(chosen, fit, {})
     paths = [path for suspect in chosen for path in suspect.fitted_paths]
     state = _all_tied(bench, state)
-    for number, path in enumerate(paths):
-        progress(number, len(paths))
+    for path in paths:
         state = _left(bench, state, path) or state
     # What only mattered together with a parameter that has left does nothing any more.
     state = _all_tied(bench, state)
@@ -157,11 +158,12 @@ def _tied(bench: Bench, state: Nested, place: int) -> Nested | None:
     stems = {doors[path.partition(".")[2]]: path for path in suspect.fitted_paths}
     for one, other, *idle in CATALOGUE[suspect.effect].ties:
         path, twin = stems.get(one), stems.get(other)
-        if path is None or twin is None or not _may_be_equal(state.fit, path, twin):
+        if path is None or twin is None:
             continue
         rest = [stems[stem] for stem in idle if stem in stems]
         found = _equal(bench, state, place, (path, twin), rest)
-        if found is not None and _flat(state.fit, found.fit):
+        # What the whole law explains more must be worth its parameters, as anywhere.
+        if found is not None and cost(found.fit) < cost(state.fit):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
             return replace(found, undetermined={**state.undetermined, **known})
     return None
@@ -175,26 +177,16 @@ def _equal(
     idle = dict(zip(rest, values(state.fit.model, rest).tolist(), strict=True))
     best: Nested | None = None
     for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
-        for _ in range(3):
+        for _ in range(ROUNDS):
             found = _held(bench, state, place, {path: size} | idle, {twin: size})
             if found is None:
                 break
             before, size = size, found.fit.estimate(twin)[0]
-            if best is None or found.fit.chi_square < best.fit.chi_square:
-                best = found
             if abs(size - before) < EQUAL * abs(size):
+                if best is None or found.fit.chi_square < best.fit.chi_square:
+                    best = found
                 break
     return best
-
-
-def _may_be_equal(fit: Fitted, path: str, twin: str) -> bool:
-    """Whether two parameters differ by no more than their errors allow, or one is at a bound."""
-    (one, error), (other, second) = fit.estimate(path), fit.estimate(twin)
-    lower, upper = bounds([path, twin])
-    ends = np.isclose((one, other), upper) | np.isclose((one, other), lower)
-    if ends.any() or not (np.isfinite(error) and np.isfinite(second)):
-        return True
-    return abs(one - other) < UNSURE * float(np.hypot(error, second))
 
 
 def _place(chosen: Chosen, path: str) -> int:

@@ -205,12 +205,8 @@ class _Work:
         """Without the parameters of effects that the trials do not determine."""
         if not selection.chosen:
             return selection
-        less = nested(
-            selection.bench,
-            selection.fit,
-            selection.chosen,
-            lambda done, total: self._tell("nested laws", done, total),
-        )
+        # Where all is determined it takes milliseconds, else a few fits: no step of its own.
+        less = nested(selection.bench, selection.fit, selection.chosen)
         return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
 
     def _confirmed(self, found: Findings) -> Findings:

@@ -50,14 +50,10 @@ def fit_of(static, dynamic, speed, begun):
     return bench, found
 
 
-def nothing(*_):
-    """No progress to tell."""
-
-
 def test_friction_of_one_size_has_one_number():
     """One that falls with the speed is at its bound, or anywhere, and is said to be neither."""
     bench, fit = fit_of(12.0, 12.0, 5.0, (40.0, 11.0, 0.02))
-    less = nested(bench, fit, (DRY,), nothing)
+    less = nested(bench, fit, (DRY,))
     assert set(less.undetermined) == {STATIC, SPEED}
     assert less.chosen[0].fitted_paths == [DYNAMIC]
     assert less.fit.chi_square < fit.chi_square + FLAT
@@ -68,7 +64,7 @@ def test_friction_of_one_size_has_one_number():
 
 def test_friction_that_falls_with_the_speed_keeps_its_law():
     bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
-    less = nested(bench, fit, (DRY,), nothing)
+    less = nested(bench, fit, (DRY,))
     assert not less.undetermined
     assert less.fit is fit
 
@@ -82,7 +78,7 @@ def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)
     fit = bench.fit(SLIDE, (DRY,), {DRY.name: begun})
     assert fit is not None
-    less = nested(bench, fit, (DRY,), nothing)
+    less = nested(bench, fit, (DRY,))
     assert SPEED in less.undetermined
     known = less.undetermined[SPEED]
     assert known.below is None and known.unit == "mm/s"
