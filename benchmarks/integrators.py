@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.accuracy import POSITION_LIMIT, POSITIONS, STATE_LIMIT
+from benchmarks.accuracy.job import POSITION_LIMIT, POSITIONS, STATE_LIMIT
+from benchmarks.accuracy.reference import TRIALS, Commands, reference, shares
 from benchmarks.files import write_text
 from benchmarks.methods import DORMAND_PRINCE, EXPRB43, GRK4T, RK4, RODAS4, ROS4L, Stepper
 from benchmarks.prototype import Prototype, operations, slow_share
-from benchmarks.reference import TRIALS, Commands, reference, shares
 from benchmarks.rosenbrock import VELDHUIZEN, Method
 from benchmarks.rosenbrock import step as rosenbrock_step
 from benchmarks.speed.rows import EVALUATIONS

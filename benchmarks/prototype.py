@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.accuracy.reference import Commands, switches
 from benchmarks.methods import Stepper
-from benchmarks.reference import Commands, switches
 from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import FIXED, HELD, Value
 from pma_gym.codegen.substitute import substitute

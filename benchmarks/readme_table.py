@@ -16,8 +16,8 @@ from typing import Annotated, Any
 import typer
 
 from benchmarks.files import write_text
-from benchmarks.hidden_effects.readme import hidden_effects
-from benchmarks.score import PHASES, UNITS
+from benchmarks.hidden_effects.evaluation.readme import hidden_effects
+from benchmarks.reproduction.score import PHASES, UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = (ROOT / "README.md", ROOT / "docs" / "benchmark.md")

@@ -15,7 +15,7 @@ from controllers.mpc import PreviewMPC
 from controllers.oracle import Oracle
 from controllers.pid import PID
 from controllers.policy import Policy, PPOPolicy, ShippedPolicy
-from controllers.policy_with_ilc import PractisedPolicy
+from controllers.policy_with_ilc import PolicyWithILC
 from controllers.registry import CONTROLLERS
 from controllers.serres_feedforward import SerresFeedforward
 from controllers.serres_replay import SerresReplay
@@ -36,7 +36,7 @@ __all__ = [
     "Oracle",
     "PPOPolicy",
     "Policy",
-    "PractisedPolicy",
+    "PolicyWithILC",
     "PreviewMPC",
     "Reference",
     "ScheduledPressure",

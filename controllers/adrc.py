@@ -7,12 +7,12 @@ import numpy as np
 from controllers.design.designs import designed
 from controllers.models.nominal_motion import NominalMotion
 from controllers.models.voltage import nominal_offset
-from controllers.observers.extended_state_observer import LagObserver, Place
-from controllers.observers.observer_feedback import LagControl
+from controllers.observers.extended_state_observer import ExtendedStateObserver, Place
+from controllers.observers.observer_feedback import ObserverFeedback
 
 
 class Settings(NamedTuple):
-    """Settings of `ADRC`; bandwidths in units of 1 / reaction time (`LagObserver.pole`).
+    """Settings of `ADRC`; bandwidths in units of 1 / reaction time (`ExtendedStateObserver.pole`).
 
     Attributes:
         controller_bandwidth: omega_c: of the error that is left once d is cancelled.
@@ -38,7 +38,7 @@ DEFAULTS = {
 """Settings by kind of task for what `controllers/design/designs.json` does not give."""
 
 
-class ADRC(LagControl[Settings]):
+class ADRC(ObserverFeedback[Settings]):
     """Cancels an estimated disturbance, and is left with a known lag to control.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
@@ -53,8 +53,8 @@ class ADRC(LagControl[Settings]):
 
         v = -K x - d - d' T / 2,   K such that all poles of x lie at exp(-omega_c T)
 
-    on top of the feed-forward. What is sent is held to 0-10 V, and the observer is told what was
-    sent: nothing winds up.
+    on top of the feed-forward. What is sent is held to 0-10 V, and the observer receives what was
+    sent, so nothing winds up.
 
     It departs from Han's form, x^(n) = f + b_0 v, in that the known lags are not left to f, and so
     are not to be estimated: at 10 to 40 ms of reaction against lags of 50 ms the observer would be
@@ -77,7 +77,7 @@ class ADRC(LagControl[Settings]):
         >>> controller, ended, info = ADRC(), False, {}
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.05
         True
@@ -96,7 +96,7 @@ class ADRC(LagControl[Settings]):
         self._motion, self._share = motion, settings.feedforward
         self._bandwidth = settings.controller_bandwidth
         self._offset = nominal_offset(motion.station)
-        self._observer = LagObserver(motion, settings.observer_bandwidth)
+        self._observer = ExtendedStateObserver(motion, settings.observer_bandwidth)
         self._feedback = [self._gains_of(place) for place in self._observer.places]
 
     def _gains_of(self, place: Place) -> np.ndarray:

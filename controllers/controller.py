@@ -1,9 +1,9 @@
-"""What a controller is: told the reference and the station, then asked for volts."""
+"""The controller protocol: `reset` with the reference and the station, `act` for each voltage."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -25,7 +25,7 @@ class Controller(Protocol):
 
     name: str
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Args:
@@ -33,11 +33,11 @@ class Controller(Protocol):
             station: nominal model, task, pressure, control period.
         """
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage of the task's actuator (V, 0-10) to hold for the next control period.
 
         Args:
-            observation: what the sensors say (SI).
+            measurement: what the sensors say (SI).
             time: time since the trial began (s).
         """
         ...
@@ -52,7 +52,7 @@ class LinearController(Controller, Protocol):
     are left out: they move no margin.
     """
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position: voltage (V) by error (m or rad).
 
         In discrete time, one input, one output, sampled at `station.period`, such that the loop of
@@ -61,7 +61,7 @@ class LinearController(Controller, Protocol):
         plant, unless the controller itself waits. Needs no `reset`.
 
         Args:
-            station: what the controller is told.
+            station: the station as the controller knows it.
             position: where on the stroke (m or rad).
         """
         ...

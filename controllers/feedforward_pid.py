@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Protocol
 from controllers.controller import Reference
 from controllers.design.gains import Gains
 from controllers.improved_feedforward import ImprovedFeedforward
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 
 if TYPE_CHECKING:
     pass
@@ -15,7 +15,7 @@ from controllers.pid import PID
 class OpenLoop(Protocol):
     """What gives a voltage by time alone, such as `ImprovedFeedforward`."""
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial."""
 
     def voltage(self, time: float) -> float:
@@ -40,7 +40,7 @@ class FeedforwardPID(PID):
         super().__init__(gains)
         self._open_loop = open_loop or ImprovedFeedforward()
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """As `PID.reset`, and compute the feed-forward, which holds the drive's offset itself."""
         super().reset(reference, station)
         self._open_loop.reset(reference, station)

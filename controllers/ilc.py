@@ -12,10 +12,10 @@ from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.gains import scheduled_gains
 from controllers.feedforward_pid import FeedforwardPID
-from controllers.models.lifted_model import LiftedPlant
+from controllers.models.lifted_model import LiftedModel
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.observers.extended_state_observer import LOOSE_N
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class Settings(NamedTuple):
@@ -97,7 +97,7 @@ class ILC:
         ...     _, ended = env.reset(seed=300), False
         ...     controller.reset(env.reference, env.station)
         ...     while not ended:
-        ...         volts = controller.act(env.reading, env.time)
+        ...         volts = controller.act(env.measurement, env.time)
         ...         *_, ended, info = env.step(env.action(volts))
         ...     left.append(info["rmse_mm"])
         >>> left[2] < 0.5 * left[0]
@@ -114,12 +114,12 @@ class ILC:
 
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
-        self._practice = Practice(self.repetitions)
+        self._learning_trials = LearningTrials(self.repetitions)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Learn from the trial before, or begin anew."""
         motion = nominal_motion(reference, station)
-        if self._practice.goes_on(motion):
+        if self._learning_trials.goes_on(motion):
             self._learn()
         else:
             self._motion = motion
@@ -137,13 +137,13 @@ class ILC:
         )
         self._pid.reset(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
-        voltage = self._pid.act(observation, time)
+        voltage = self._pid.act(measurement, time)
         expected = self._motion.expected(time - self._late)
-        self._errors.append(expected - self._position(observation))
+        self._errors.append(expected - self._position(measurement))
         self._added.append(voltage - self._pid.feedforward(time))
-        self._taut.append(observation.load >= self._loose)
+        self._taut.append(measurement.load >= self._loose)
         return voltage
 
     def _learn(self) -> None:
@@ -155,7 +155,7 @@ class ILC:
         if count < LEAST_STEPS:
             return
         # A voltage sent in step k shows in the errors from step k + late + 1 on.
-        plant = LiftedPlant(motion, late, count)
+        plant = LiftedModel(motion, late, count)
         errors = np.array(self._errors[late:])
         without = errors + plant.response(np.array(self._added[:count]))
         taut = tight(self._taut[late:])
@@ -172,11 +172,11 @@ class ILC:
         self.learned = reachable - volts
 
 
-class Practice:
+class LearningTrials:
     """Counts the trials on one station and reference.
 
     Args:
-        repetitions: after how many practice begins anew.
+        repetitions: after how many learning begins anew.
 
     Attributes:
         trials: how many there were, with the one that has begun last.
@@ -199,7 +199,7 @@ class Practice:
         return goes_on
 
 
-def loose_load(station: Station) -> float:
+def loose_load(station: StationInfo) -> float:
     """Load (N) below which the cable may be slack, so that the position says nothing."""
     return LOOSE_N if station.task.protocol.quantity == "rotation" else -math.inf
 
@@ -213,9 +213,9 @@ def tight(taut: Sequence[bool]) -> NDArray[np.bool_]:
     Args:
         taut: by step, whether the load cell says so.
     """
-    found = np.array(binary_opening(taut, np.ones(TIGHT_STEPS)), bool)
-    found[1:] &= found[:-1].copy()
-    return found
+    pulling = np.array(binary_opening(taut, np.ones(TIGHT_STEPS)), bool)
+    pulling[1:] &= pulling[:-1].copy()
+    return pulling
 
 
 class LearningGain:
@@ -254,7 +254,7 @@ class _Learned:
         self._motion, self._learned = motion, learned.tolist()
         self._period = motion.station.period
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Nothing to compute."""
 
     def voltage(self, time: float) -> float:

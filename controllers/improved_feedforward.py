@@ -3,7 +3,7 @@
 from controllers.controller import Reference
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class ImprovedFeedforward:
@@ -26,11 +26,11 @@ class ImprovedFeedforward:
     def __init__(self) -> None:
         self._motion: NominalMotion | None = None
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute the voltages of the whole trial, or take them as computed before."""
         self._motion = nominal_motion(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) to send now, for it is in force the action delay later."""
         assert self._motion is not None, "reset comes first"
         return min(max(self._motion.command(time), 0.0), VOLTAGE_LIMIT)

@@ -19,7 +19,7 @@ from controllers.observers.deviation_filter import (
     Unknowns,
     with_disturbance,
 )
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -45,16 +45,16 @@ class Settings(NamedTuple):
     Attributes:
         effort: weight r of a volt squared, where a position's error counts as the volts that hold
             it.
-        agitation: standard deviation of the voltage that shakes the plant in a period (V).
+        process_noise: standard deviation of the voltage that shakes the plant in a period (V).
         disturbance: of the unknown voltage's change in a second (V/s^0.5).
     """
 
     effort: float
-    agitation: float
+    process_noise: float
     disturbance: float
 
 
-BOUNDS = {"effort": (0.15, 10.0), "agitation": (0.02, 0.3), "disturbance": (0.01, 0.2)}
+BOUNDS = {"effort": (0.15, 10.0), "process_noise": (0.02, 0.3), "disturbance": (0.01, 0.2)}
 """Bounds of a search. Bolder settings than these swing from limit to limit at 50 Hz with 20 ms of
 delay where a station has a third of the nominal damping, whose interval is that wide."""
 
@@ -79,7 +79,7 @@ class LQG:
     k minimises the sum of (y / g)^2 + r v^2 along the linearised plant, g its static gain: the
     solution of the discrete Riccati equation at 11 places of the stroke, mixed between them. That
     d and s H are made good is the integral action, for the filter integrates what surprises it
-    into them. It is told u as held to its limits, so that nothing winds up.
+    into them. It receives u as held to its limits, so that nothing winds up.
 
     Before the first pull the rotor alone is controlled, by a model of its own and with little
     force, for nothing brakes it. On a cable that goes slack later the plan alone drives it. Where
@@ -96,7 +96,7 @@ class LQG:
         >>> controller, ended = LQG(), False
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, broken, ended, info = env.step(env.action(volts))
         >>> broken, info["rmse_mm"] < 0.05
         (False, True)
@@ -111,12 +111,12 @@ class LQG:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the nominal motion and its gains, and estimate anew."""
         settings = self._settings(station)
         self._motion = nominal_motion(reference, station)
         self._stroke, self._period = self._motion.stroke, station.period
-        unknowns = Unknowns(settings.agitation, settings.disturbance)
+        unknowns = Unknowns(settings.process_noise, settings.disturbance)
         self._filter = DeviationFilter(self._motion, unknowns)
         self._behind = 0.0
         self._gains = _scheduled(self._stroke, settings.effort)
@@ -129,13 +129,13 @@ class LQG:
             weight = lengths / self._stroke.models[0].gain
             self._free_gains = regulator(a, free[1], weight, settings.effort)
 
-    def _settings(self, station: Station) -> Settings:
+    def _settings(self, station: StationInfo) -> Settings:
         return self._given or designed(self.name, station, DEFAULTS)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) to send now."""
         estimator = self._filter
-        estimator.see(observation)
+        estimator.update(measurement)
         state, due = estimator.ahead()
         if estimator.alone:
             feedback = self._of_rotor(state)
@@ -173,7 +173,7 @@ class LQG:
         far = behind < -FAR_SHARE * self._motion.station.task.protocol.span
         return FREE_MOST_V if far and behind < self._behind else 0.0
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) once the filter has settled: volts by error.
 
         With s frozen and what it may change in a second counted as d's. The controller predicts
@@ -186,7 +186,7 @@ class LQG:
         at = motion.stroke.nearest(position)
         local, held = motion.stroke.models[at], motion.stroke.volts[at]
         drift = np.hypot(settings.disturbance, SHARE * held / SHARE_TIME_S**0.5)
-        steady = Unknowns(settings.agitation, float(drift))
+        steady = Unknowns(settings.process_noise, float(drift))
         late = round((station.action_delay + station.observation_delay) / station.period)
         gains = regulator(local.a, local.b, 1.0 / local.gain, settings.effort)
         observer = steady_gain(local, steady, motion.noise, station.period)
@@ -228,7 +228,7 @@ def steady_gain(local: LocalModel, unknowns: Unknowns, noise: float, period: flo
         period: control period (s).
     """
     whole, push = with_disturbance(local)
-    driven = unknowns.agitation**2 * np.outer(push, push)
+    driven = unknowns.process_noise**2 * np.outer(push, push)
     driven[-1, -1] += unknowns.disturbance**2 * period
     seen = np.eye(len(push))[:, :1]
     spread = solve_discrete_are(whole.T, seen, driven, np.array([[noise**2]]))

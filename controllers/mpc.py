@@ -9,12 +9,12 @@ from controllers.controller import Reference
 from controllers.design.designs import designed
 from controllers.design.quadratic_program import BoundedProgram
 from controllers.models.linear_motion import linear_motion
-from controllers.models.model_key import Nominal
+from controllers.models.model_key import ModelKey
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.voltage import VOLTAGE_LIMIT
 from controllers.observers.filter_bank import DampingBank
 from controllers.observers.filter_bank_design import BankDesign, bank_design
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.compiled_model import regulator_voltage
 
 
@@ -66,7 +66,7 @@ class PreviewMPC:
         0 <= u_ff + v <= 10 V
 
     commanding the first of them. G varies along the motion (linear time-varying); h^2, the mean of
-    G' G's diagonal, makes rho the same number on every station. f holds what is foreseen without
+    G' G's diagonal, makes rho the same number on every station. f holds what is predicted without
     v: the error of the nominal motion, the estimated deviation, the unknown forces. With delays,
     the commands on their way are part of f, and the first voltage is that of the period in which
     it will be in force. The motor cannot push: the lower limit is where the drive, with the offset
@@ -96,7 +96,7 @@ class PreviewMPC:
         >>> controller.reset(env.reference, env.station)
         >>> ended = False
         >>> while not ended:
-        ...     *_, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+        ...     *_, ended, info = env.step(env.action(controller.act(env.measurement, env.time)))
         >>> info["rmse_mm"] < 0.05
         True
     """
@@ -106,7 +106,7 @@ class PreviewMPC:
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Foresee the trial: the nominal motion, the filters' gains, how voltages act.
 
         Raises:
@@ -128,9 +128,9 @@ class PreviewMPC:
         self._effort = self.settings.effort * changes.T @ changes
         self._entries = np.tril_indices(trial.horizon)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage of the task's actuator (V) to hold for the next control period."""
-        self._bank.see(observation, self._sent)
+        self._bank.update(measurement, self._sent)
         volts = self._volts(round(time / self._period) + self._delay)
         self._sent.append(volts)
         return volts
@@ -155,8 +155,8 @@ class PreviewMPC:
     ) -> tuple[np.ndarray, np.ndarray]:
         """H and q of the program for the periods from `first` on."""
         design, count = self._design, self._count
-        foreseen = (design.ahead[:, first, 1:] @ estimates[:, :, None])[:, :, 0]
-        free = weights @ (foreseen + design.carried[:, first, 1:])
+        predicted = (design.ahead[:, first, 1:] @ estimates[:, :, None])[:, :, 0]
+        free = weights @ (predicted + design.carried[:, first, 1:])
         free += design.motion.error[first + 1 : first + 1 + count]
         response = np.tensordot(weights, design.response[:, first : first + count], 1)
         ends, begins = self._entries
@@ -172,14 +172,14 @@ class PreviewMPC:
 class _Trial:
     """What a design depends on, equal to every other of which it is the same."""
 
-    def __init__(self, reference: Reference, station: Station, settings: Settings) -> None:
+    def __init__(self, reference: Reference, station: StationInfo, settings: Settings) -> None:
         self.station, self.settings, task = station, settings, station.task
         self.needed = nominal_motion(reference, station).volts
         times = station.period * np.arange(len(self.needed) + 1)
         self.wanted = np.array([reference(time) for time in times.tolist()])
         self.horizon = max(2, round(settings.horizon / station.period))
         self.delay = round(station.action_delay / station.period)
-        said = Nominal(station.model), task.protocol.quantity, task.load, station.pressure
+        said = ModelKey(station.model), task.protocol.quantity, task.load, station.pressure
         follows = self.needed.tobytes(), self.wanted.tobytes()
         self._key = *said, station.period, self.delay, settings, *follows
 

@@ -32,9 +32,9 @@ from controllers.controller import Reference
 from controllers.design.bounded_least_squares import Errors, Space, best_plan
 from controllers.design.horizon import horizon
 from controllers.models.nominal_motion import nominal_motion
-from controllers.models.prediction import PLANS, Commands, Foresight
+from controllers.models.prediction import PLANS, Commands, Prediction
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.units import SI_FACTORS
 
 if TYPE_CHECKING:
@@ -48,17 +48,17 @@ PUSHES_V = np.append(0.0, np.geomspace(0.01, 10.0, 13))
 class Oracle:
     """The predictive controller that knows everything but the future; see this module.
 
-    It drives no real station: it is shown the environment (`see`) before each `reset`.
+    It drives no real station: it receives the environment (`receive`) before each `reset`.
 
     Example:
         >>> from pma_gym.envs import PMAEnv
         >>> env, ended = PMAEnv("displacement", pressure_kpa=300), False
         >>> observation, info = env.reset(seed=1)
         >>> oracle = Oracle()
-        >>> oracle.see(env)
+        >>> oracle.receive(env)
         >>> oracle.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = oracle.act(env.reading, env.time)
+        ...     volts = oracle.act(env.measurement, env.time)
         ...     _, _, terminated, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.01
         True
@@ -69,7 +69,7 @@ class Oracle:
     def __init__(self) -> None:
         self._environment: PMAEnv | None = None
 
-    def see(self, environment: "PMAEnv") -> None:
+    def receive(self, environment: "PMAEnv") -> None:
         """Be shown the environment that it drives; after the environment's own reset."""
         self._environment = environment
 
@@ -80,7 +80,7 @@ class Oracle:
         copied.__dict__ |= copy.deepcopy(self.__dict__, memo)
         return copied
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Look at the true station, and compute what its inverse needs.
 
         Raises:
@@ -93,10 +93,10 @@ class Oracle:
         self._quantity = protocol.quantity
         delay = round(station.action_delay / station.period)
         # Commands on their way are the first of every plan, and fixed.
-        self._sent = np.full(delay, self._heard(environment))
+        self._sent = np.full(delay, self._delayed(environment))
         self._horizon = ahead = horizon(station.period, delay)
         times = station.period * (delay + np.append(-delay, ahead.ends / ahead.parts))
-        self._foresight = Foresight(plant, times)
+        self._prediction = Prediction(plant, times)
         needed = nominal_motion(reference, replace(station, model=plant.model)).volts
         self._zero = self._position_at_zero(environment)
         self._low = 0.0 if self._regulates else self._idle_voltage(environment)
@@ -105,7 +105,7 @@ class Oracle:
         self._plan = self._needed[delay : delay + len(ahead.blocks)]
 
     def _tabulate(
-        self, needed: NDArray[np.float64], reference: Reference, station: Station
+        self, needed: NDArray[np.float64], reference: Reference, station: StationInfo
     ) -> None:
         """Keep inverse and reference of the whole trial, and of a horizon beyond its end."""
         ahead, delay = self._horizon, len(self._sent)
@@ -115,7 +115,7 @@ class Oracle:
         self._wanted = np.array([reference(time) for time in times.tolist()])
         self._counts = np.where(times <= station.task.duration + 1e-9, 1.0 / self._unit, 0.0)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator, in force after the action delay."""
         begin = round(time / self._period) + len(self._sent)
         end = begin + len(self._plan)
@@ -165,11 +165,11 @@ class Oracle:
             else:
                 commands = Commands(held, regulator)
             # A copy: the next prediction is written over it.
-            return self._foresight(condition, commands, len(plans))[self._quantity].copy()
+            return self._prediction(condition, commands, len(plans))[self._quantity].copy()
 
         return errors
 
-    def _heard(self, environment: "PMAEnv") -> float:
+    def _delayed(self, environment: "PMAEnv") -> float:
         """What the actuator hears now (V)."""
         return environment.regulator_voltage if self._regulates else environment.motor_voltage
 
@@ -188,7 +188,7 @@ class Oracle:
         for _ in range(4):
             volts = np.linspace(low, high, PLANS)
             commands = Commands(volts[:, None], environment.regulator_voltage)
-            reached = self._foresight(environment.condition, commands, PLANS)[self._quantity]
+            reached = self._prediction(environment.condition, commands, PLANS)[self._quantity]
             moved = np.abs(reached[:, -1] - reached[0, -1]) > 1e-6 * self._unit
             first = max(1, int(np.argmax(moved)))
             low, high = float(volts[first - 1]), float(volts[first])
@@ -198,6 +198,6 @@ class Oracle:
         if self._environment is None:
             raise ValueError(
                 "oracle must be shown the environment, whose true station it knows; call "
-                "see(environment) before reset, or take a controller that needs the sensors alone"
+                "receive(environment) before reset, or take a controller that needs only sensors"
             )
         return self._environment

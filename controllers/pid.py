@@ -7,7 +7,7 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.design.gains import Gains, scheduled_gains
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -35,11 +35,11 @@ class PID:
     The derivative is of the error: on a ramp that of the measurement alone would push against
     the motion all the time, which the integral would have to make good.
 
-    Gains come from `controllers/design/gains.json`, where `benchmarks/tune.py` wrote them: of the
-    nearest loop (control rate and delay) and the kind of task, linear in pressure between the
-    pressures that it tuned at and constant beyond, and varying with the reference (`Gains.scaled`).
-    They are those under the model's name, else, for a model of one's own, those of the shipped
-    model of its plant (`station`, `cascade`).
+    Gains come from `controllers/design/gains.json`, where `benchmarks/tuning/tune.py` wrote them:
+    of the nearest loop (control rate and delay) and the kind of task, linear in pressure between
+    the pressures that it tuned at and constant beyond, and varying with the reference
+    (`Gains.scaled`). They are those under the model's name, else, for a model of one's own, those
+    of the shipped model of its plant (`station`, `cascade`).
 
     Args:
         gains: gains to use instead of the scheduled ones, in SI of the task.
@@ -55,7 +55,7 @@ class PID:
         self.gains = gains or Gains(0.0, 0.0, 0.0, 0.0)
         self._reference: Reference = lambda time: 0.0
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the gains of this model, task and pressure, and forget everything else.
 
         Raises:
@@ -70,11 +70,11 @@ class PID:
         self._integral = self._derivative = 0.0
         self._last_error: float | None = None
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
         period, reference = self._period, self._reference(time + self._ahead)
         gains = self.gains.scaled(reference / self._span)
-        error = reference - self._position(observation)
+        error = reference - self._position(measurement)
         change = 0.0 if self._last_error is None else error - self._last_error
         self._derivative = (gains.filter * self._derivative + gains.derivative * change) / (
             gains.filter + period
@@ -91,7 +91,7 @@ class PID:
         """Voltage added to that of the feedback (V); none here."""
         return 0.0
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad), without limits: volts by error."""
         import control
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 from controllers.controller import Reference
 from controllers.design.designs import loop_name, task_kind
-from controllers.policies.adapter import Pilot
+from controllers.policies.adapter import PolicyAdapter
 from controllers.policies.document import PolicyError
 from controllers.policies.network import Network
 from controllers.policies.policy_file import PolicyFile, load_policy_file
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 POLICIES = Path(__file__).parent / "policies" / "shipped"
 """Folder of the shipped policies, each called `{kind of task}-{loop}-{algorithm}`."""
@@ -38,9 +38,9 @@ class Policy:
         self.file = load_policy_file(path)
         self.name, self.anywhere = self.file.name, anywhere
         self._network = Network(self.file.weights)
-        self._pilot = Pilot(self.file.view, self.file.form)
+        self._adapter = PolicyAdapter(self.file.view, self.file.form)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Raises:
@@ -53,12 +53,12 @@ class Policy:
                 "the environment what it was trained for, or take a policy of this task and loop; "
                 "at another rate or delay it runs as Policy(path, anywhere=True)"
             )
-        self._pilot.reset(reference, station)
+        self._adapter.reset(reference, station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period."""
-        entries = self._pilot.see(observation, time)
-        return self._pilot.volts(float(self._network(entries)[0]))
+        entries = self._adapter.update(measurement, time)
+        return self._adapter.volts(float(self._network(entries)[0]))
 
 
 class ShippedPolicy:
@@ -78,7 +78,7 @@ class ShippedPolicy:
         self._policies: dict[str, Policy] = {}
         self._policy: Policy | None = None
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Take the policy for the station, and prepare it for a trial.
 
         Raises:
@@ -89,7 +89,7 @@ class ShippedPolicy:
         policy.reset(reference, station)
         self._policy = policy
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period.
 
         Raises:
@@ -97,9 +97,9 @@ class ShippedPolicy:
         """
         if self._policy is None:
             raise RuntimeError(f"policy {self.name} has no trial: call reset() before act()")
-        return self._policy.act(observation, time)
+        return self._policy.act(measurement, time)
 
-    def _chosen(self, station: Station) -> Policy:
+    def _chosen(self, station: StationInfo) -> Policy:
         # Gains of the nearest loop serve; a network's weights hold for the loop that made them.
         name = f"{task_kind(station)}-{loop_name(station)}-{self.name}"
         if name not in self._policies:
@@ -134,7 +134,7 @@ def shipped_policies(folder: Path = POLICIES) -> list[Path]:
     return sorted(folder.glob("*.json"))
 
 
-def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> list[str]:
+def differences(file: PolicyFile, station: StationInfo, anywhere: bool = False) -> list[str]:
     """What makes a station another one than a policy was trained for, in words.
 
     Args:
@@ -142,10 +142,10 @@ def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> l
         station: the station.
         anywhere: whether control rate and delays may differ.
     """
-    found = []
+    differing = []
     kind = task_kind(station)
     if kind != file.task:
-        found.append(f"the task's kind is {kind}, trained for {file.task}")
+        differing.append(f"the task's kind is {kind}, trained for {file.task}")
     trained = file.environment["kwargs"]
     if not anywhere:
         for what, came, wanted, unit in (
@@ -154,23 +154,23 @@ def differences(file: PolicyFile, station: Station, anywhere: bool = False) -> l
             ("observation delay", station.observation_delay, trained["observation_delay_s"], "s"),
         ):
             if not math.isclose(came, wanted, rel_tol=1e-6, abs_tol=1e-6):
-                found.append(f"the {what} is {came:g} {unit}, trained for {wanted:g} {unit}")
-    return found + _other_rows(file, station)
+                differing.append(f"the {what} is {came:g} {unit}, trained for {wanted:g} {unit}")
+    return differing + _other_rows(file, station)
 
 
-def _other_rows(file: PolicyFile, station: Station) -> list[str]:
+def _other_rows(file: PolicyFile, station: StationInfo) -> list[str]:
     """Entries of the observation that are others, and their count if it is another."""
     rows, known = file.view.rows(station, file.form.base), file.observation
-    found = []
+    differing = []
     if len(rows) != len(known):
-        found.append(f"the observation has {len(rows)} entries, trained for {len(known)}")
+        differing.append(f"the observation has {len(rows)} entries, trained for {len(known)}")
     others = [
         f"entry {i} of the observation is {came[0]} (1.0 = {came[1]}), trained for {wanted[0]} "
         f"(1.0 = {wanted[1]})"
         for i, (came, wanted) in enumerate(zip(rows, known, strict=False))
         if came != wanted
     ]
-    found += others[:SHOWN]
+    differing += others[:SHOWN]
     if len(others) > SHOWN:
-        found.append(f"and {len(others) - SHOWN} more entries differ")
-    return found
+        differing.append(f"and {len(others) - SHOWN} more entries differ")
+    return differing

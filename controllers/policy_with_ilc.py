@@ -1,4 +1,4 @@
-"""A policy that practises: between trials its reference is moved by the error that it left."""
+"""A policy with iterative learning: each trial moves its reference by the error that is left."""
 
 import math
 from collections.abc import Sequence
@@ -10,12 +10,12 @@ from scipy.sparse.linalg import spsolve
 
 from controllers.controller import Reference
 from controllers.design.designs import task_kind
-from controllers.ilc import LEAST_STEPS, LearningGain, Practice, loose_load, tight
+from controllers.ilc import LEAST_STEPS, LearningGain, LearningTrials, loose_load, tight
 from controllers.models.lifted_model import second_difference
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.policies.document import PolicyError
 from controllers.policy import ShippedPolicy
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 CUTOFF_HZ = 8.0
 """Frequency at which half of an error is learned (Hz)."""
@@ -29,30 +29,30 @@ MISMATCH = 0.3
 position."""
 
 ALONE = 5
-"""Trials that the policy drives on what the sensors say. In all later ones it is told less of what
-did not happen in the earlier ones."""
+"""Trials that the policy drives on what the sensors say. In all later ones it receives less of
+what did not happen in the earlier ones."""
 
 LEAST_SHARE = 0.35
-"""Least share of such a deviation that it is told of."""
+"""Least share of such a deviation that it receives."""
 
 HOLD = 1e-3
 """Price of moving the reference by itself, as a share of that of the error it would make good."""
 
 
-class PractisedPolicy:
-    """The shipped policy of PPO on a station and reference that it has practised on.
+class PolicyWithILC:
+    """The shipped policy of PPO with iterative learning over the trials of a station.
 
-    Iterative learning in series: the policy itself stays as it is, what it is told changes. In
+    Iterative learning in series: the policy stays unchanged, its inputs change. In
     trial j it follows r + s_j, s_1 = 0. What the sensor says at the end differs from what it would
     say of r by o_j, and
 
         d_j = argmin |o_j - d|^2 + rho |D2 d|^2,   s_(j+1) = s_j + k_j d_j
 
     with the second difference D2: a low-pass without phase. It takes the position for what the
-    policy is told to follow, `LEAD_STEPS` late. The gains k_j are those of `controllers.ILC`.
+    policy is to follow, `LEAD_STEPS` later. The gains k_j are those of `controllers.ILC`.
 
     What is left then is mostly the sensors' noise, which the policy answers as it would answer an
-    error. So once there are trials to compare with it is told m + c (x - m): x a reading, m the
+    error. So once there are trials to compare with it receives m + c (x - m): x a reading, m the
     mean of that reading over the earlier trials. That of the sensor that the task goes by is moved
     as s has been since, the other position's is not. c is the share of the power of x - m, from
     trial to trial, that is not the sensor's noise, but `LEAST_SHARE` at least; it is computed for
@@ -63,7 +63,7 @@ class PractisedPolicy:
     suite `robust` (displacement; 16 in rotation), of which no suite has one.
 
     As with `controllers.ILC` `reset` is to be called with the reference and station of the trial
-    before; with others, and after `repetitions` trials, practice begins anew.
+    before; with others, and after `repetitions` trials, learning begins anew.
 
     Attributes:
         algorithm: of the shipped policies that it runs; its figures depend on their files.
@@ -80,54 +80,54 @@ class PractisedPolicy:
 
     def __init__(self) -> None:
         self._policy = ShippedPolicy(self.algorithm)
-        self._practice = Practice(self.repetitions)
+        self._learning_trials = LearningTrials(self.repetitions)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Learn from the trial before, or begin anew.
 
         Raises:
-            PolicyError: a kind of task that it does not practise, or no policy is shipped for this
+            PolicyError: a kind of task that it does not learn, or no policy is shipped for this
                 kind of task and loop.
         """
         kind = task_kind(station)
         if kind not in self.kinds:
             raise PolicyError(
-                f"{self.name} practises {' and '.join(sorted(self.kinds))}, the task's kind is "
-                f"{kind}; take a policy that needs no practice, such as {self.algorithm}"
+                f"{self.name} learns {' and '.join(sorted(self.kinds))}, the task's kind is "
+                f"{kind}; take a policy that needs no learning trials, such as {self.algorithm}"
             )
         # Refuses a station that it was not trained for before anything has changed.
         self._policy.reset(reference, station)
         motion = nominal_motion(reference, station)
-        if self._practice.goes_on(motion):
+        if self._learning_trials.goes_on(motion):
             self._learn()
         else:
             self._motion = motion
             self.moved = np.zeros(len(motion.volts) + 1)
             self._gain = LearningGain(MISMATCH)
             self._earlier = EarlierTrials(len(motion.volts))
-        alone = self._practice.trials <= ALONE
+        alone = self._learning_trials.trials <= ALONE
         self._softened = None if alone else self._earlier.softened(self.moved, motion)
         self._policy.reset(_Moved(reference, self.moved, station.period).at, station)
         self._loose = loose_load(station)
-        self._readings = list[Reading]()
+        self._readings = list[Measurement]()
         self._errors, self._taut = list[float](), list[bool]()
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V, 0-10) to hold for the next control period.
 
         Raises:
             RuntimeError: it was not reset.
         """
-        if not self._practice.trials:
+        if not self._learning_trials.trials:
             raise RuntimeError(f"{self.name} has no trial: call reset() before act()")
         station, step = self._motion.station, len(self._readings)
         expected = self._motion.expected(time - station.observation_delay)
-        self._errors.append(expected - station.position(observation))
-        self._taut.append(observation.load >= self._loose)
-        self._readings.append(observation)
+        self._errors.append(expected - station.position(measurement))
+        self._taut.append(measurement.load >= self._loose)
+        self._readings.append(measurement)
         if self._softened is not None:
-            observation = self._softened.told(observation, step)
-        return self._policy.act(observation, time)
+            measurement = self._softened.reading(measurement, step)
+        return self._policy.act(measurement, time)
 
     def _learn(self) -> None:
         """Move the reference by what the last trial says, and remember its readings."""
@@ -161,7 +161,7 @@ class EarlierTrials:
         self._steps, self._first = steps, True
         self._readings, self._moves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
 
-    def add(self, readings: Sequence[Reading], moved: NDArray[np.float64]) -> None:
+    def add(self, readings: Sequence[Measurement], moved: NDArray[np.float64]) -> None:
         """Remember a trial, if it was whole."""
         if not self._first and len(readings) >= self._steps:
             self._readings.append(np.array([reading[1:] for reading in readings[: self._steps]]))
@@ -179,13 +179,13 @@ class EarlierTrials:
             return None
         station = motion.station
         instants = station.period * np.arange(len(moved))
-        heard = instants[: self._steps] - station.observation_delay - motion.sensor_lag
+        taken = instants[: self._steps] - station.observation_delay - motion.sensor_lag
 
         def shown(moves: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.interp(heard, instants, moves)
+            return np.interp(taken, instants, moves)
 
         mean, places = np.mean(self._readings, axis=0), shown(np.mean(self._moves, axis=0))
-        column = Reading._fields.index(station.task.protocol.quantity) - 1
+        column = Measurement._fields.index(station.task.protocol.quantity) - 1
         apart = [
             readings[:, column] - mean[:, column] - shown(moves) + places
             for readings, moves in zip(self._readings, self._moves, strict=True)
@@ -201,19 +201,19 @@ class Softened:
 
     Args:
         means: what is expected of each sensor (SI), by control step.
-        share: of the deviation that is told.
+        share: of the deviation that the policy receives.
     """
 
     def __init__(self, means: list[list[float]], share: float) -> None:
         self.means, self.share = means, share
 
-    def told(self, reading: Reading, step: int) -> Reading:
-        """What the policy is told in a control step; beyond the last one the reading itself."""
+    def reading(self, reading: Measurement, step: int) -> Measurement:
+        """Measurement that the policy receives in a control step; unchanged beyond the last one."""
         if step >= len(self.means):
             return reading
         share = self.share
         values = [m + share * (x - m) for m, x in zip(self.means[step], reading[1:], strict=True)]
-        return Reading(reading[0], *values)
+        return Measurement(reading[0], *values)
 
 
 def smooth(

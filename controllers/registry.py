@@ -19,7 +19,7 @@ ENTRY_POINTS = {
     "mpc": "controllers.mpc:PreviewMPC",
     "ilc": "controllers.ilc:ILC",
     "ppo": "controllers.policy:PPOPolicy",
-    "ppo_ilc": "controllers.policy_with_ilc:PractisedPolicy",
+    "ppo_ilc": "controllers.policy_with_ilc:PolicyWithILC",
     "oracle": "controllers.oracle:Oracle",
     "constant_pressure": "controllers.exercise.constant_pressure:ConstantPressure",
     "scheduled_pressure": "controllers.exercise.scheduled_pressure:ScheduledPressure",

@@ -7,7 +7,7 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.design.designs import must_give_a_position
 from controllers.design.voltage_table import VoltageTable
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.studies.voltage_profile import SAMPLE_TIME, feedforward, reachable_mm
 
 PROFILE_RADIUS = 45e-3 / (math.pi / 2.0)
@@ -31,7 +31,7 @@ class SerresFeedforward(VoltageTable):
 
     name = "serres_feedforward"
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute the profile.
 
         Raises:

@@ -7,7 +7,7 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.design.voltage_table import VoltageTable
 from pma_gym.data.serres2008 import load_table, pressures
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.tasks import TASKS
 
 
@@ -23,7 +23,7 @@ class SerresReplay(VoltageTable):
 
     name = "serres_replay"
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Look up the profile of the trial.
 
         Raises:

@@ -6,12 +6,14 @@ import numpy as np
 
 from controllers.design.designs import designed
 from controllers.models.nominal_motion import NominalMotion
-from controllers.observers.extended_state_observer import LagObserver, Place
-from controllers.observers.observer_feedback import LagControl
+from controllers.observers.extended_state_observer import ExtendedStateObserver, Place
+from controllers.observers.observer_feedback import ObserverFeedback
 
 
 class Settings(NamedTuple):
-    """Settings of `SlidingMode`; bandwidths in units of 1 / reaction time (`LagObserver.pole`).
+    """Settings of `SlidingMode`.
+
+    Bandwidths are in units of 1 / reaction time (`ExtendedStateObserver.pole`).
 
     Attributes:
         layer_bandwidth: omega_s: how fast s dies out within the boundary layer, and the error on
@@ -53,7 +55,7 @@ class Surface(NamedTuple):
     switching: np.ndarray
 
 
-class SlidingMode(LagControl[Settings]):
+class SlidingMode(ObserverFeedback[Settings]):
     """Drives the error to a surface s = 0 on which it dies out, and holds it there.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
@@ -79,8 +81,8 @@ class SlidingMode(LagControl[Settings]):
     most, however large it is, as while the rotor flies through the cable's slack.
 
     x and d are of when a voltage sent now begins to act, as the observer brings them forward with
-    the voltages sent before. What is sent is held to 0-10 V, and the observer is told what was
-    sent: nothing winds up.
+    the voltages sent before. What is sent is held to 0-10 V, and the observer receives what was
+    sent, so nothing winds up.
 
     Args:
         settings: settings to use instead of the designed ones.
@@ -94,7 +96,7 @@ class SlidingMode(LagControl[Settings]):
         >>> controller, ended, info = SlidingMode(), False, {}
         >>> controller.reset(env.reference, env.station)
         >>> while not ended:
-        ...     volts = controller.act(env.reading, env.time)
+        ...     volts = controller.act(env.measurement, env.time)
         ...     *_, ended, info = env.step(env.action(volts))
         >>> info["rmse_mm"] < 0.05
         True
@@ -112,7 +114,7 @@ class SlidingMode(LagControl[Settings]):
     def _design(self, motion: NominalMotion) -> None:
         settings = self._given or designed(self.name, motion.station, DEFAULTS)
         self._motion, self._most = motion, settings.switching
-        self._observer = observer = LagObserver(motion, settings.observer_bandwidth)
+        self._observer = observer = ExtendedStateObserver(motion, settings.observer_bandwidth)
         poles = [observer.pole(place.lags, settings.layer_bandwidth) for place in observer.places]
         self._surfaces = [
             _surface(place, pole, motion.station.period)

@@ -14,12 +14,12 @@ import pma_gym  # noqa: F401 - registers the environments
 from benchmarks.exercise.choice import Choice
 from benchmarks.exercise.job import run_exercise
 from benchmarks.exercise.profile import read_profile
-from benchmarks.hidden_effects.pictures import naming_picture
+from benchmarks.hidden_effects.evaluation.pictures import naming_picture
 from controllers import SerresReplay
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.curves import curves_picture, worst_trial
-from pma_gym.discovery.pictures import gap_picture, map_picture
+from pma_gym.discovery.report.curves import curves_picture, worst_trial
+from pma_gym.discovery.report.pictures import gap_picture, map_picture
 
 IMAGES = Path(__file__).parent / "images"
 STOP_S = 4.0
@@ -34,7 +34,7 @@ def draw_station() -> None:
     env.reset(seed=1)
     replay.reset(env.reference, env.station)
     while env.time < STOP_S - 1e-9:
-        env.step(env.action(replay.act(env.reading, env.time)))
+        env.step(env.action(replay.act(env.measurement, env.time)))
     IMAGES.mkdir(exist_ok=True)
     matplotlib.image.imsave(IMAGES / "station.png", env.render())
 

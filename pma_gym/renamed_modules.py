@@ -14,6 +14,7 @@ from types import ModuleType
 from typing import Any
 
 RENAMED_MODULES: Mapping[str, str] = {
+    "pma_gym.discovery.summary": "pma_gym.discovery.report.summary",
     "pma_gym.envs.engine": "pma_gym.engine.engine",
     "pma_gym.envs.snapshot": "pma_gym.engine.snapshot",
     "pma_gym.envs.command": "pma_gym.engine.actions",

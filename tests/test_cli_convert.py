@@ -7,7 +7,7 @@ import pytest
 
 from pma_gym.cli import main
 from pma_gym.data.datasets.dataset import read_dataset
-from tests.discovery.data_checks.logs import logs, write
+from tests.discovery.preparation.data_checks.logs import logs, write
 
 NAMES = {
     "time_s": ("Zeit [ms]", 1e3),

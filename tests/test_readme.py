@@ -16,10 +16,10 @@ from typer.testing import CliRunner
 import benchmarks.__main__
 import pma_gym.cli
 from benchmarks import readme_table
-from benchmarks.hidden_effects.readme import KEPT
+from benchmarks.hidden_effects.evaluation.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
-from benchmarks.score import PHASES, measured_score
-from benchmarks.suite import load_suite
+from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.suites.reproduction import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

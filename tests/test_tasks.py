@@ -21,12 +21,12 @@ from pma_gym.tasks import (
     broken,
     broken_limit,
     following,
+    infeasibility_reason,
     isotonic,
     limit_in_words,
     missed_reward,
     multisine,
     named_task,
-    obstacle,
     phase_errors,
     phase_rmse,
 )
@@ -132,7 +132,7 @@ def test_drawn_tasks_are_known_by_their_number():
 def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(name, pressure):
     task = EVERY_TASK[name]
     low, high = task.starts
-    found = obstacle(task, "station", low + pressure * (high - low))
+    found = infeasibility_reason(task, "station", low + pressure * (high - low))
     if name.endswith("steps"):
         jump = np.abs(np.diff(task.protocol.reference(np.arange(3841) / 384.0)))
         size = jump[jump > 0.0][0] / SI_FACTORS[task.protocol.unit]
@@ -145,12 +145,14 @@ def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(na
 
 def test_obstacles_say_what_is_lacking():
     far = following("far", "extension", _far, duration=4.0)
-    assert "the motor would need more than 10 V" in obstacle(far, "station", 575e3)
+    assert "the motor would need more than 10 V" in infeasibility_reason(far, "station", 575e3)
     short = isotonic(stroke=30e-3)
-    assert "the regulator would need more than 10 V" in obstacle(short, "station", 350e3)
-    assert obstacle(short, "station", 150e3) is None
+    assert "the regulator would need more than 10 V" in infeasibility_reason(
+        short, "station", 350e3
+    )
+    assert infeasibility_reason(short, "station", 150e3) is None
     with pytest.raises(ValueError, match="must be of a station"):
-        obstacle(TASKS["displacement"], "cascade", 300e3)
+        infeasibility_reason(TASKS["displacement"], "cascade", 300e3)
 
 
 def _far(time):

@@ -35,7 +35,7 @@ from controllers.models.inverse import TAKE_UP_S
 from controllers.models.muscle import Muscle
 from controllers.models.nominal_motion import nominal_motion
 from controllers.serres_feedforward import PROFILE_RADIUS
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.studies.tustin import cascade_transfer, inverse_recursion, tustin_recursion
@@ -104,7 +104,7 @@ class OpenLoop:
         station: task, pressure and control period.
     """
 
-    def __init__(self, plant: Plant, station: Station) -> None:
+    def __init__(self, plant: Plant, station: StationInfo) -> None:
         self.plant, self.station = plant, station
         self.rotation = station.task.protocol.quantity == "rotation"
         self.profile = profile_model(station.pressure / 1e3)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from benchmarks.budget.drawn import DRAWN, Contest, contest, drawn_stations
+from benchmarks.budget.drawn_stations import DRAWN, Contest, contest, drawn_stations
 from benchmarks.budget.plots import budget_plot
 from benchmarks.budget.tables import (
     BUDGET_COLUMNS,
@@ -21,8 +21,8 @@ from benchmarks.budget.tables import (
     waterfall_rows,
 )
 from benchmarks.budget.trial import Budget, trial_budget
+from benchmarks.dissertation.profiles import write_csv
 from benchmarks.files import write_bytes, write_text
-from benchmarks.profiles import write_csv
 from pma_gym.data.serres2008 import pressures
 from pma_gym.terminal import SafeConsole
 

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from rich.table import Table
 
-from benchmarks.budget.drawn import CONTROLLERS, Contest
+from benchmarks.budget.drawn_stations import CONTROLLERS, Contest
 from benchmarks.budget.trial import Budget
 from pma_gym.tasks import TASKS
 

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.bounds.open_loop import open_loop_positions
 from benchmarks.budget.causes import OpenLoop, causes_of, without
-from benchmarks.open_loop import open_loop_positions
-from benchmarks.score import measured_score
-from pma_gym.envs import Station
+from benchmarks.reproduction.score import measured_score
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import TASKS, phase_rmse
@@ -103,7 +103,7 @@ def trial_budget(task: str, pressure_kpa: float, model: Model | str = "station")
         model: of a station.
     """
     plant = Plant(load_model(model))
-    station = Station(plant.model, TASKS[task], 1e3 * pressure_kpa, PERIOD_S)
+    station = StationInfo(plant.model, TASKS[task], 1e3 * pressure_kpa, PERIOD_S)
     open_loop, causes = OpenLoop(plant, station), causes_of(task)
     sets = [frozenset(some) for some in _subsets(causes)]
     volts = [open_loop.voltages(faults) for faults in sets]
@@ -120,7 +120,7 @@ def trial_budget(task: str, pressure_kpa: float, model: Model | str = "station")
 
 
 def simulated_errors(
-    plants: Sequence[Plant], station: Station, volts: Sequence[NDArray[np.float64]]
+    plants: Sequence[Plant], station: StationInfo, volts: Sequence[NDArray[np.float64]]
 ) -> list[Errors]:
     """RMSE (mm or deg) by phase of open-loop trials, one for each plant and its voltages."""
     unit, found = SI_FACTORS[station.task.protocol.unit], []

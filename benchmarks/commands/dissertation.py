@@ -21,7 +21,7 @@ def register(app: typer.Typer) -> None:
 
 def profiles(out: Out) -> None:
     """Regenerate the dissertation's voltage profiles (tables I4-I20)."""
-    from benchmarks.profiles import run_profiles
+    from benchmarks.dissertation.profiles import run_profiles
 
     print(f"{run_profiles(out)} rows in {out}")
 
@@ -83,7 +83,7 @@ def voltages(
     ] = "station",
 ) -> None:
     """Write a feed-forward's voltages for a real rig as CSV."""
-    from benchmarks.voltages import Order, run_voltages
+    from benchmarks.dissertation.voltages import Order, run_voltages
 
     try:
         rows = run_voltages(Order(controller, task, pressure, rate, model), out)
@@ -94,14 +94,14 @@ def voltages(
 
 def studies(out: OptionalOut = None) -> None:
     """Recompute the dissertation's regressions and variance tables beside the printed ones."""
-    from benchmarks.studies import run_studies
+    from benchmarks.dissertation.studies import run_studies
 
     run_studies(out)
 
 
 def identify(out: Out, jobs: Jobs = 2) -> None:
     """Fit the station's model from tables I2 and I3; judge it on left-out pressures and I1."""
-    from benchmarks.identify import run_identify
+    from benchmarks.identification.job import run_identify
 
     try:
         run_identify(out, jobs)

@@ -41,9 +41,9 @@ def reproduction(
 
 def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str, jobs: int) -> int:
     """The main job; its exit code."""
-    from benchmarks.contender import ControllerError, parse_contenders
-    from benchmarks.job import run_job
-    from benchmarks.suite import SuiteError, load_suite
+    from benchmarks.reproduction.job import run_job
+    from benchmarks.runner.controller_spec import ControllerError, parse_contenders
+    from benchmarks.suites.reproduction import SuiteError, load_suite
     from pma_gym.plant.model import ModelError, load_model
     from pma_gym.terminal import SafeConsole
 
@@ -62,7 +62,7 @@ def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str
 
 
 def _pressures(text: str) -> list[float]:
-    from benchmarks.suite import SuiteError
+    from benchmarks.suites.reproduction import SuiteError
     from pma_gym.numerals import parse_numbers
 
     found = parse_numbers(text)

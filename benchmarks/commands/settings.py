@@ -31,7 +31,7 @@ def tune(
     ] = "*",
 ) -> None:
     """Tune the gains of the PIDs on a model; without --out, the shipped table of gains."""
-    from benchmarks.tune import GAINS_FILE, TuneError, run_tune
+    from benchmarks.tuning.tune import GAINS_FILE, TuneError, run_tune
 
     out = out or GAINS_FILE
     require_writable(out, "--out")
@@ -60,7 +60,7 @@ def design(
     ] = "*",
 ) -> None:
     """Search the settings of controllers on training stations; without --out, the shipped file."""
-    from benchmarks.design import run_design
+    from benchmarks.tuning.design import run_design
     from controllers.design.designs import DESIGNS_FILE
 
     try:

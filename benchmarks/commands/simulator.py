@@ -17,7 +17,7 @@ def register(app: typer.Typer) -> None:
 
 def accuracy(out: OptionalOut = None) -> None:
     """Measure the integrator's accuracy; exit code 1 if the default step misses a limit."""
-    from benchmarks.accuracy import run_accuracy
+    from benchmarks.accuracy.job import run_accuracy
 
     raise typer.Exit(0 if run_accuracy(out=out) else 1)
 

@@ -31,9 +31,9 @@ def run(
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
-    from benchmarks.comparison.suite import frozen_suite
-    from benchmarks.contender import ControllerError
-    from benchmarks.suite import SuiteError
+    from benchmarks.runner.controller_spec import ControllerError
+    from benchmarks.suites.frozen import frozen_suite
+    from benchmarks.suites.reproduction import SuiteError
     from pma_gym.terminal import SafeConsole
 
     try:
@@ -61,9 +61,9 @@ def report(
     ] = None,
 ) -> None:
     """Write a suite's leaderboard from the journal of its run."""
-    from benchmarks.comparison.publish import run_report
-    from benchmarks.comparison.suite import frozen_suite
-    from benchmarks.suite import SuiteError
+    from benchmarks.report.publish import run_report
+    from benchmarks.suites.frozen import frozen_suite
+    from benchmarks.suites.reproduction import SuiteError
 
     try:
         frozen = frozen_suite(suite)
@@ -83,9 +83,9 @@ def add(
 ) -> None:
     """Score your own controller on all suites, and say where it stands or what to mend."""
     from benchmarks.comparison.add import own_contender, run_add
-    from benchmarks.comparison.suite import frozen_suite, suite_names
-    from benchmarks.contender import ControllerError
-    from benchmarks.suite import SuiteError
+    from benchmarks.runner.controller_spec import ControllerError
+    from benchmarks.suites.frozen import frozen_suite, suite_names
+    from benchmarks.suites.reproduction import SuiteError
     from pma_gym.terminal import SafeConsole
 
     try:
@@ -110,8 +110,8 @@ def remove(
     """Take a controller's rows out of the journals; the rows of all others stay unchanged."""
     from benchmarks.comparison.command_lines import report_command
     from benchmarks.comparison.remove import remove_controller
-    from benchmarks.comparison.suite import frozen_suite, suite_names
-    from benchmarks.suite import SuiteError
+    from benchmarks.suites.frozen import frozen_suite, suite_names
+    from benchmarks.suites.reproduction import SuiteError
 
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]

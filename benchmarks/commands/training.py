@@ -46,8 +46,8 @@ def train(
 
     try:
         from benchmarks.training.checkpoint import CheckpointError
+        from benchmarks.training.configuration.preset import PresetError
         from benchmarks.training.job import ordered, run_train
-        from benchmarks.training.preset import PresetError
     except ImportError as error:
         print(
             f"error: training needs Stable-Baselines3 ({error}); install it: "
@@ -91,7 +91,7 @@ def export(
     ] = False,
 ) -> None:
     """Make a policy file of your own model, which the benchmark runs without torch."""
-    from benchmarks.training.users_model import Order, export_model, parsed_kwargs
+    from benchmarks.training.policy_export.users_model import Order, export_model, parsed_kwargs
 
     try:
         kwargs = parsed_kwargs(env_kwargs)

@@ -1,1 +1,1 @@
-"""Suites that tell controllers apart: cases, runs, figures, statistics, leaderboards."""
+"""Comparing controllers on frozen suites: run, add, remove, list."""

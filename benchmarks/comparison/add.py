@@ -8,17 +8,17 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import Progress
 
-from benchmarks.comparison.case import BY_LIMIT, Row
 from benchmarks.comparison.command_lines import remove_command, run_command
-from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
-from benchmarks.comparison.guard import probe
-from benchmarks.comparison.leaderboard import read_leaderboard
-from benchmarks.comparison.provenance import check_folder, run_info, write_run
 from benchmarks.comparison.scores import print_clipping, print_failures
-from benchmarks.comparison.standings import Standings
-from benchmarks.comparison.suite import FrozenSuite
-from benchmarks.contender import Contender, ControllerError
-from benchmarks.processes import run_all
+from benchmarks.report.leaderboard import read_leaderboard
+from benchmarks.report.standings import Standings
+from benchmarks.runner.case import BY_LIMIT, Row
+from benchmarks.runner.controller_spec import Contender, ControllerError
+from benchmarks.runner.execution import Plan, compile_kernels, execute, plan
+from benchmarks.runner.processes import run_all
+from benchmarks.runner.provenance import check_folder, run_info, write_run
+from benchmarks.runner.user_controller import probe
+from benchmarks.suites.frozen import FrozenSuite
 from controllers import CONTROLLERS
 
 ENOUGH = 3

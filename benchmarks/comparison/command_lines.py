@@ -3,14 +3,14 @@
 import shlex
 from pathlib import Path
 
-from benchmarks.comparison.suite import FrozenSuite
 from benchmarks.files import RESULTS
+from benchmarks.suites.frozen import FrozenSuite
 
 
 def run_command(suite: FrozenSuite, folder: Path) -> str:
     """What runs a suite into a folder.
 
-    >>> from benchmarks.comparison.suite import frozen_suite
+    >>> from benchmarks.suites.frozen import frozen_suite
     >>> run_command(frozen_suite("nominal"), Path("results/nominal"))
     'python -m benchmarks run --suite nominal'
     >>> run_command(frozen_suite("nominal"), Path("my results"))

@@ -8,15 +8,15 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from benchmarks.comparison.case import Row
 from benchmarks.comparison.command_lines import report_command
-from benchmarks.comparison.execution import Plan, compile_kernels, execute, plan
-from benchmarks.comparison.journal import JOURNAL
-from benchmarks.comparison.leaderboard import keep_bounds
-from benchmarks.comparison.provenance import check_folder, run_info, write_run, write_stations
 from benchmarks.comparison.scores import print_scores, write_scores
-from benchmarks.comparison.suite import Entry, FrozenSuite
-from benchmarks.contender import ControllerError, parse_contenders
+from benchmarks.report.leaderboard import keep_bounds
+from benchmarks.runner.case import Row
+from benchmarks.runner.controller_spec import ControllerError, parse_contenders
+from benchmarks.runner.execution import Plan, compile_kernels, execute, plan
+from benchmarks.runner.journal import JOURNAL
+from benchmarks.runner.provenance import check_folder, run_info, write_run, write_stations
+from benchmarks.suites.frozen import Entry, FrozenSuite
 
 FAILED, INTERRUPTED = 1, 130
 """Exit codes."""

@@ -3,9 +3,9 @@
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.comparison.case import cases
-from benchmarks.comparison.suite import FrozenSuite, frozen_suite, suite_names
-from benchmarks.suite import load_suite
+from benchmarks.runner.case import cases
+from benchmarks.suites.frozen import FrozenSuite, frozen_suite, suite_names
+from benchmarks.suites.reproduction import load_suite
 
 
 def print_suites(console: Console) -> None:

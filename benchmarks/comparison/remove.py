@@ -5,10 +5,10 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.comparison.journal import JOURNAL, rewriting
-from benchmarks.comparison.provenance import read_run, write_run
-from benchmarks.comparison.suite import FrozenSuite
-from benchmarks.suite import SuiteError
+from benchmarks.runner.journal import JOURNAL, rewriting
+from benchmarks.runner.provenance import read_run, write_run
+from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.reproduction import SuiteError
 
 
 def remove_controller(name: str, suites: Sequence[FrozenSuite], results: Path) -> dict[Path, int]:

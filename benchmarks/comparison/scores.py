@@ -9,13 +9,13 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from benchmarks.comparison.case import BY_LIMIT, Row
-from benchmarks.comparison.execution import Plan, identity, row_identity
-from benchmarks.comparison.guard import LateError
-from benchmarks.comparison.suite import Entry
-from benchmarks.contender import ControllerError
 from benchmarks.files import write_text
-from benchmarks.worker import ProcessDied, TookTooLong
+from benchmarks.runner.case import BY_LIMIT, Row
+from benchmarks.runner.controller_spec import ControllerError
+from benchmarks.runner.execution import Plan, identity, row_identity
+from benchmarks.runner.user_controller import LateError
+from benchmarks.runner.worker import ProcessDied, TookTooLong
+from benchmarks.suites.frozen import Entry
 
 SCORES = "scores.csv"
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from benchmarks.dissertation.profiles import write_csv
 from benchmarks.exercise.answer import Answer, answer
 from benchmarks.exercise.choice import Choice
 from benchmarks.exercise.page import PICTURE, exercise_blocks
@@ -12,7 +13,6 @@ from benchmarks.exercise.plots import exercise_plot
 from benchmarks.exercise.profile import Prescription
 from benchmarks.exercise.tables import terminal_table
 from benchmarks.files import write_bytes, write_text
-from benchmarks.profiles import write_csv
 from pma_gym.pages.document import TextTable, to_html, to_markdown
 from pma_gym.plant.exercise_device.device import FULL_ANGLE, Device, pressure_grid, resistive_moment
 from pma_gym.plant.model import Model, load_model

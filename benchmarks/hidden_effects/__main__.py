@@ -12,10 +12,11 @@ from pma_gym.terminal import safe_streams
 # Each process computes on its own core.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-from benchmarks.hidden_effects import drawing, judging, scoring  # noqa: E402
 from benchmarks.hidden_effects import speed as timing  # noqa: E402
-from benchmarks.hidden_effects.cases import BLOCKS  # noqa: E402
-from benchmarks.hidden_effects.effects import ALL  # noqa: E402
+from benchmarks.hidden_effects.evaluation import diagnosed_cases, scoring  # noqa: E402
+from benchmarks.hidden_effects.generation import drawing  # noqa: E402
+from benchmarks.hidden_effects.generation.cases import BLOCKS  # noqa: E402
+from benchmarks.hidden_effects.generation.effects import ALL  # noqa: E402
 
 app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
 
@@ -79,7 +80,7 @@ def judge(
     limit: Annotated[float, typer.Option(help="Seconds after which a case is given up.")] = 900.0,
 ) -> None:
     """Diagnose every case that has no answer yet."""
-    judging.judge(folder, jobs, options.split(), limit)
+    diagnosed_cases.judge(folder, jobs, options.split(), limit)
 
 
 @app.command()

@@ -23,7 +23,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Annotated, Any
 
-from benchmarks.damaged import say_damaged
+from benchmarks.runner.damaged_results import say_damaged
 from pma_gym.cli.options import StrictTyper
 from pma_gym.document_shape import check_shape
 from pma_gym.documents import read_json
@@ -37,7 +37,8 @@ from numpy.typing import NDArray  # noqa: E402
 from scipy.linalg import solve_toeplitz  # noqa: E402
 from scipy.stats import norm  # noqa: E402
 
-from benchmarks.hidden_effects.groups import group  # noqa: E402
+from benchmarks.hidden_effects.generation.effect_size import simulate_variants  # noqa: E402
+from benchmarks.hidden_effects.generation.groups import group  # noqa: E402
 from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
     NOISE,
     SENSORS,
@@ -46,14 +47,14 @@ from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
     noise_levels,
 )
 from benchmarks.hidden_effects.physics.simulation import Commands  # noqa: E402
-from benchmarks.hidden_effects.size import simulate_variants  # noqa: E402
 from pma_gym.data.datasets.dataset import Dataset, read_dataset  # noqa: E402
 from pma_gym.data.trial import Trial  # noqa: E402
-from pma_gym.discovery.fits import Bench, Fitted  # noqa: E402
-from pma_gym.discovery.noise import Whitening  # noqa: E402
-from pma_gym.discovery.parameters import own_parameters  # noqa: E402
-from pma_gym.discovery.screening import Baseline, beginnings, look  # noqa: E402
-from pma_gym.discovery.suspects import Suspect, suspects  # noqa: E402
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted  # noqa: E402
+from pma_gym.discovery.fitting.free_parameters import own_parameters  # noqa: E402
+from pma_gym.discovery.preparation.noise import Whitening  # noqa: E402
+from pma_gym.discovery.screening.candidates import suspects  # noqa: E402
+from pma_gym.discovery.screening.score_test import Baseline, beginnings, look  # noqa: E402
 from pma_gym.files import replace_file  # noqa: E402
 from pma_gym.plant.model import Model, load_model  # noqa: E402
 

@@ -9,19 +9,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.comparison.fingerprint import code_digest_with
-from benchmarks.damaged import UNREADABLE, reason, say_damaged
 from benchmarks.files import write_text
-from benchmarks.hidden_effects import records, scoring
-from benchmarks.hidden_effects.asking import Judge, diagnosed
-from benchmarks.hidden_effects.blocks import Block
-from benchmarks.hidden_effects.one_case import Work
-from benchmarks.hidden_effects.records import Record
-from benchmarks.hidden_effects.tables import percent, table
-from benchmarks.hidden_effects.targets import RATES
-from benchmarks.hidden_effects.undecidable import BLOCKS
-from benchmarks.hidden_effects.verdicts import Outcome
-from benchmarks.processes import run_all
+from benchmarks.hidden_effects.evaluation import records, scoring
+from benchmarks.hidden_effects.evaluation.diagnosis import Judge, diagnosed
+from benchmarks.hidden_effects.evaluation.one_case import Work
+from benchmarks.hidden_effects.evaluation.records import Record
+from benchmarks.hidden_effects.evaluation.tables import percent, table
+from benchmarks.hidden_effects.evaluation.targets import RATES
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome
+from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.undecidable import BLOCKS
+from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
+from benchmarks.runner.fingerprint import code_digest_with
+from benchmarks.runner.processes import run_all
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json
 
@@ -202,7 +202,8 @@ def json_text(document: dict[str, Any]) -> str:
 def fingerprint() -> str:
     """Of all code that a record depends on: the package's and the generator's."""
     here = Path(__file__).parent
-    return code_digest_with(sorted([*here.glob("*.py"), *(here / "physics").glob("*.py")]))
+    folders = (here, here / "generation", here / "physics", here / "evaluation")
+    return code_digest_with([file for folder in folders for file in sorted(folder.glob("*.py"))])
 
 
 class Progress:

@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.floors import initial_floors
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import Own, own_parameters, values
-from pma_gym.discovery.suspects import Suspect, suspects
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import Own, own_parameters, values
+from pma_gym.discovery.preparation.initial_floors import initial_floors
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.screening.candidates import suspects
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model

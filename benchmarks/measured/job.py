@@ -13,7 +13,7 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
-from benchmarks.measured.blind import Proposal, Undecidable, undecidable
+from benchmarks.measured.detectability import Proposal, Undecidable, undecidable
 from benchmarks.measured.pages import measured_page
 from benchmarks.measured.reverse import Explanation, searched
 from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
@@ -25,7 +25,7 @@ from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import Held, held_against
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
-from pma_gym.discovery.journal import digest
+from pma_gym.discovery.fitting.journal import digest
 from pma_gym.document_shape import ListOf, check_shape, shape_of
 from pma_gym.plant.model import load_model
 from pma_gym.terminal import SafeConsole

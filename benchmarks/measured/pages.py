@@ -23,7 +23,7 @@ from benchmarks.measured.tables import (
     round_rows,
     verdict_words,
 )
-from pma_gym.discovery.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
+from pma_gym.discovery.report.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
 from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture, TextTable, to_html
 from pma_gym.pages.figures import legend_below, picture, png
 

@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.contender import Contender
-from benchmarks.execution import Execution, Outcome, run_case
-from benchmarks.replay import ReplayError, all_replay_errors, summarise
-from benchmarks.results import Results
-from benchmarks.suite import Suite, load_suite
+from benchmarks.reproduction.execution import Execution, Outcome, run_case
+from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise
+from benchmarks.reproduction.results import Results
+from benchmarks.runner.controller_spec import Contender
+from benchmarks.suites.reproduction import Suite, load_suite
 
 PHASE_NAMES = {
     "displacement": "displacement (tables 21, 22)",

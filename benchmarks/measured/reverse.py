@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
-from benchmarks.score import PHASES, measured_score
+from benchmarks.reproduction.score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.evidence import Evidence
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import prior, values
-from pma_gym.discovery.suspects import Suspect, bounds, suspects
+from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
+from pma_gym.discovery.fitting.free_parameters import prior, values
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.screening.candidates import suspects
 from pma_gym.metrics import PHASE_DURATION, regression
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, load_model

@@ -8,13 +8,22 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
-from benchmarks.comparison.fingerprint import ROOT, code_digest_with
-from benchmarks.damaged import UNREADABLE, reason, say_damaged
 from benchmarks.files import write_text
+from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
+from benchmarks.runner.fingerprint import ROOT, code_digest_with
 from pma_gym.document_shape import check_shape, shape_of
 from pma_gym.documents import read_json
 
-ELSEWHERE = ("contender", "execution", "replay", "results", "rollout", "score", "suite", "targets")
+ELSEWHERE = (
+    "reproduction/execution",
+    "reproduction/replay",
+    "reproduction/results",
+    "reproduction/score",
+    "reproduction/targets",
+    "runner/controller_spec",
+    "runner/rollout",
+    "suites/reproduction",
+)
 """Modules of the benchmark, beside its own, that a stage depends on."""
 
 T = TypeVar("T")

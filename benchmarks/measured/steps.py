@@ -9,7 +9,7 @@ from benchmarks.measured.held_out import AT_LOAD, FIGURES, Rig, limit_errors, rm
 from benchmarks.measured.replays import Replay, replays
 from benchmarks.measured.stages import Stages
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.journal import digest
+from pma_gym.discovery.fitting.journal import digest
 from pma_gym.plant.model import Model, dump_model
 
 AS_GIVEN, REFITTED = "as given", "parameters refitted"

@@ -1,1 +1,1 @@
-"""What a reader opens after a run: tables, plots and words, as Markdown and as one page."""
+"""The leaderboard of a suite: statistics, standings, tables, plots and the page."""

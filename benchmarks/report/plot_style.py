@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from benchmarks.suite import Suite
+from benchmarks.suites.reproduction import Suite
 
 Dashes = Literal["-", "--", "-.", ":"]
 

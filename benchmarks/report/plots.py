@@ -1,120 +1,208 @@
-"""The report's plots of trials: reference and response, error, voltage, actual against ideal."""
+"""The leaderboard's plots: distributions, profiles, error by pressure, who beats whom."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
-from numpy.typing import NDArray
+from matplotlib.patches import Patch
 
-from benchmarks.report.plot_style import MEASURED, REFERENCE, Style, controller_styles
-from benchmarks.results import Results
-from benchmarks.score import UNITS, measured_score
-from pma_gym.data.protocol import PROTOCOLS, Protocol
-from pma_gym.data.trial import Trial
-from pma_gym.metrics import phase_times
+from benchmarks.report.plot_style import Style
+from benchmarks.report.standings import Standings
+from benchmarks.report.statistics import profile
+from benchmarks.report.tables import capital
 from pma_gym.pages.figures import legend_below, picture, png
-from pma_gym.units import SI_FACTORS
 
-_ENLARGED = {"displacement": 0.4, "rotation": 1.6}
-"""Half the height of the enlarged error (mm, deg): four times what feedback is to reach."""
+Styles = Mapping[str, Style]
 
-_LABELS = {"displacement": "extension", "rotation": "rotation"}
+_GREY = "#666666"
+_BOX = {"linewidth": 1.1}
+_LONG = 15.0
+"""Ratio of an axis' ends above which only 1, 2 and 5 are written."""
 
-
-def tracking_plot(results: Results, task: str) -> bytes:
-    """Response, error and motor voltage over time at a low, a middle and a high pressure."""
-    pressures = _pictured(results, task)
-    styles = controller_styles(results.suite)
-    unit = UNITS[task]
-    with picture(11.0, 10.5) as figure:
-        axes: Any = figure.subplots(4, len(pressures), sharex=True, sharey="row", squeeze=False)
-        for column, pressure in enumerate(pressures):
-            panels = axes[:, column]
-            panels[0].set_title(f"{pressure:g} kPa")
-            _draw_measured(panels, task, pressure)
-            for name, trial in results.trials(task, pressure).items():
-                _draw_trial(panels, trial, PROTOCOLS[task], styles[name])
-            panels[-1].set_xlabel("time (s)")
-        axes[0, 0].set_ylabel(f"{_LABELS[task]} ({unit})")
-        axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
-        axes[2, 0].set_ylabel(f"actual − ideal ({unit}),\nenlarged")
-        axes[2, 0].set_ylim(-_ENLARGED[task], _ENLARGED[task])
-        axes[3, 0].set_ylabel("motor voltage (V)")
-        axes[3, 0].set_ylim(0.0, None)
-        figure.align_ylabels()
-        legend_below(figure, _handles(styles), 3)
-        return png(figure)
+THRESHOLDS = 120
+"""Points of a performance profile."""
 
 
-def actual_against_ideal_plot(results: Results, task: str) -> bytes:
-    """Actual position over the ideal one, as figures 32 and 36 have it."""
-    pressures = _pictured(results, task)
-    styles = controller_styles(results.suite)
-    unit = UNITS[task]
-    protocol = PROTOCOLS[task]
-    span = protocol.span / SI_FACTORS[unit]
-    with picture(11.0, 4.6) as figure:
-        axes: Any = figure.subplots(1, len(pressures), sharex=True, sharey=True, squeeze=False)
-        for axis, pressure in zip(axes[0], pressures, strict=True):
-            axis.set_title(f"{pressure:g} kPa")
-            axis.plot([0.0, span], [0.0, span], zorder=4, **REFERENCE)
-            for time, line in _measured_lines(task, pressure):
-                axis.plot(protocol.reference(time) / SI_FACTORS[unit], line, zorder=1, **MEASURED)
-            for name, trial in results.trials(task, pressure).items():
-                position = trial.truth[protocol.quantity] / SI_FACTORS[unit]
-                ideal = protocol.reference(trial.time) / SI_FACTORS[unit]
-                axis.plot(ideal, position, color=styles[name].color, zorder=2)
-            axis.set_xlabel(f"ideal {_LABELS[task]} ({unit})")
-        axes[0, 0].set_ylabel(f"actual {_LABELS[task]} ({unit})")
-        legend_below(figure, _handles(styles), 3)
-        return png(figure)
+def distribution_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+    """Where each controller's cases lie, and its interquartile mean with its interval."""
+    most = max(len(standings.rows) for standings in found)
+    with picture(11.0, 0.9 + len(found) * (0.75 + 0.27 * most)) as canvas:
+        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], found, strict=True):
+            _boxes(axis, standings, styles)
+        handles = [
+            Line2D([], [], color=_GREY, linewidth=1.1, label="5–95 % of the cases"),
+            Patch(facecolor="#d9dde2", edgecolor=_GREY, label="middle half, median"),
+            Line2D(
+                [],
+                [],
+                color="black",
+                linewidth=2.6,
+                marker="|",
+                markersize=9,
+                label="95 % interval",
+            ),
+            Line2D([], [], color="black", linestyle="", marker="o", label="interquartile mean"),
+        ]
+        legend_below(canvas, handles, 4)
+        return png(canvas)
 
 
-def _pictured(results: Results, task: str) -> list[float]:
-    """The pressures that are drawn and have a trial."""
-    return [p for p in results.suite.pictured_kpa[task] if results.trials(task, p)]
+def _boxes(axis: Any, standings: Standings, styles: Styles) -> None:  # noqa: ANN401
+    """A row a controller, the best on top."""
+    measure = standings.errors.measure
+    for place, row in enumerate(reversed(standings.rows)):
+        style = styles[row.name]
+        low, first, middle, third, high = np.quantile(
+            standings.errors.of(row.name), (0.05, 0.25, 0.5, 0.75, 0.95)
+        )
+        axis.plot([low, high], [place, place], color=style.color, **_BOX)
+        axis.barh(
+            place,
+            third - first,
+            0.56,
+            first,
+            facecolor=style.color,
+            edgecolor=style.color,
+            alpha=0.28,
+        )
+        axis.plot([middle, middle], [place - 0.28, place + 0.28], color=style.color, **_BOX)
+        if not np.isnan(row.mean.low):
+            axis.plot(row.mean[1:], [place, place], color="black", linewidth=2.6, marker="|")
+        axis.plot(
+            row.mean.estimate,
+            place,
+            linestyle="",
+            marker=style.marker,
+            markersize=7,
+            color=style.color,
+            markeredgecolor="black",
+            markeredgewidth=0.7,
+        )
+    names = [styles[row.name].label for row in reversed(standings.rows)]
+    axis.set_yticks(range(len(names)), names)
+    axis.set_ylim(-0.6, len(names) - 0.4)
+    axis.grid(visible=False, axis="y")
+    _logarithmic(axis.xaxis, axis)
+    axis.set_xlabel(f"RMSE ({measure.unit})")
+    axis.set_title(capital(measure.name), loc="left")
 
 
-def _draw_trial(panels: Sequence[Axes], trial: Trial, protocol: Protocol, style: Style) -> None:
-    response, error, enlarged, voltage = panels
-    unit, color = SI_FACTORS[protocol.unit], style.color
-    actual = trial.truth[protocol.quantity] / unit
-    difference = actual - protocol.reference(trial.time) / unit
-    response.plot(trial.time, actual, color=color)
-    error.plot(trial.time, difference, color=color)
-    enlarged.plot(trial.time, difference, color=color, linewidth=0.9)
-    voltage.plot(trial.time, trial.commands["motor_voltage"], color=color, linewidth=0.9)
+def profile_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+    """Share of the cases with an error up to a threshold, with 95 % bands."""
+    with picture(11.0, 0.9 + 3.6 * len(found)) as canvas:
+        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], found, strict=True):
+            errors = standings.errors
+            positive = errors.values[errors.values > 0.0]
+            thresholds = np.geomspace(positive.min() * 0.9, positive.max() * 1.1, THRESHOLDS)
+            for at, name in enumerate(errors.names):
+                share, low, high = profile(errors.values[at], thresholds, standings.draws)
+                style = styles[name]
+                axis.fill_between(
+                    thresholds, 100 * low, 100 * high, color=style.color, alpha=0.12, linewidth=0
+                )
+                axis.plot(
+                    thresholds,
+                    100 * share,
+                    color=style.color,
+                    linestyle=style.line,
+                    marker=style.marker,
+                    markevery=[_marked(share, at / len(errors.names))],
+                    markersize=6.5,
+                )
+            _logarithmic(axis.xaxis, axis)
+            axis.set_ylim(-2.0, 102.0)
+            axis.set_ylabel("cases (%)")
+            axis.set_xlabel(f"RMSE at most ({errors.measure.unit})")
+            axis.set_title(capital(errors.measure.name), loc="left")
+        legend_below(canvas, _handles(found, styles), 4)
+        return png(canvas)
 
 
-def _draw_measured(panels: Sequence[Axes], task: str, pressure: float) -> None:
-    """The reference, and the lines of tables 21 and 27-29, which are all that is printed."""
-    protocol, unit = PROTOCOLS[task], SI_FACTORS[UNITS[task]]
-    grid = np.linspace(0.0, protocol.duration, 301)
-    panels[0].plot(grid, protocol.reference(grid) / unit, zorder=4, **REFERENCE)
-    for panel in panels[1:3]:
-        panel.axhline(0.0, zorder=4, **REFERENCE)
-    for time, line in _measured_lines(task, pressure):
-        panels[0].plot(time, line, zorder=1, **MEASURED)
-        panels[1].plot(time, line - protocol.reference(time) / unit, zorder=1, **MEASURED)
+def _marked(share: np.ndarray, place: float) -> int:
+    """Which point of a rising profile carries the marker: another height for every controller."""
+    return int(np.argmax(share >= 0.15 + 0.7 * place))
 
 
-def _measured_lines(
-    task: str, pressure: float
-) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
-    """Times (s) and positions (unit) of the regression line of each phase."""
-    lines = []
-    own = phase_times()[:1921:8]
-    for phase in PROTOCOLS[task].phases:
-        score = measured_score(task, phase.name, pressure)
-        lines.append((phase.start + own, score.intercept + score.slope * own))
-    return lines
+def pressure_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+    """Median error of every controller at every pressure, with the middle half of the best."""
+    with picture(11.0, 0.9 + 3.2 * len(found)) as canvas:
+        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], found, strict=True):
+            errors = standings.errors
+            at_pressure = np.array([episode.pressure_kpa for episode in errors.episodes])
+            pressures = np.unique(at_pressure)
+            for name in errors.names:
+                style, values = styles[name], errors.of(name)
+                medians = [np.median(values[at_pressure == p]) for p in pressures]
+                axis.plot(
+                    pressures,
+                    medians,
+                    color=style.color,
+                    linestyle=style.line,
+                    marker=style.marker,
+                    markersize=5.5,
+                )
+            _logarithmic(axis.yaxis, axis)
+            axis.set_xticks(pressures, [f"{p:g}" for p in pressures])
+            axis.set_xlabel("pressure (kPa)")
+            axis.set_ylabel(f"median RMSE ({errors.measure.unit})")
+            axis.set_title(capital(errors.measure.name), loc="left")
+        legend_below(canvas, _handles(found, styles), 4)
+        return png(canvas)
 
 
-def _handles(styles: dict[str, Style]) -> list[Line2D]:
+def improvement_plot(standings: Standings, styles: Styles) -> bytes:
+    """Probability that the row's controller has the smaller error than the column's."""
+    names = [row.name for row in standings.rows]
+    places = {name: at for at, name in enumerate(names)}
+    shares = np.full((len(names), len(names)), np.nan)
+    for pair in standings.pairs:
+        shares[places[pair.first], places[pair.second]] = 100.0 * pair.improvement.estimate
+    side = 0.62 * len(names)
+    with picture(3.2 + side, 2.0 + side) as canvas:
+        axis: Any = canvas.subplots()
+        image = axis.imshow(shares, cmap="PuOr_r", vmin=0.0, vmax=100.0)
+        for pair in standings.pairs:
+            row, column = places[pair.first], places[pair.second]
+            share = shares[row, column]
+            axis.text(
+                column,
+                row,
+                f"{share:.0f}",
+                ha="center",
+                va="center",
+                fontsize=9,
+                fontweight="bold" if pair.separated else "normal",
+                color="white" if abs(share - 50.0) > 35.0 else "black",
+            )
+        labels = [styles[name].label for name in names]
+        axis.set_xticks(range(len(names)), labels, rotation=40, ha="right")
+        axis.set_yticks(range(len(names)), labels)
+        axis.grid(visible=False)
+        axis.set_title(f"{capital(standings.errors.measure.name)}: row better than column")
+        canvas.colorbar(image, ax=axis, label="cases (%)", shrink=0.75)
+        return png(canvas)
+
+
+def _logarithmic(line: Any, axis: Any) -> None:  # noqa: ANN401
+    """A logarithmic axis with plain numbers, more of them the shorter it is."""
+    low, high = line.get_data_interval()
+    between = [2, 5] if high > _LONG * low else [1.5, 2, 3, 4, 5, 7]
+    set_scale = axis.set_xscale if line is axis.xaxis else axis.set_yscale
+    set_scale("log", subs=between)
+    line.set_major_formatter("{x:g}")
+    line.set_minor_formatter("{x:g}")
+    line.grid(visible=True, which="minor", color="#eef0f3")
+
+
+def _handles(found: Sequence[Standings], styles: Styles) -> list[Line2D]:
+    """Entries of a legend, in the order of the styles."""
+    shown = {name for standings in found for name in standings.errors.names}
     return [
-        Line2D([], [], label="Ideal", **REFERENCE),
-        Line2D([], [], label="Measured (regression lines)", **MEASURED),
-        *(Line2D([], [], color=style.color, label=style.label) for style in styles.values()),
+        Line2D([], [], color=s.color, marker=s.marker, linestyle=s.line, label=s.label)
+        for name, s in styles.items()
+        if name in shown
     ]

@@ -1,132 +1,206 @@
-"""Tables in the layout of the dissertation's 21, 22 and 27-30, its columns beside ours."""
+"""The leaderboard's tables as text."""
 
-from collections.abc import Callable, Iterable, Sequence
-from statistics import fmean
+from collections.abc import Mapping, Sequence
 
-from benchmarks.replay import QUANTITIES, ReplayError, summarise
-from benchmarks.results import Results
-from benchmarks.score import UNITS, PhaseScore, measured_score
-from benchmarks.suite import MEASURED
-from benchmarks.targets import Check
+import numpy as np
+
+from benchmarks.report.errors import PERCENT, Record
+from benchmarks.report.standings import Standing, Standings
+from benchmarks.report.statistics import Interval
+from benchmarks.report.tracking_cost import Spending
+from benchmarks.report.verdicts import Verdict, mean_by_trial
+from benchmarks.runner.case import EXERCISE_FIGURES
 from pma_gym.pages.document import TextTable
 
-RULE = [""]
-MISSING = "failed"
+NONE = "—"
+"""A cell without a figure."""
 
-REGRESSION_TABLES = {"displacement": "21", "I": "27", "II": "28", "III": "29"}
-"""Printed tables of slope and intercept, by phase."""
-
-Figures = Callable[[float], PhaseScore | None]
+Labels = Mapping[str, str]
+"""What people call the controllers, by name."""
 
 
-def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Figures]:
-    """Who stands in a table, measured first, and the figures of each by pressure."""
-    found: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
-    for controller in results.suite.controllers:
-        if not results.suite.does(controller, model):
-            continue
-        name = controller.name
-        found[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)
-    return found
+def standings_table(standings: Standings, labels: Labels) -> TextTable:
+    """Ranks and means of a measure, the best rival first, the bounds last."""
+    measure = standings.errors.measure
+    unit = measure.unit
+    header = ["Rank", "Controller"]
+    header += [f"Interquartile mean | {unit}", "Interquartile mean | 95 % interval"]
+    header += [] if unit == PERCENT else ["Interquartile mean | % of range"]
+    header += [f"Median ({unit})", f"Worst tenth ({unit})"]
+    header += ["Over the best | ratio", "Over the best | 95 % interval"]
+    bounded = standings.bound is not None
+    header += ["Over the oracle | ratio", "Over the oracle | 95 % interval"] if bounded else []
+    rows = [_standing_cells(row, labels, unit, bounded) for row in standings.rows]
+    title = f"{capital(measure.name)}: {len(standings.errors.episodes)} cases"
+    return TextTable(title, header, rows, words=2)
 
 
-def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:
-    """Table 22, or a third of table 30: RMSE and percent of the range, by pressure."""
-    unit = UNITS[task]
-    who = columns(results, model, task, phase)
-    pressures = results.suite.pressures_kpa[task]
-    bounded = phase == "III" and model == results.suite.models[0] and bool(results.bounds)
-    header = ["Pressure (kPa)"]
-    header += [f"{name} | {part}" for name in who for part in (unit, "%")]
-    rows = [
-        [f"{p:g}", *(text for figures in who.values() for text in _rmse_cells(figures(p)))]
-        for p in pressures
+def _standing_cells(row: Standing, labels: Labels, unit: str, bounded: bool) -> list[str]:
+    cells = [
+        str(row.rank) if row.rank else "bound",
+        labels.get(row.name, row.name),
+        figure(row.mean.estimate),
+        ends(row.mean),
+        *([] if unit == PERCENT else [figure(row.percent)]),
+        figure(row.median.estimate),
+        figure(row.worst.estimate),
+        *_ratio_cells(row.to_best),
     ]
-    mean = ["mean"]
-    for figures in who.values():
-        scores = [figures(p) for p in pressures]
-        mean += [_mean(s.rmse if s else None for s in scores)]
-        mean += [_mean((s.percent_of_range if s else None for s in scores), 2)]
-    if bounded:
-        header.append(f"Achievable bound | {unit}")
-        bounds = [results.bounds.get(p) for p in pressures]
-        rows = [[*row, _number(b, 3)] for row, b in zip(rows, bounds, strict=True)]
-        mean.append(_mean(bounds))
-    number, part = ("22", "") if task == "displacement" else ("30", f", phase {phase}")
-    title = f"Table {number}{part}: RMSE against the ideal, and in percent of the range"
-    return TextTable(title, header, [*rows, RULE, mean])
+    return cells + list(_ratio_cells(row.to_bound)) if bounded else cells
 
 
-def regression_table(results: Results, model: str, task: str, phase: str) -> TextTable:
-    """Table 21 or 27-29: intercept and slope with their standard errors, by pressure."""
-    unit = UNITS[task]
-    who = columns(results, model, task, phase)
-    rows: list[list[str]] = []
-    for pressure in results.suite.pressures_kpa[task]:
-        scores = [figures(pressure) for figures in who.values()]
-        rows.append([f"{pressure:g}", f"intercept ({unit})", *map(_intercept, scores)])
-        rows.append(["", f"slope ({unit}/s)", *map(_slope, scores)])
-    part = "" if task == "displacement" else f", phase {phase}"
-    title = f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)"
-    return TextTable(title, ["Pressure (kPa)", "Term", *who], rows, words=2)
+def _ratio_cells(ratio: Interval | None) -> tuple[str, str]:
+    if ratio is None:
+        return NONE, ""
+    if ratio.low == ratio.high == 1.0:
+        return "1", ""
+    return figure(ratio.estimate), ends(ratio)
 
 
-def replay_table(errors: Sequence[ReplayError]) -> TextTable:
-    """Signed errors of the replay in one phase, trial by trial, and their means."""
-    unit = UNITS[errors[0].task]
-    means = summarise(errors)
-    header = ["Pressure (kPa)", f"slope ({unit}/s)"]
-    header += [f"{name} ({unit})" for name in ("intercept", "mean position", "RMSE")]
-    rows = [
-        [f"{error.pressure_kpa:g}", *(f"{getattr(error, name):+.3f}" for name in QUANTITIES)]
-        for error in errors
+def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labels) -> TextTable:
+    """Start and steady errors, effort, limits, computing time."""
+    header = ["Controller", f"RMSE ({unit}) | first 0.5 s", f"RMSE ({unit}) | the rest"]
+    header += [f"Largest error ({unit})", "Effort (V)", "Variation (V/s)", "Saturated (%)"]
+    header += ["Clipped | % of steps", "Clipped | at most by (V)"]
+    header += ["Beyond a soft limit | % of cases", "Beyond a soft limit | at most (%)"]
+    header += ["act (us) | median", "act (us) | 99 %", "Real-time factor", "Failed"]
+    cells = [
+        [
+            labels.get(row.name, row.name),
+            *map(figure, (row.start, row.steady, row.largest)),
+            *map(figure, (row.effort_v, row.variation_v_per_s)),
+            _short(row.saturated_percent),
+            _short(row.clipped_percent),
+            figure(row.clipped_v),
+            _short(row.violating_percent),
+            _short(row.violation_percent),
+            *map(figure, (row.act_us, row.act_us_worst, row.real_time_factor)),
+            f"{row.failures} of {row.cases}",
+        ]
+        for row in rows
     ]
-    signed = ["mean", *(f"{means.signed[name]:+.3f}" for name in QUANTITIES)]
-    absolute = ["mean absolute", *(f"{means.absolute[name]:.3f}" for name in QUANTITIES)]
-    phase = errors[0].phase
-    part = "Displacement" if phase == "displacement" else f"Rotation, phase {phase}"
-    title = f"{part}: simulated less measured"
-    return TextTable(title, header, [*rows, RULE, signed, absolute])
+    return TextTable(title, header, cells)
 
 
-def target_table(checks: Iterable[Check], model: str) -> TextTable:
-    """Targets, what was got on a model, met or missed."""
+def exercise_table(
+    record: Record, tasks: Sequence[str], names: Sequence[str], title: str, labels: Labels
+) -> TextTable:
+    """What exercises came to beside their errors: medians over the cases that did not fail.
+
+    Args:
+        record: the suite's rows.
+        tasks: names of the exercises.
+        names: of the controllers, in the table's order.
+        title: of the table.
+        labels: what people call them.
+    """
+    rows = []
+    for name in names:
+        own = [row for (who, e), row in record.rows.items() if who == name and e.task in tasks]
+        done = [row["exercise"] for row in own if not row["failure"]]
+        medians = [float(np.median([row[f] for row in done] or [np.nan])) for f in EXERCISE_FIGURES]
+        rows.append([labels.get(name, name), *map(figure, medians)])
+    return TextTable(title, ["Controller", *EXERCISE_FIGURES.values()], rows)
+
+
+def tasks_table(found: Mapping[str, Standings], labels: Labels) -> TextTable:
+    """Interquartile mean of every controller in every single task."""
+    columns = [{row.name: row.mean for row in each.rows} for each in found.values()]
+    names = [name for name in labels if any(name in column for column in columns)]
+    units = [each.errors.measure.unit for each in found.values()]
+    header = [
+        "Controller",
+        *(f"{task.replace('_', ' ')} ({unit})" for task, unit in zip(found, units, strict=True)),
+    ]
+    rows = [
+        [
+            labels[name],
+            *(figure(column[name].estimate) if name in column else NONE for column in columns),
+        ]
+        for name in names
+    ]
+    return TextTable("Interquartile mean by task", header, rows)
+
+
+def obstacle_table(
+    obstacles: Mapping[tuple[str, float], str], found: Sequence[Standings]
+) -> TextTable:
+    """What keeps the actuator from following, and what the bound and the best rival reach."""
+    rows = []
+    for (task, kpa), why in sorted(obstacles.items()):
+        # On the way there a motor pulls; what it cannot do shows on the way back.
+        *_, standings = (each for each in found if task in each.errors.measure.tasks)
+        errors = standings.errors
+        names = [at if at is None else errors.names[at] for at in _leaders(standings)]
+        cells = [
+            NONE if name is None else figure(mean_by_trial(standings, name)[task, kpa])
+            for name in names
+        ]
+        rows.append([task, f"{kpa:g}", why, f"{errors.measure.name} ({errors.measure.unit})"])
+        rows[-1] += cells
+    header = ["Task", "Pressure (kPa)", "Why", "Mean error of", "Oracle", "Best rival"]
+    return TextTable("Obstacles", header, rows, words=4)
+
+
+def _leaders(standings: Standings) -> tuple[int | None, int | None]:
+    """Numbers of the bound and of the best rival."""
+    return standings.bound, standings.best
+
+
+def verdict_table(checks: Sequence[Verdict]) -> TextTable:
+    """Targets, what was got, met or missed."""
     rows = [
         [
             check.what,
-            f"{'<' if check.strict else '≤'} {check.limit:g} {check.unit}",
-            "—" if check.got is None else f"{check.got:.3g} {check.unit}",
-            check.verdict,
+            NONE if check.most is None else f"≤ {check.most:g} {check.unit}".strip(),
+            NONE if check.got is None else f"{figure(check.got.estimate)} {check.unit}".strip(),
+            "" if check.got is None else ends(check.got),
+            check.word,
         ]
         for check in checks
     ]
-    return TextTable(f"On `{model}`", ["What", "Target", "This run", "Verdict"], rows)
+    header = ["What", "Target", "This run", "95 % interval", "Verdict"]
+    return TextTable("What the suite asks for", header, rows)
 
 
-def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:
-    if score is None:
-        return MISSING, ""
-    return _number(score.rmse, 3), _number(score.percent_of_range, 2)
+def failure_table(record: Record, labels: Labels) -> TextTable:
+    """Why cases have no figures: each reason of a controller once."""
+    groups: dict[tuple[str, str], list[str]] = {}
+    for name, episode, reason in record.failures():
+        groups.setdefault((name, reason), []).append(episode.name)
+    rows = [
+        [
+            labels.get(name, name),
+            cases[0] if len(cases) == 1 else f"{cases[0]} and {len(cases) - 1} more",
+            reason,
+        ]
+        for (name, reason), cases in groups.items()
+    ]
+    header = ["Controller", "Case (station/task/kPa/repeat)", "Why"]
+    return TextTable("Cases without figures", header, rows, words=3)
 
 
-def _intercept(score: PhaseScore | None) -> str:
-    return MISSING if score is None else _with_error(score.intercept, score.intercept_std_error)
+def capital(text: str) -> str:
+    """The text with a capital first letter; phases keep theirs."""
+    return text[:1].upper() + text[1:]
 
 
-def _slope(score: PhaseScore | None) -> str:
-    return MISSING if score is None else _with_error(score.slope, score.slope_std_error)
+def figure(value: float) -> str:
+    """Three digits, without exponent; a dash for no number."""
+    if not np.isfinite(value):
+        return NONE if np.isnan(value) else "∞"
+    if value == 0.0:
+        return "0"
+    decimals = max(0, 2 - int(np.floor(np.log10(abs(value)))))
+    return f"{value:.{min(decimals, 6)}f}"
 
 
-def _with_error(estimate: float, error: float) -> str:
-    return f"{estimate:z.3f} ({error:.3f})"
+def ends(found: Interval) -> str:
+    """The ends of an interval; nothing where it is not known."""
+    if np.isnan(found.low):
+        return ""
+    return f"[{figure(found.low)}, {figure(found.high)}]"
 
 
-def _mean(values: Iterable[float | None], decimals: int = 3) -> str:
-    """The mean; nothing if one of the values is missing."""
-    known = list(values)
-    numbers = [value for value in known if value is not None]
-    return _number(fmean(numbers) if len(numbers) == len(known) else None, decimals)
-
-
-def _number(value: float | None, decimals: int) -> str:
-    return "" if value is None else f"{value:.{decimals}f}"
+def _short(value: float) -> str:
+    return NONE if np.isnan(value) else f"{value:.1f}"

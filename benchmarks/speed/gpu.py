@@ -112,7 +112,7 @@ def differences(precision: str) -> dict[str, float]:
     own.seed(every, range(n))
     own.reset(every)
     envs = CudaEngine(task, options, n, PRECISIONS[precision], seed=0)
-    names = [*own.record.states, "size"]
+    names = [*own.state_layout.states, "size"]
     found = dict.fromkeys([*names, "observation", "reward"], 0.0)
     generator = np.random.default_rng(0)
     for _ in range(_CHECKED_STEPS):

@@ -15,7 +15,7 @@ import typer
 
 from benchmarks.files import write_text
 from benchmarks.speed.measure import Plan
-from benchmarks.speed.views import View, sentences, views
+from benchmarks.speed.report.tables import View, sentences, views
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "speed.md"

@@ -12,9 +12,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from benchmarks.files import write_text
-from benchmarks.speed.document import Document, document, started
 from benchmarks.speed.measure import QUICK, Measurement, Plan
-from benchmarks.speed.ratios import (
+from benchmarks.speed.report.document import Document, document, started
+from benchmarks.speed.report.ratios import (
     CHECKS,
     TARGETS,
     Target,
@@ -23,8 +23,8 @@ from benchmarks.speed.ratios import (
     neighbours,
     wanted_rows,
 )
+from benchmarks.speed.report.tables import View, rate, views
 from benchmarks.speed.rows import RequestError, Row, all_rows, select
-from benchmarks.speed.views import View, rate, views
 from pma_gym.files import OutputError, check_output
 from pma_gym.terminal import SafeConsole
 

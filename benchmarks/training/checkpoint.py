@@ -18,7 +18,7 @@ from safetensors import SafetensorError
 from safetensors.torch import load_file, save_file
 from stable_baselines3.common.base_class import BaseAlgorithm
 
-from benchmarks.damaged import reason, say_damaged
+from benchmarks.runner.damaged_results import reason, say_damaged
 from benchmarks.training.averaging import WeightAverage
 from controllers.policies.tensor_header import LARGEST_HEADER, check_header
 from pma_gym.document_shape import check_shape

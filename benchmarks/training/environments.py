@@ -4,8 +4,8 @@ import time
 
 from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.training.piloted import PilotedVecEnv
-from benchmarks.training.preset import Preset
+from benchmarks.training.configuration.preset import Preset
+from benchmarks.training.policy_batch import PilotedVecEnv
 from benchmarks.training.stations import VALIDATION, VALIDATION_FIRST, Stations
 from pma_gym.sb3 import SB3VecEnv
 from pma_gym.tasks import named_task

@@ -12,8 +12,8 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
-from benchmarks.training.preset import Preset, PresetError, load_preset
-from benchmarks.training.product import policy_name, policy_of
+from benchmarks.training.configuration.preset import Preset, PresetError, load_preset
+from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.run import Order, Point, Trained, train
 from benchmarks.training.validation import unit_of
 from controllers.design.designs import kind_of

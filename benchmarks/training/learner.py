@@ -10,8 +10,8 @@ from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.noise import NormalActionNoise, VectorizedActionNoise
 from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.training.preset import Preset, PresetError
-from benchmarks.training.zoo_text import ACTIVATIONS
+from benchmarks.training.configuration.preset import Preset, PresetError
+from benchmarks.training.configuration.zoo_text import ACTIVATIONS
 
 _ACTIVATIONS = {name: getattr(torch.nn, name.removeprefix("nn.")) for name in ACTIVATIONS}
 

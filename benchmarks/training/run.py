@@ -27,13 +27,13 @@ from benchmarks.training.checkpoint import (
     save_checkpoint,
     usable,
 )
+from benchmarks.training.configuration.preset import Preset
 from benchmarks.training.environments import (
     drawing_s,
     training_environments,
     validation_environments,
 )
 from benchmarks.training.learner import learner
-from benchmarks.training.preset import Preset
 from benchmarks.training.validation import Validation, validate
 from pma_gym.document_shape import ListOf, Real
 

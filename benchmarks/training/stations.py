@@ -5,11 +5,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.comparison.recipe import Recipe
-from benchmarks.comparison.stations import draw_station
-from benchmarks.comparison.suite import frozen_suite
-from benchmarks.suite import SuiteError
-from pma_gym.engine.options import told_model
+from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.recipe import Recipe
+from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.stations import draw_station
+from pma_gym.engine.options import nominal_model
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EXERCISES
 
@@ -88,4 +88,4 @@ def _station(recipe: Recipe, number: int, added: tuple[str, ...]) -> Model:
     if last == "operator":
         return model.with_effects(OPERATOR)
     # Any exercise will do: all have the leg that controllers are told of.
-    return told_model(EXERCISES["isokinetic_exercise"], model)
+    return nominal_model(EXERCISES["isokinetic_exercise"], model)

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from stable_baselines3.common.vec_env import VecEnv
 
-from benchmarks.comparison.errors import Measure, measures, task_of
-from benchmarks.comparison.statistics import interquartile_mean
+from benchmarks.report.errors import Measure, measures, task_of
+from benchmarks.report.statistics import interquartile_mean
 from pma_gym.units import SI_FACTORS
 
 SEED = 4_000_000

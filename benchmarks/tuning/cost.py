@@ -14,7 +14,7 @@ from controllers.feedforward_pid import FeedforwardPID
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.pid import PID
 from pma_gym.effects.effect import Value
-from pma_gym.envs import PMAEnv, Station
+from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
@@ -36,7 +36,7 @@ STATIONS = ((1.0, 1.0), (1.0, 1.0), (1.2, 0.8), (0.8, 1.2))
 
 
 class Cost:
-    """What gains cost; see `benchmarks.tune`."""
+    """What gains cost; see `benchmarks.tuning.tune`."""
 
     def __init__(self, job: Job) -> None:
         self.job = job
@@ -75,7 +75,9 @@ class _Trial:
         controller.reset(env.reference, self.station)
         ended, info = False, dict[str, Any]()
         while not ended:
-            _, _, broken, ended, info = env.step(env.action(controller.act(env.reading, env.time)))
+            _, _, broken, ended, info = env.step(
+                env.action(controller.act(env.measurement, env.time))
+            )
             if broken:
                 return UNSTABLE_COST
         by_phase = info.get("rmse_by_phase_mm") or info["rmse_by_phase_deg"]
@@ -92,7 +94,7 @@ class _OpenLoop:
     def __init__(self, motion: NominalMotion) -> None:
         self.voltage = motion.voltage
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Nothing to compute."""
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from controllers.design.designs import loop_name, task_kind
 from controllers.pid import PID
 from pma_gym.data.protocol import Protocol
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.tasks import EVERY_TASK
 
@@ -37,10 +37,10 @@ class Job:
     delay_s: float = 0.0
 
     @property
-    def station(self) -> Station:
+    def station(self) -> StationInfo:
         """What a controller of the row is told."""
         task, pressure = EVERY_TASK[self.task], self.pressure_kpa * 1e3
-        return Station(self.model, task, pressure, 1.0 / self.rate_hz, self.delay_s)
+        return StationInfo(self.model, task, pressure, 1.0 / self.rate_hz, self.delay_s)
 
     @property
     def loop(self) -> str:

@@ -10,7 +10,7 @@ from scipy.optimize import root_scalar
 
 from controllers.models.voltage import nominal_offset
 from pma_gym.engine.options import motor_at_rest
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.linear import linearize_at, operating_point
 from pma_gym.plant.plant import Plant
@@ -37,7 +37,7 @@ class Place(NamedTuple):
     system: control.StateSpace
 
 
-def linearised(station: Station, shares: Iterable[float] = STROKES) -> list[Place]:
+def linearised(station: StationInfo, shares: Iterable[float] = STROKES) -> list[Place]:
     """The nominal plant at places of the stroke, in the task's directions of motion.
 
     Places that no voltage holds are left out.
@@ -57,7 +57,9 @@ def linearised(station: Station, shares: Iterable[float] = STROKES) -> list[Plac
     return places
 
 
-def _pulled(plant: Plant, station: Station, share: float) -> tuple[Condition, tuple[float, float]]:
+def _pulled(
+    plant: Plant, station: StationInfo, share: float
+) -> tuple[Condition, tuple[float, float]]:
     """The plant held by the motor at a share of the stroke, at the trial's pressure."""
     protocol, parameters = station.task.protocol, station.model.parameters
     stroke = share * protocol.span
@@ -68,7 +70,7 @@ def _pulled(plant: Plant, station: Station, share: float) -> tuple[Condition, tu
 
 
 def _contracted(
-    plant: Plant, station: Station, share: float
+    plant: Plant, station: StationInfo, share: float
 ) -> tuple[Condition, tuple[float, float]]:
     """The plant contracted by the regulator by a share of the stroke, under the task's load.
 
@@ -90,7 +92,9 @@ def _contracted(
     return plant.settle(motor, regulator_voltage=voltage), (motor, voltage)
 
 
-def sampled(place: Place, station: Station, actuator: Actuator | None = None) -> control.StateSpace:
+def sampled(
+    place: Place, station: StationInfo, actuator: Actuator | None = None
+) -> control.StateSpace:
     """Measured position (m or rad) by an actuator's voltage (V) in discrete time, delays in it.
 
     The voltage is held over each period; the sensor's lag and the station's delays of actions and

@@ -66,23 +66,23 @@ def best_plan(errors: Errors, plan: Array, others: Array, space: Space) -> Array
     """
     probe = _Probe(plan, space)
     starts = np.concatenate([plan[None, :], others])
-    found = errors(np.concatenate([probe.plans, others]))
+    residuals = errors(np.concatenate([probe.plans, others]))
     own = len(probe.plans)
-    sums = _sums(np.concatenate([found[:1], found[own:]]))
+    sums = _sums(np.concatenate([residuals[:1], residuals[own:]]))
     best = int(sums.argmin())
-    plan, least, found = starts[best], float(sums[best]), found[:own] if best == 0 else None
+    plan, least, residuals = starts[best], float(sums[best]), residuals[:own] if best == 0 else None
     for _ in range(ROUNDS):
-        if found is None:
+        if residuals is None:
             probe = _Probe(plan, space)
-            found = errors(probe.plans)
-        tried = space.changed(plan, LENGTHS * probe.step(found))
+            residuals = errors(probe.plans)
+        tried = space.changed(plan, LENGTHS * probe.step(residuals))
         sums = _sums(errors(tried))
         best = int(sums.argmin())
         lower = float(sums[best])
         if not lower < least:
             break
         small = lower > (1.0 - GAIN) * least
-        plan, least, found = tried[best], lower, None
+        plan, least, residuals = tried[best], lower, None
         if small:
             break
     return plan
@@ -102,17 +102,17 @@ class _Probe:
         changes[1:].flat[:: len(starts) + 1] = self.away
         self.plans = space.changed(plan, changes)
 
-    def step(self, found: Array) -> Array:
+    def step(self, residuals: Array) -> Array:
         """The Gauss-Newton step by blocks, by the errors of the plans."""
-        slopes = (found[1:] - found[0]) / self.away[:, None]
+        slopes = (residuals[1:] - residuals[0]) / self.away[:, None]
         square = slopes @ slopes.T
         square.flat[:: len(square) + 1] += TIE
-        return _bounded(square, -slopes @ found[0], self.low, self.high)
+        return _bounded(square, -slopes @ residuals[0], self.low, self.high)
 
 
-def _sums(found: Array) -> Array:
+def _sums(residuals: Array) -> Array:
     """Sums of squares, infinite for what is no number."""
-    sums = (found * found).sum(axis=1)
+    sums = (residuals * residuals).sum(axis=1)
     return np.where(np.isfinite(sums), sums, np.inf)
 
 

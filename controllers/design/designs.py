@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
 from pma_gym.documents import read_json
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
 
 DESIGNS_FILE = Path(__file__).with_name("designs.json")
@@ -27,7 +27,7 @@ Settings = TypeVar("Settings", bound=NamedTuple)
 
 def designed(
     controller: str,
-    station: Station,
+    station: StationInfo,
     defaults: Mapping[str, Settings],
     path: Path = DESIGNS_FILE,
 ) -> Settings:
@@ -64,7 +64,7 @@ def designed(
     return defaults[kind]._replace(**values)
 
 
-def task_kind(station: Station) -> str:
+def task_kind(station: StationInfo) -> str:
     """What a station's task asks for, whatever its name: see `kind_of`."""
     return kind_of(station.task)
 
@@ -76,7 +76,7 @@ def kind_of(task: Task) -> str:
     return KINDS[task.protocol.quantity]
 
 
-def must_give_a_position(station: Station) -> None:
+def must_give_a_position(station: StationInfo) -> None:
     """Refuse a task that gives no position to follow.
 
     Raises:
@@ -90,12 +90,12 @@ def must_give_a_position(station: Station) -> None:
         )
 
 
-def loop_name(station: Station) -> str:
+def loop_name(station: StationInfo) -> str:
     """Name of a loop: its control rate, and all delay in it if there is any.
 
     >>> from pma_gym.plant.model import load_model
     >>> from pma_gym.tasks import TASKS
-    >>> where = Station(load_model("cascade"), TASKS["displacement"], 3e5, 0.02)
+    >>> where = StationInfo(load_model("cascade"), TASKS["displacement"], 3e5, 0.02)
     >>> loop_name(where)
     '50hz'
     >>> from dataclasses import replace
@@ -113,13 +113,13 @@ def nearest_loop(wanted: str, known: list[str]) -> str:
 
 def _dead_time(loop: str) -> float:
     """Period and delay of a loop (s), read off its name."""
-    found = re.fullmatch(r"([0-9.e+-]+)hz(?:_delay([0-9.e+-]+)ms)?", loop)
-    if found is None:
+    match = re.fullmatch(r"([0-9.e+-]+)hz(?:_delay([0-9.e+-]+)ms)?", loop)
+    if match is None:
         raise ValueError(
             f"a loop is called like 100hz or 50hz_delay20ms (control rate in Hz, delay in ms), "
             f"got {loop!r}; write the settings anew: python -m benchmarks design"
         )
-    return 1.0 / float(found[1]) + 1e-3 * float(found[2] or 0.0)
+    return 1.0 / float(match[1]) + 1e-3 * float(match[2] or 0.0)
 
 
 @cache

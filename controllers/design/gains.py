@@ -1,4 +1,4 @@
-"""Gains by model, loop, task, controller and pressure, as `benchmarks/tune.py` wrote them."""
+"""Gains by model, loop, task, controller and pressure, as `benchmarks.tuning.tune` writes them."""
 
 import math
 from functools import cache
@@ -9,7 +9,7 @@ import numpy as np
 
 from controllers.design.designs import loop_name, must_give_a_position, nearest_loop, task_kind
 from pma_gym.documents import read_json
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.units import SI_FACTORS
 
 GAINS_FILE = Path(__file__).with_name("gains.json")
@@ -84,7 +84,7 @@ def column_names(unit: str) -> dict[str, tuple[str, float]]:
     }
 
 
-def scheduled_gains(controller: str, station: Station, path: Path = GAINS_FILE) -> Gains:
+def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FILE) -> Gains:
     """Gains of a controller for a station, linear between the tuned pressures.
 
     Gains are of a loop (control rate and delay) and of a kind of task: any reference in extension

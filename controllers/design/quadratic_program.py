@@ -73,10 +73,10 @@ class BoundedProgram:
         if not failed and np.all((low <= free) & (free <= high)):
             return free
         self.limited += 1
-        found = self._searched(square, linear, low, high)
-        if found is None:
+        optimum = self._searched(square, linear, low, high)
+        if optimum is None:
             self.failures += 1
-        return found
+        return optimum
 
     def _searched(
         self, square: np.ndarray, linear: np.ndarray, low: np.ndarray, high: np.ndarray

@@ -4,7 +4,7 @@ from typing import Literal
 
 import numpy as np
 
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 Hold = Literal["linear", "zero"]
 
@@ -42,7 +42,7 @@ class VoltageTable:
         at = int(np.searchsorted(self.times, time + 1e-9, side="right")) - 1
         return float(self.volts[max(at, 0)])
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Motor voltage (V) in the middle of the period for which it is held.
 
         The mean of a line over a period is its value in the middle, so the replay does not lag

@@ -6,7 +6,7 @@ import numpy as np
 
 from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, PRESSURES, Resistance, exercise_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     from pma_gym.tasks import Exercise
@@ -39,7 +39,7 @@ class ConstantPressure:
     name = "constant_pressure"
     kinds = ("isokinetic", "moment")
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Find the pressure.
 
         Raises:
@@ -50,13 +50,13 @@ class ConstantPressure:
         prescribed = exercise.prescription is not None
         self.pressure = nearest_pressure(station, exercise) if prescribed else station.pressure
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
         share = min(time / CHANGE_S, 1.0)
         return self._volts(self._first + share * (self.pressure - self._first))
 
 
-def nearest_pressure(station: Station, exercise: "Exercise") -> float:
+def nearest_pressure(station: StationInfo, exercise: "Exercise") -> float:
     """Pressure (Pa) whose moments miss a prescription least over 0-90 deg, in the mean square."""
     assert exercise.prescription is not None
     wanted = np.array([exercise.prescription.at(angle) for angle in ANGLES.tolist()])

@@ -8,18 +8,18 @@ from numpy.typing import NDArray
 from controllers.controller import Reference
 from controllers.design.quadratic_program import BoundedProgram
 from controllers.exercise.joint_prediction import Horizon, Joint, Program, programmed
-from controllers.exercise.leg_observer import Agitation, LegObserver, PressureObserver, leg_of
+from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
 from controllers.exercise.resistance import Resistance, exercise_of, pressures_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.tasks.exercise import PACE
 
 Array = NDArray[np.float64]
 
 STRIDE_S = 0.01
-"""Time from one foreseen instant to the next (s), or a control step where that is longer."""
+"""Time from one predicted instant to the next (s), or a control step where that is longer."""
 
 
-class Foresight(NamedTuple):
+class Settings(NamedTuple):
     """Settings of the MPC.
 
     Attributes:
@@ -27,16 +27,16 @@ class Foresight(NamedTuple):
             (rad^2 or N^2 m^2).
         expected: share of what the operator is expected to give later, 1.
         horizon: how far it looks ahead (s), beyond the delays.
-        agitation: what the observers take for unknown.
+        process_noise: what the observers take for unknown.
     """
 
     effort: float
     expected: float = 1.0
     horizon: float = 0.5
-    agitation: Agitation = Agitation()
+    process_noise: ProcessNoise = ProcessNoise()
 
 
-ANGLE, MOMENT = Foresight(effort=1e-4), Foresight(effort=3e-3)
+ANGLE, MOMENT = Settings(effort=1e-4), Settings(effort=3e-3)
 """Settings where the speed is prescribed, and where a moment is."""
 
 
@@ -50,8 +50,8 @@ class ExerciseMPC:
         min  |e|^2 / n + rho * sum over i of (v_i - v_(i-1))^2,   0 <= V <= 10 V
 
     commanding the first of them. e is the angle less the reference, or the moment less the one that
-    is prescribed at the angle foreseen. The commands are counted as the moment that they come to in
-    the end, h (P_c + g - P), so that rho is the same at every angle and pressure. The nominal
+    is prescribed at the angle predicted. The commands are counted as the moment that they come to
+    in the end, h (P_c + g - P), so that rho is the same at every angle and pressure. The nominal
     device is taken as it is at the present pressure and angle: h and its stiffness k are those of
     `Resistance`. What it is off does not matter, for deviations start at the load cell's moment;
     what the regulator is off, g, is observed. Hysteresis is left to the load cell.
@@ -101,10 +101,10 @@ class ExerciseMPC:
     name = "exercise_mpc"
     kinds = ("isokinetic", "moment")
 
-    def __init__(self, settings: Foresight | None = None) -> None:
+    def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Begin at rest, at the trial's first pressure.
 
         Raises:
@@ -114,11 +114,11 @@ class ExerciseMPC:
         self._prescription = exercise_of(self.name, station).prescription
         self.settings = self._given or (ANGLE if self._prescription is None else MOMENT)
         self._station, self._device, self._volts = station, Resistance(station), volts_of(station)
-        self._leg = LegObserver(station, self.settings.agitation)
-        self._regulator = PressureObserver(station, self.settings.agitation)
+        self._leg = LegObserver(station, self.settings.process_noise)
+        self._regulator = PressureObserver(station, self.settings.process_noise)
         self._limits = np.array(pressures_of(station))
         self._horizon = _horizon(station, self.settings.horizon)
-        self._joint = _joint(station, self.settings.agitation.fade)
+        self._joint = _joint(station, self.settings.process_noise.fade)
         self._old = round(station.observation_delay / station.period)
         self._foretell(reference)
         # In force before the coming reading, then what is on its way.
@@ -138,12 +138,12 @@ class ExerciseMPC:
             angles = self._prescription.angles
             self._knots = angles, [self._prescription.at(angle) for angle in angles]
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        self._leg.see(observation)
-        self._regulator.see(observation.pressure, self._sent.pop(0))
+        self._leg.update(measurement)
+        self._regulator.update(measurement.pressure, self._sent.pop(0))
         now = max(round(time / self._station.period) - self._old, 0)
-        self._chosen = self._best(self._station.moment(observation), now)
+        self._chosen = self._best(self._station.moment(measurement), now)
         self._sent.append(self._chosen)
         return self._volts(self._chosen)
 
@@ -164,17 +164,17 @@ class ExerciseMPC:
         return self._chosen if plan is None else still + float(plan[0]) / local.influence
 
     def _errors(self, program: Program, past: Array, moment: float, now: int) -> Array:
-        """Errors that the commands on their way will leave at the foreseen times (rad or N m)."""
+        """Errors that the commands on their way will leave at the predicted times (rad or N m)."""
         angle, speed, operator, slope, _ = self._leg.state.tolist()
         stride = self._horizon.stride
         state = np.array([0.0, speed, 0.0, operator - moment, slope, speed])
         last = now + stride * self._horizon.ahead
         drift = self._expected[now:last:stride] - self._expected[now]
-        foreseen = program.state @ state + program.drift @ drift + program.past @ past
-        angles = angle + foreseen[0]
+        predicted = program.state @ state + program.drift @ drift + program.past @ past
+        angles = angle + predicted[0]
         if self._prescription is None:
             return angles - self._wanted[now + stride : last + 1 : stride]
-        return moment + foreseen[1] - np.interp(angles, *self._knots)
+        return moment + predicted[1] - np.interp(angles, *self._knots)
 
     def _programmed(self, stiffness: float, pressure: float) -> Program:
         """The program of a stiffness (N m/rad) and a pressure (Pa), rounded: it is kept."""
@@ -188,7 +188,7 @@ class ExerciseMPC:
         return programmed(joint, of_moment, self.settings.effort, self._horizon)
 
 
-def expected_moment(station: Station, device: Resistance, times: Array) -> Array:
+def expected_moment(station: StationInfo, device: Resistance, times: Array) -> Array:
     """What a typical operator gives (N m) at times (s), but for how far he is from his intent.
 
         K theta_i(t - reaction) + plan(theta_i(t - reaction - rise))
@@ -208,14 +208,14 @@ def expected_moment(station: Station, device: Resistance, times: Array) -> Array
     return people.stiffness * meant + np.array(plan)
 
 
-def _horizon(station: Station, length: float) -> Horizon:
+def _horizon(station: StationInfo, length: float) -> Horizon:
     late = round((station.action_delay + station.observation_delay) / station.period)
     stride = max(1, round(STRIDE_S / station.period))
     ahead = max(4, round((length / station.period + late) / stride))
     return Horizon(station.period, stride, ahead, late)
 
 
-def _joint(station: Station, fade: float) -> Joint:
+def _joint(station: StationInfo, fade: float) -> Joint:
     exercise = station.task.exercise
     assert exercise is not None
     lag = station.model.parameters["regulator_lag"].time_constant

@@ -1,4 +1,4 @@
-"""What an exercise's joint is foreseen to do, and the quadratic program that is made of it.
+"""What an exercise's joint is predicted to do, and the quadratic program that is made of it.
 
 All are deviations from now, but speeds and the operator's slope. The moment that the pressure makes
 stands in place of the pressure, q = h (P - P_0), u = h (P_c + g - P_0), h the change of the moment
@@ -56,12 +56,12 @@ class Joint(NamedTuple):
 
 
 class Horizon(NamedTuple):
-    """Times that are foreseen.
+    """Times that are predicted.
 
     Attributes:
         period: of the control step (s).
-        stride: control steps from one foreseen time to the next.
-        ahead: foreseen times, the first a stride from now.
+        stride: control steps from one predicted time to the next.
+        ahead: predicted times, the first a stride from now.
         late: control steps in which commands are on their way.
     """
 
@@ -83,7 +83,7 @@ class Program(NamedTuple):
 
     Attributes:
         square: H, shape (moves, moves).
-        pull: q by the errors foreseen, shape (moves, ahead).
+        pull: q by the errors predicted, shape (moves, ahead).
         state: outputs by theta, w, q, m, s and w_0 of now, shape (outputs, ahead, 6).
         drift: outputs by d of every stride, shape (outputs, ahead, ahead).
         past: outputs by the commands on their way, shape (outputs, ahead, late).
@@ -106,11 +106,11 @@ def programmed(joint: Joint, of_moment: bool, effort: float, horizon: Horizon) -
         joint: the model's numbers.
         of_moment: whether the cost is of the moment, or of the angle.
         effort: weight of a change of the command beside the mean square of the errors.
-        horizon: what is foreseen.
+        horizon: what is predicted.
     """
     k, c = joint.stiffness, joint.muscle
     outputs = np.array([[1.0, 0.0, 0.0, 0.0, 0.0, 0.0], [k, c, 1.0, 0.0, 0.0, -c]])
-    state, drift, command = foreseen(joint, outputs[: 1 + of_moment], horizon)
+    state, drift, command = predicted(joint, outputs[: 1 + of_moment], horizon)
     edges = np.array(horizon.edges)
     effect = np.add.reduceat(command[-1], edges[:-1], axis=1)
     pull = effect.T / horizon.ahead
@@ -121,8 +121,8 @@ def programmed(joint: Joint, of_moment: bool, effort: float, horizon: Horizon) -
     return Program(square, pull, state, drift, command[:, :, : horizon.late].copy())
 
 
-def foreseen(joint: Joint, outputs: Array, horizon: Horizon) -> tuple[Array, Array, Array]:
-    """Outputs at the foreseen times, by the state of now and by d and u of every control step.
+def predicted(joint: Joint, outputs: Array, horizon: Horizon) -> tuple[Array, Array, Array]:
+    """Outputs at the predicted times, by the state of now and by d and u of every control step.
 
     Args:
         joint: the model's numbers.
@@ -158,7 +158,7 @@ def _step(joint: Joint, period: float) -> tuple[Array, Array, Array]:
 def _toeplitz(pulse: Array, stride: int) -> Array:
     """Of responses to a pulse, (n, outputs), those to one in every step: (outputs, ahead, n)."""
     count = len(pulse)
-    found = np.zeros((pulse.shape[1], count, count))
+    matrices = np.zeros((pulse.shape[1], count, count))
     for j in range(count):
-        found[:, j:, j] = pulse[: count - j].T
-    return found[:, stride - 1 :: stride]
+        matrices[:, j:, j] = pulse[: count - j].T
+    return matrices[:, stride - 1 :: stride]

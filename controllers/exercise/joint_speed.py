@@ -2,7 +2,7 @@
 
 import math
 
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class JointSpeed:
@@ -11,19 +11,19 @@ class JointSpeed:
     The LVDT is finer than the potentiometer. What the cable stretches is taken for no motion.
 
     Args:
-        station: what the controller is told.
+        station: the station as the controller knows it.
         time_constant: of the filter (s).
 
     Attributes:
         speed: of late (rad/s).
     """
 
-    def __init__(self, station: Station, time_constant: float) -> None:
+    def __init__(self, station: StationInfo, time_constant: float) -> None:
         self._rate = 1.0 / (station.period * station.model.parameters["rotor"].radius)
         self._kept = math.exp(-station.period / time_constant)
         self.speed = self._extension = 0.0
 
-    def see(self, reading: Reading) -> float:
+    def update(self, reading: Measurement) -> float:
         """Take a reading; the speed (rad/s)."""
         rate = self._rate * (reading.extension - self._extension)
         self._extension = reading.extension

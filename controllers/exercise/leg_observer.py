@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from controllers.exercise.resistance import AWAY_PA
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
-class Agitation(NamedTuple):
+class ProcessNoise(NamedTuple):
     """What the filters take for unknown, in SI; assumptions, found by trying.
 
     Attributes:
@@ -47,22 +47,27 @@ class LegObserver:
     """The filter of the leg.
 
     Args:
-        station: what the controller is told.
-        agitation: what is unknown.
+        station: the station as the controller knows it.
+        process_noise: what is unknown.
 
     Attributes:
         state: theta (rad), w (rad/s), M_h (N m), s (N m/s) and e (rad) at the last reading.
     """
 
-    def __init__(self, station: Station, agitation: Agitation) -> None:
+    def __init__(self, station: StationInfo, process_noise: ProcessNoise) -> None:
         cable, sensors = station.model.parameters["cable"], station.model.parameters
         self._radius, self._stiffness = sensors["rotor"].radius, cable.stiffness
         self._station = station
-        noise = agitation.speed, agitation.operator, agitation.slope, agitation.slack
+        noise = (
+            process_noise.speed,
+            process_noise.operator,
+            process_noise.slope,
+            process_noise.slack,
+        )
         process = np.diag(np.square([0.0, *noise])) * station.period
         fine = sensors["lvdt"].noise / self._radius
         spread = np.square([sensors["potentiometer"].noise, fine])
-        self._whole, self._push = _leg(station, agitation.fade)
+        self._whole, self._push = _leg(station, process_noise.fade)
         self._seen = np.array([[1.0, 0.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 1.0]])
         self._gain = settled_gain(self._whole, self._seen, process, np.diag(spread))
         # A load that the trial begins with has stretched the cable already.
@@ -70,7 +75,7 @@ class LegObserver:
         self._moment = self._radius * station.load
         self.state = np.array([0.0, 0.0, self._moment, 0.0, 0.0])
 
-    def see(self, reading: Reading) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading, a period after the last."""
         moment = self._station.moment(reading)
         wound = reading.extension + reading.load / self._stiffness - self._stretch
@@ -83,25 +88,25 @@ class PressureObserver:
     """The filter of the regulator.
 
     Args:
-        station: what the controller is told.
-        agitation: what is unknown.
+        station: the station as the controller knows it.
+        process_noise: what is unknown.
 
     Attributes:
         pressure: P at the last reading (Pa).
         offset: g (Pa).
     """
 
-    def __init__(self, station: Station, agitation: Agitation) -> None:
+    def __init__(self, station: StationInfo, process_noise: ProcessNoise) -> None:
         parameters = station.model.parameters
         kept = np.exp(-station.period / parameters["regulator_lag"].time_constant)
         whole = np.array([[kept, 1.0 - kept], [0.0, 1.0]])
-        process = np.diag(np.square([agitation.pressure, agitation.line])) * station.period
+        process = np.diag(np.square([process_noise.pressure, process_noise.line])) * station.period
         spread = np.array([[parameters["pressure_transducer"].noise ** 2]])
         gain = settled_gain(whole, np.array([[1.0, 0.0]]), process, spread)
         self._kept, self._gain = float(kept), [float(value) for value in gain[:, 0]]
         self.pressure, self.offset = station.pressure, 0.0
 
-    def see(self, pressure: float, commanded: float) -> None:
+    def update(self, pressure: float, commanded: float) -> None:
         """Take a pressure (Pa), a period after the last, in which one was commanded (Pa)."""
         reached = commanded + self.offset
         believed = reached + self._kept * (self.pressure - reached)
@@ -110,7 +115,7 @@ class PressureObserver:
         self.offset = min(max(self.offset + self._gain[1] * error, -AWAY_PA), AWAY_PA)
 
 
-def leg_of(station: Station) -> tuple[float, float]:
+def leg_of(station: StationInfo) -> tuple[float, float]:
     """Inertia I (kg m^2) and damping D (N m s) of all that turns with the nominal joint."""
     parameters = station.model.parameters
     leg, rotor, slide = (parameters[name] for name in ("leg", "rotor", "slide"))
@@ -129,7 +134,7 @@ def settled_gain(
     return np.linalg.solve(seen @ covariance @ seen.T + spread, seen @ covariance).T
 
 
-def _leg(station: Station, fade: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _leg(station: StationInfo, fade: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The leg over a period: what becomes of its state, and of a moment at the joint."""
     inertia, damping = leg_of(station)
     rates = np.zeros((6, 6))

@@ -9,7 +9,7 @@ from controllers.controller import Reference
 from controllers.exercise.joint_speed import JointSpeed
 from controllers.exercise.resistance import ANGLES, Arrival, Resistance, exercise_of, volts_of
 from controllers.exercise.scheduled_pressure import schedule
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class MomentGains(NamedTuple):
@@ -52,7 +52,7 @@ class MomentPID:
     def __init__(self, gains: MomentGains | None = None) -> None:
         self.gains = gains or MomentGains()
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Begin at the trial's first pressure and moment.
 
         Raises:
@@ -68,17 +68,17 @@ class MomentPID:
         self._sum = self._slope = 0.0
         self._over: float | None = None
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        gains, angle = self.gains, observation.rotation
-        over = self._station.position(observation)
+        gains, angle = self.gains, measurement.rotation
+        over = self._station.position(measurement)
         slope = 0.0 if self._over is None else (over - self._over) / self._period
         self._slope, self._over = slope + self._kept * (self._slope - slope), over
         moment = gains.proportional * over + self._sum + gains.derivative * self._slope
-        coming = angle + gains.lead * self._speed.see(observation)
+        coming = angle + gains.lead * self._speed.update(measurement)
         pressure = float(np.interp(coming, ANGLES, self._schedule))
-        pressure -= moment / self._device.at(observation.pressure, angle).influence
-        if not self._arrival.held(observation.pressure, -over):
+        pressure -= moment / self._device.at(measurement.pressure, angle).influence
+        if not self._arrival.held(measurement.pressure, -over):
             self._sum += gains.integral * self._period * over
         self._arrival.command(pressure)
         return self._volts(pressure)

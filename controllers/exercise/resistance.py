@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.exercise_device.device import FULL_ANGLE, own_device, resistive_moment
 from pma_gym.tasks import Exercise
 
@@ -55,7 +55,7 @@ class Resistance:
         moments: table over `PRESSURES` and `ANGLES` (N m).
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         exercise = station.task.exercise
         assert exercise is not None
         self.moments = _table(station, exercise.start_moment)
@@ -87,12 +87,12 @@ ABLE = {
 """What a controller can do, in words, by whether it follows a moment; None: either."""
 
 
-def exercise_of(name: str, station: Station, prescribed: bool | None = None) -> Exercise:
+def exercise_of(name: str, station: StationInfo, prescribed: bool | None = None) -> Exercise:
     """The exercise of a station's task, if a controller can do it.
 
     Args:
         name: of the controller.
-        station: what it is told.
+        station: the station as the controller knows it.
         prescribed: whether it follows a moment (True) or holds the speed (False); None: either.
     Raises:
         ValueError: it cannot; says which tasks it can do.
@@ -112,10 +112,10 @@ class Arrival:
     The nominal regulator is a lag: believed' = (commanded - believed) / tau.
 
     Args:
-        station: what the controller is told.
+        station: the station as the controller knows it.
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         lag = station.model.parameters["regulator_lag"].time_constant
         self._kept = math.exp(-station.period / lag)
         self._lowest, self._highest = pressures_of(station)
@@ -140,13 +140,13 @@ class Arrival:
         return abs(away) > AWAY_PA and (away > 0.0) == (rise > 0.0)
 
 
-def pressures_of(station: Station) -> tuple[float, float]:
+def pressures_of(station: StationInfo) -> tuple[float, float]:
     """Pressures (Pa) that the regulator gives at 0 V, or no pressure at all, and at 10 V."""
     line = station.model.parameters["regulator_line"]
     return max(line.offset, 0.0), line.gain * RANGE_V + line.offset
 
 
-def volts_of(station: Station) -> Callable[[float], float]:
+def volts_of(station: StationInfo) -> Callable[[float], float]:
     """What gives the regulator's volts, held to 0-10 V, of a pressure (Pa), by the nominal line."""
     line = station.model.parameters["regulator_line"]
     gain, offset = line.gain, line.offset
@@ -160,7 +160,7 @@ def _place(at: float, count: int) -> tuple[int, float]:
     return cell, held - cell
 
 
-def _table(station: Station, start_moment: float) -> NDArray[np.float64]:
+def _table(station: StationInfo, start_moment: float) -> NDArray[np.float64]:
     """Moments (N m), shape (pressures, angles)."""
     model = station.model
     set_at = station.pressure, start_moment

@@ -4,7 +4,7 @@ import numpy as np
 
 from controllers.controller import Reference
 from controllers.exercise.resistance import ANGLES, exercise_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.exercise_device.device import own_device
 from pma_gym.plant.exercise_device.prescription import follow_from
 
@@ -22,7 +22,7 @@ class ScheduledPressure:
     name = "scheduled_pressure"
     kinds = ("moment",)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Find the pressures.
 
         Raises:
@@ -31,12 +31,12 @@ class ScheduledPressure:
         exercise_of(self.name, station, prescribed=True)
         self._volts, self._schedule = volts_of(station), schedule(station)
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
-        return self._volts(float(np.interp(observation.rotation, ANGLES, self._schedule)))
+        return self._volts(float(np.interp(measurement.rotation, ANGLES, self._schedule)))
 
 
-def schedule(station: Station) -> np.ndarray:
+def schedule(station: StationInfo) -> np.ndarray:
     """Pressures (Pa) over `ANGLES` that give the prescribed moments, shape (angles,).
 
     Raises:

@@ -5,7 +5,7 @@ from typing import NamedTuple
 from controllers.controller import Reference
 from controllers.exercise.joint_speed import JointSpeed
 from controllers.exercise.resistance import Arrival, Resistance, exercise_of, volts_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class SpeedGains(NamedTuple):
@@ -58,7 +58,7 @@ class SpeedPID:
     def __init__(self, gains: SpeedGains | None = None) -> None:
         self.gains = gains or SpeedGains()
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Begin at rest, at the trial's first pressure.
 
         Raises:
@@ -72,17 +72,17 @@ class SpeedPID:
         self._speed = JointSpeed(station, self.gains.filter)
         self._sum = 0.0
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Regulator voltage (V)."""
         gains, due = self.gains, time + self._ahead
         wanted = self._reference(due)
         slow = (self._reference(due + self._period) - wanted) / self._period
-        slow -= self._speed.see(observation)
-        behind = wanted - observation.rotation
+        slow -= self._speed.update(measurement)
+        behind = wanted - measurement.rotation
         moment = gains.speed * slow + gains.angle * behind + self._sum
-        local = self._device.at(observation.pressure, observation.rotation)
+        local = self._device.at(measurement.pressure, measurement.rotation)
         pressure = self._first - moment / local.influence
-        if not self._arrival.held(observation.pressure, -behind):
+        if not self._arrival.held(measurement.pressure, -behind):
             self._sum += gains.sum * self._period * behind
         self._arrival.command(pressure)
         return self._volts(pressure)

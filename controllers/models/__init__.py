@@ -1,1 +1,1 @@
-"""Nominal models: the plant as controllers know it, its inverse, its linear and reduced forms."""
+"""ModelKey models: the plant as controllers know it, its inverse, its linear and reduced forms."""

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from controllers.models.local_model import observer_form
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 LOOSE_LOAD_N, LOOSE_WAY_M = 3.0, 0.25e-3
 """A cable is slack where its tension is below this, and it is wound in by so much less than its
@@ -31,7 +31,7 @@ class Cable:
         settling: whether it does, or did just now: the rotor may still swing.
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
         self._exists = "cable" in parameters and station.task.actuator == "motor"
         self.loose = self.settling = self._exists
@@ -42,7 +42,7 @@ class Cable:
             self._radius = parameters["rotor"].radius
             self._least = parameters["cable"].slack - LOOSE_WAY_M
 
-    def see(self, reading: Reading) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading."""
         if not self._exists:
             return
@@ -60,7 +60,7 @@ class Cable:
         self.settling = reading.time < self._slack_until + IMPACT_S
 
 
-def free_rotor(station: Station, order: int) -> tuple[np.ndarray, np.ndarray] | None:
+def free_rotor(station: StationInfo, order: int) -> tuple[np.ndarray, np.ndarray] | None:
     """The rotor on a loose cable, sampled, in observer form; None where it never is alone.
 
     theta'' = (r g V - B_M theta') / J; the sensor's lag is left out.
@@ -79,7 +79,7 @@ def free_rotor(station: Station, order: int) -> tuple[np.ndarray, np.ndarray] | 
     slowed = -math.expm1(-rate * period) / rate
     a = np.array([[1.0, slowed], [0.0, 1.0 - rate * slowed]])
     b = push * np.array([(period - slowed) / rate, slowed])
-    found = observer_form((a, b, np.array([1.0, 0.0])))
+    observer = observer_form((a, b, np.array([1.0, 0.0])))
     columns = np.zeros((2, order))
-    columns[:, :2] = found.reshape(2, 2) * [[-1.0], [1.0]]
+    columns[:, :2] = observer.reshape(2, 2) * [[-1.0], [1.0]]
     return columns[0], columns[1]

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from controllers.models.muscle import Muscle
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.plant import Plant
 
 PROBE_PA = 1e3
@@ -41,7 +41,7 @@ class ContractionInverse:
         """Into how many steps a control period is divided: memories need short ones."""
         return max(1, math.ceil(period / 2e-3 - 1e-9))
 
-    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Regulator voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
         needed = self.pressures(wanted, station, station.period / parts)
@@ -54,7 +54,7 @@ class ContractionInverse:
         asked = start + change / -np.expm1(-pace * station.period)
         return (asked - self.line.offset) / self.line.gain
 
-    def pressures(self, wanted: np.ndarray, station: Station, step: float) -> np.ndarray:
+    def pressures(self, wanted: np.ndarray, station: StationInfo, step: float) -> np.ndarray:
         """Pressure (Pa) in the middle of every step of a motion, shape (n,).
 
         Args:
@@ -65,7 +65,7 @@ class ContractionInverse:
         motor = (station.task.load - self.drive.offset) / self.drive.gain
         muscle = Muscle(self.plant, self.plant.settle(motor, pressure=station.pressure))
         begin = muscle.zero - float(muscle.state[self.plant.states.index("contraction")])
-        found, pressure = [], station.pressure
+        pressures, pressure = [], station.pressure
         middles, speeds = 0.5 * (wanted[1:] + wanted[:-1]), np.diff(wanted) / step
         for contraction, speed in zip(middles.tolist(), speeds.tolist(), strict=True):
             motion = begin - contraction, -speed
@@ -76,8 +76,8 @@ class ContractionInverse:
             pressure += (load - here) / (above - here) * PROBE_PA
             muscle.tension_at(pressure, *motion)
             muscle.remember(*motion, step)
-            found.append(pressure)
-        return np.array(found)
+            pressures.append(pressure)
+        return np.array(pressures)
 
     def _pace(self, pressure: float, sign: int) -> float:
         """Rate (1/s) at which the pressure follows a command above (1) or below it (-1)."""

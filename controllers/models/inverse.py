@@ -26,7 +26,7 @@ from controllers.models.muscle import Muscle
 from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.codegen.rebinding import lanes
 from pma_gym.effects.drive.position_map import mapped_displacement
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 
@@ -44,7 +44,7 @@ class Inverse(Protocol):
         """Into how many steps a control period (s) is divided."""
         ...
 
-    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Voltage (V) of every control period of a motion.
 
         Args:
@@ -83,7 +83,7 @@ class StationInverse:
         """Into how many steps a control period (s) is divided."""
         return max(1, math.ceil(period / STEP_S - 1e-9))
 
-    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
         rotation = station.task.protocol.quantity == "rotation"
@@ -156,7 +156,7 @@ class StationInverse:
         before = np.concatenate([[0.0], momentum[parts - 1 :: parts] / step])
         return (tension + friction).reshape(-1, parts).mean(axis=1) + np.diff(before) / period
 
-    def _take_up_slack(self, load: np.ndarray, station: Station) -> None:
+    def _take_up_slack(self, load: np.ndarray, station: StationInfo) -> None:
         """Replace the first loads in force by a push that carries the rotor through the slack.
 
         Under a load F for a time t_1, then coasting as long, the cable winds in
@@ -186,7 +186,7 @@ class CascadeInverse:
         """Into how many steps a control period is divided: its middle is asked for."""
         return 2
 
-    def along(self, wanted: np.ndarray, station: Station) -> np.ndarray:
+    def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, from its middle."""
         ends, middle = wanted[::2], wanted[1::2]
         if station.task.protocol.quantity == "rotation":

@@ -31,8 +31,8 @@ FASTEST = 0.37
 """Least share of a lag that is left after a control period: that of a lag of one period."""
 
 
-class Lags(NamedTuple):
-    """Lags and dead time at a place of the stroke.
+class LagDeadTimeModel(NamedTuple):
+    """LagDeadTimeModel and dead time at a place of the stroke.
 
     Attributes:
         gain: g (m/V or rad/V).
@@ -54,7 +54,7 @@ class Lags(NamedTuple):
         return a
 
 
-def lags_of(local: LocalModel, period: float, order: int) -> Lags:
+def lag_dead_time_model(local: LocalModel, period: float, order: int) -> LagDeadTimeModel:
     """A local model reduced to `order` lags; what is left of its mean delay is dead time.
 
     Args:
@@ -71,4 +71,4 @@ def lags_of(local: LocalModel, period: float, order: int) -> Lags:
     # Two poles that swing are slower by themselves than their response is.
     shrink = min(1.0, delay / sum(slowest))
     constants = tuple(max(shrink * lag, -period / math.log(FASTEST)) for lag in slowest)
-    return Lags(local.gain, constants, max(delay - sum(constants), 0.0))
+    return LagDeadTimeModel(local.gain, constants, max(delay - sum(constants), 0.0))

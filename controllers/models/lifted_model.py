@@ -34,12 +34,12 @@ LOOSE = 1.0
 """The same while the cable is slack."""
 
 
-class LiftedPlant:
+class LiftedModel:
     """G of the voltages sent in a trial's steps.
 
     Args:
         motion: the nominal motion.
-        late: after how many steps a voltage is in force and its effect heard.
+        late: after how many steps a voltage is in force and its effect measured.
         count: number of steps.
     """
 
@@ -89,5 +89,5 @@ def banded(
     diagonals: Sequence[ArrayLike], offsets: Sequence[int], shape: tuple[int, int]
 ) -> sparse.csc_array:
     """A sparse matrix of diagonals, each with its offset from the main one."""
-    found = sparse.diags_array(diagonals, offsets=offsets, shape=shape)  # type: ignore[arg-type]
-    return found.tocsc()
+    matrix = sparse.diags_array(diagonals, offsets=offsets, shape=shape)  # type: ignore[arg-type]
+    return matrix.tocsc()

@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.engine.options import motor_at_rest
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.linear import FOLLOWING
 from pma_gym.plant.plant import Plant
@@ -77,7 +77,7 @@ class LinearMotion(NamedTuple):
 
 
 def linear_motion(
-    needed: np.ndarray, wanted: np.ndarray, station: Station, beyond: int
+    needed: np.ndarray, wanted: np.ndarray, station: StationInfo, beyond: int
 ) -> LinearMotion:
     """The nominal motion under the feed-forward's voltages, and the plant near it.
 
@@ -137,7 +137,7 @@ def linear_motion(
     )
 
 
-def _idle_voltage(station: Station) -> float:
+def _idle_voltage(station: StationInfo) -> float:
     """Motor voltage (V) at which the nominal drive begins to pull; 0 without a drive."""
     drive = station.model.parameters.get("drive")
     return max(0.0, -drive.offset / drive.gain) if drive else 0.0

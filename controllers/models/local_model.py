@@ -181,10 +181,10 @@ def _rests(
     begin = float(rest(np.array([commands[0] if motor else commands[1]]))[2][0])
     searched = np.linspace(0.0, VOLTAGE_LIMIT, _SEARCHED)
     held = _rising(rest(searched)[2] - begin, lowest=0.0 if motor else -np.inf)
-    volts, found = searched[held[0]], held[1]
-    low = max(reach[0], float(found[0]))
-    places = np.linspace(low, min(reach[1], float(found[-1])), PLACES)
-    volts = np.interp(places, found, volts)
+    volts, rests = searched[held[0]], held[1]
+    low = max(reach[0], float(rests[0]))
+    places = np.linspace(low, min(reach[1], float(rests[-1])), PLACES)
+    volts = np.interp(places, rests, volts)
     states, zeros, positions = rest(volts)
     rests = [
         (
@@ -271,11 +271,11 @@ def _order(system: System) -> int:
 
 def step_response(a: np.ndarray, b: np.ndarray, c: np.ndarray, steps: int = 60) -> np.ndarray:
     """Position after 1, 2... steps of 1 V, shape (steps,)."""
-    x, found = np.zeros(len(b)), []
+    x, response = np.zeros(len(b)), []
     for _ in range(steps):
         x = a @ x + b
-        found.append(float(c @ x))
-    return np.array(found)
+        response.append(float(c @ x))
+    return np.array(response)
 
 
 def observer_form(system: System) -> np.ndarray:

@@ -4,7 +4,7 @@ from pma_gym.plant.model import Model
 from pma_gym.plant.program import structure
 
 
-class Nominal:
+class ModelKey:
     """A nominal model that is equal to every other of the same laws and numbers: a key.
 
     Args:
@@ -22,4 +22,4 @@ class Nominal:
 
     def __eq__(self, other: object) -> bool:
         """Whether laws and numbers are the same."""
-        return isinstance(other, Nominal) and self._key == other._key
+        return isinstance(other, ModelKey) and self._key == other._key

@@ -9,10 +9,10 @@ from controllers.design.designs import must_give_a_position
 from controllers.models.attainable_reference import begun_late, jumps, without_jumps
 from controllers.models.inverse import Inverse, inverse_of
 from controllers.models.local_model import LocalModel, Stroke
-from controllers.models.model_key import Nominal
-from controllers.models.nominal_rollout import improved, position_of, rehearsed
+from controllers.models.model_key import ModelKey
+from controllers.models.nominal_rollout import improved, nominal_rollout, position_of
 from controllers.models.operating_range import sensor_of, stroke_along
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 
 VOLTAGES_KEPT = 128
 """Motions whose voltages a process keeps."""
@@ -38,7 +38,7 @@ class NominalMotion:
     """
 
     def __init__(
-        self, reference: Reference, station: Station, planned: np.ndarray, volts: np.ndarray
+        self, reference: Reference, station: StationInfo, planned: np.ndarray, volts: np.ndarray
     ) -> None:
         self.reference, self.station, self.volts = reference, station, volts
         self._volts: list[float] = volts.tolist()
@@ -70,7 +70,7 @@ class NominalMotion:
         """Position (m or rad) that the sensor should say at a time (s): the planned one, lagged."""
         return self.planned(time - self.sensor_lag)
 
-    def foreseen(self, time: float) -> float:
+    def predicted(self, time: float) -> float:
         """Position (m or rad) that the nominal plant's sensor says at a control instant (s).
 
         Simulated under `voltage` as held to 0-10 V: what comes of the plan where a cable has to
@@ -78,7 +78,7 @@ class NominalMotion:
         """
         return self._position[self._instant(time)]
 
-    def foreseen_rotation(self, time: float) -> float:
+    def predicted_rotation(self, time: float) -> float:
         """Pulley angle (rad) that its sensor says then, whatever the task asks for."""
         return self._rotation[self._instant(time)]
 
@@ -87,7 +87,7 @@ class NominalMotion:
 
     @cached_property
     def _said(self) -> np.ndarray:
-        return rehearsed(self.station, self.volts)
+        return nominal_rollout(self.station, self.volts)
 
     @cached_property
     def _position(self) -> list[float]:
@@ -123,7 +123,7 @@ class NominalMotion:
         return slope * (pressure - self.station.pressure)
 
 
-def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
+def nominal_motion(reference: Reference, station: StationInfo) -> NominalMotion:
     """The nominal plant along a reference.
 
     Voltages and local models are kept for the process, so that many trials with one reference,
@@ -136,7 +136,7 @@ def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
         ValueError: the task is an exercise, which has no position to follow.
     """
     must_give_a_position(station)
-    inverse = _inverse(Nominal(station.model), station.task.actuator)
+    inverse = _inverse(ModelKey(station.model), station.task.actuator)
     parts, span = inverse.parts(station.period), station.task.protocol.span
     step, first = station.period / parts, round(parts * station.action_delay / station.period)
     planned = begun_late(_sampled(reference, station, parts), first)
@@ -147,7 +147,7 @@ def nominal_motion(reference: Reference, station: Station) -> NominalMotion:
     return NominalMotion(reference, station, planned, volts)
 
 
-def _sampled(reference: Reference, station: Station, parts: int) -> np.ndarray:
+def _sampled(reference: Reference, station: StationInfo, parts: int) -> np.ndarray:
     """The reference at all nodes.
 
     One that is the task's own at every control instant is taken as that, and asked for all times
@@ -165,7 +165,7 @@ def _sampled(reference: Reference, station: Station, parts: int) -> np.ndarray:
 class _Aim:
     """A motion of a station, equal to every other for which a model needs the same voltages."""
 
-    def __init__(self, planned: np.ndarray, station: Station) -> None:
+    def __init__(self, planned: np.ndarray, station: StationInfo) -> None:
         self.planned, self.station, task = planned, station, station.task
         said = task.protocol.quantity, task.load, station.pressure
         self._key = *said, station.period, station.action_delay, planned.tobytes()
@@ -178,7 +178,7 @@ class _Aim:
 
 
 @lru_cache(maxsize=8)
-def _inverse(nominal: Nominal, actuator: str) -> Inverse:
+def _inverse(nominal: ModelKey, actuator: str) -> Inverse:
     return inverse_of(nominal.model, actuator)
 
 

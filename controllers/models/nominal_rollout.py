@@ -5,11 +5,11 @@ import numpy as np
 from controllers.models.local_model import Stroke
 from controllers.models.operating_range import rest_voltages
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.plant import Plant
 
 REPETITIONS = 3
-"""How often voltages are rehearsed."""
+"""How often voltages are nominal_rollout."""
 
 LEARNED_SHARE = 0.7
 """Share of what an error calls for that is learned from a rehearsal."""
@@ -21,7 +21,7 @@ LEAST_LOAD_N = 5.0
 """Load (N) under which a cable may be slack, and an error tells nothing of the voltage."""
 
 
-def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
+def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
     """What the nominal plant's sensors say at control instants under voltages, without noise.
 
     Args:
@@ -41,19 +41,21 @@ def rehearsed(station: Station, volts: np.ndarray) -> np.ndarray:
     times = station.period * np.arange(len(held))
     states, zero = plant.run(times, *commands, joined=False, condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
-    found = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
-    found[:2] -= found[:2, :1]
-    return found
+    measured = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
+    measured[:2] -= measured[:2, :1]
+    return measured
 
 
-def position_of(station: Station, said: np.ndarray) -> np.ndarray:
-    """The position that the task asks for (m or rad), shape (n,), of what `rehearsed` returns."""
+def position_of(station: StationInfo, said: np.ndarray) -> np.ndarray:
+    """The task's position (m or rad), shape (n,), from the result of `nominal_rollout`."""
     contraction, rotation, _ = said
     quantity = station.task.protocol.quantity
     return {"extension": -contraction, "rotation": rotation, "contraction": contraction}[quantity]
 
 
-def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke) -> np.ndarray:
+def improved(
+    station: StationInfo, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke
+) -> np.ndarray:
     """Voltages after some rehearsals, in each of which errors that stay are learned from.
 
         V[k] += share * mean of e / g over a window about k
@@ -64,7 +66,7 @@ def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: St
     the cable does not pull, it stays, and nothing is learned from there.
 
     Args:
-        station: as of `rehearsed`.
+        station: as of `nominal_rollout`.
         volts: to begin with (V), shape (steps,).
         wanted: planned position at control instants, as its sensor would say (m or rad), shape
             (steps + 1,).
@@ -75,7 +77,7 @@ def improved(station: Station, volts: np.ndarray, wanted: np.ndarray, stroke: St
     window = np.hanning(2 * round(0.5 * WINDOW_S / station.period) + 3)
     pulls = "cable" in station.model.parameters
     for _ in range(REPETITIONS):
-        said = rehearsed(station, volts)
+        said = nominal_rollout(station, volts)
         error = wanted - position_of(station, said)
         possible = (volts >= 0.0) & (volts <= VOLTAGE_LIMIT)
         if pulls:

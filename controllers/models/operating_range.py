@@ -6,8 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from controllers.models.local_model import SENSORS, Stroke, stroke_models
-from controllers.models.model_key import Nominal
-from pma_gym.envs import Station
+from controllers.models.model_key import ModelKey
+from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 from pma_gym.plant.plant import Plant
 
@@ -15,7 +15,7 @@ STROKES_KEPT = 64
 """Strokes whose local models a process keeps: one a pressure, task and control period."""
 
 
-def stroke_along(positions: np.ndarray, station: Station) -> Stroke:
+def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
     """Local models over the stroke of a motion: the task's range, and beyond where it goes there.
 
     Args:
@@ -27,7 +27,7 @@ def stroke_along(positions: np.ndarray, station: Station) -> Stroke:
     contracts, relaxes = (rises, falls) if task.actuator == "regulator" else (falls, rises)
     directions = ("relaxing",) * relaxes + ("contracting",) * contracts
     return _stroke(
-        Nominal(station.model),
+        ModelKey(station.model),
         *(task.protocol.quantity, task.actuator),
         rest_voltages(station),
         station.period,
@@ -38,7 +38,7 @@ def stroke_along(positions: np.ndarray, station: Station) -> Stroke:
 
 @lru_cache(maxsize=STROKES_KEPT)
 def _stroke(
-    nominal: Nominal,
+    nominal: ModelKey,
     quantity: str,
     actuator: str,
     rest: tuple[float, float],
@@ -50,14 +50,14 @@ def _stroke(
     return stroke_models(plant, quantity, actuator, rest, reach, directions, period)
 
 
-def rest_voltages(station: Station) -> tuple[float, float]:
+def rest_voltages(station: StationInfo) -> tuple[float, float]:
     """Voltages of motor and regulator (V) at which the nominal station begins a trial."""
     load, drive = station.task.load, station.model.parameters.get("drive")
     motor = (load - drive.offset) / drive.gain if load and drive is not None else 0.0
     return motor, Plant(station.model).regulator_voltage(station.pressure)
 
 
-def sensor_of(station: Station, quantity: str) -> tuple[float, float]:
+def sensor_of(station: StationInfo, quantity: str) -> tuple[float, float]:
     """Lag (s) and noise (m or rad), the DAQ's rounding included, of the sensor of a quantity."""
     name = SENSORS[quantity]
     _, calibration = sensors.SENSORS[name]

@@ -20,7 +20,7 @@ class Commands(NamedTuple):
     regulator: float | NDArray[np.float64]
 
 
-class Foresight:
+class Prediction:
     """Simulates up to 16 plans from one condition, in the memory of the plans before.
 
     The same compiled plant as `Plant.step`, with its arrays made once: of a prediction's 30 us,
@@ -51,9 +51,9 @@ class Foresight:
         shared = self._jobs, self._taken, self._attempts
         self._addresses = [array.ctypes.data for array in shared]
 
-    def __deepcopy__(self, memo: dict[int, object]) -> "Foresight":
+    def __deepcopy__(self, memo: dict[int, object]) -> "Prediction":
         """One with arrays of its own; the compiled plant never changes and is shared."""
-        return Foresight(self.plant, self._time)
+        return Prediction(self.plant, self._time)
 
     def __call__(
         self, condition: Condition, commands: Commands, plans: int

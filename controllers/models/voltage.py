@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 
 if TYPE_CHECKING:
     pass
@@ -11,7 +11,7 @@ VOLTAGE_LIMIT = 10.0
 """Largest voltage of motor and regulator (V)."""
 
 
-def nominal_offset(station: Station) -> float:
+def nominal_offset(station: StationInfo) -> float:
     """Voltage (V) that changes nothing of how a trial begins.
 
     Of the motor the one at which the nominal drive just begins to pull, 0 without a drive; of the
@@ -25,6 +25,6 @@ def nominal_offset(station: Station) -> float:
     return max(0.0, -drive.offset / drive.gain) if drive else 0.0
 
 
-def rest_voltage(station: Station) -> float:
+def rest_voltage(station: StationInfo) -> float:
     """Voltage of the task's actuator at rest (V): no pull, or what holds the pressure."""
     return 0.0 if station.task.actuator == "motor" else nominal_offset(station)

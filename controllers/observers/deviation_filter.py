@@ -14,8 +14,8 @@ both leaves no steady error. What the measured pressure explains is known and le
 The model changes along the way, so the covariance is computed as it goes. Three things are no
 Gaussian noise:
 
-- A jump (somebody pushes): where a reading lies further off than `SURPRISE` standard deviations,
-  d may have changed by `JUMP` in the period before.
+- A jump (somebody pushes): where a reading lies further off than `INNOVATION_GATE` standard
+  deviations, d may have changed by `JUMP` in the period before.
 - A wrong model: w also has a share `DOUBT` of what moves the plant, so that the answer to a large
   correction, or to a step of the plan, is not taken for another disturbance.
 - A cable that does not pull, which the load cell and both position sensors show: d and s then
@@ -34,7 +34,7 @@ from controllers.models.nominal_motion import NominalMotion
 from controllers.models.operating_range import sensor_of
 from controllers.models.voltage import VOLTAGE_LIMIT, nominal_offset
 from controllers.observers.pressure_filter import PressureFilter
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 ONSET_V = {"motor": 0.2, "regulator": 0.05}
 """Standard deviation of d as the motion begins (V), by actuator: 20 N, for what the muscle pulls is
@@ -49,7 +49,7 @@ MOST_SHARE = 0.3
 SHARE_TIME_S = 10.0
 """Time in which s may change by that much (s)."""
 
-SURPRISE = 3.5
+INNOVATION_GATE = 3.5
 """Standard deviations of a reading beyond which d may have jumped."""
 
 JUMP = (0.5, 0.25)
@@ -62,7 +62,7 @@ FREE_JUMP = (0.02, 0.05)
 DOUBT = 0.2
 """Share to which the model's gain and lag are known."""
 
-DOUBT_TIME_S, MOST_SURPRISE, MOST_DOUBT = 0.3, 16.0, 4.0
+DOUBT_TIME_S, INNOVATION_GATE, MOST_DOUBT = 0.3, 16.0, 4.0
 """Time of the mean of squared errors over their variances (s), the most that one counts, and the
 mean beyond which a model is wrong: pushes of an operator bring it to 2."""
 
@@ -77,11 +77,11 @@ class Unknowns(NamedTuple):
     """What may change between two readings.
 
     Attributes:
-        agitation: standard deviation of the voltage w (V), white.
+        process_noise: standard deviation of the voltage w (V), white.
         disturbance: of d's change in a second (V/s^0.5).
     """
 
-    agitation: float
+    process_noise: float
     disturbance: float
 
 
@@ -116,7 +116,7 @@ class DeviationFilter:
         free = free_rotor(self._station, n)
         self._free = None if free is None else _System.of(*free)
         self._idle = nominal_offset(self._station)
-        self._agitation, self._noise = unknowns.agitation**2, motion.noise**2
+        self._process_noise, self._noise = unknowns.process_noise**2, motion.noise**2
         self._free_noise = sensor_of(self._station, "rotation")[1] ** 2
         self._drift = np.diag([0.0] * n + [unknowns.disturbance**2, SHARE**2 / SHARE_TIME_S])
         self._drift *= self._period
@@ -133,19 +133,19 @@ class DeviationFilter:
         """Whether the rotor is, which has yet to tighten the cable: x is its angle's (rad)."""
         return self._free is not None and not self.cable.tightened
 
-    def see(self, reading: Reading) -> None:
+    def update(self, reading: Measurement) -> None:
         """Take a reading, however old: the estimate is then for when it was taken."""
         taken = round(reading.time / self._period)
         for k in range(self._taken, taken):
             before = self._pressure.pressure
             self._pressure.advance(self._commanded(self._sent[0]))
             if k + 1 == taken:
-                self._pressure.see(reading.pressure)
+                self._pressure.update(reading.pressure)
             self._advance(0.5 * (before + self._pressure.pressure))
-        # With readings that are late the first is heard several times.
+        # With delayed readings the first arrives several times.
         if taken > self._seen:
             if taken == 0:
-                self._pressure.see(reading.pressure)
+                self._pressure.update(reading.pressure)
             self._seen = taken
             self._note(reading)
             self._correct(self._deviation(reading))
@@ -219,9 +219,11 @@ class DeviationFilter:
         known = self.correction(k) if self._line is not None else self._held(k, pressure)
         whole, push = self._system(k)
         alone = self.alone
-        agitation = FREE_V**2 if alone else self._agitation + self._misjudged(k, sent - known)
+        process_noise = (
+            FREE_V**2 if alone else self._process_noise + self._misjudged(k, sent - known)
+        )
         self.estimate = self._moved(self.estimate, k, sent, known)
-        spread = whole @ self._covariance @ whole.T + agitation * push[:, None] * push
+        spread = whole @ self._covariance @ whole.T + process_noise * push[:, None] * push
         self._covariance = spread if alone else spread + self._drift
         self._taken += 1
 
@@ -236,16 +238,16 @@ class DeviationFilter:
         away = float(state[0]) / self._stroke.models[at].gain
         return DOUBT**2 * (pushed**2 + away**2 + (nominal - self._stroke.volts[at]) ** 2)
 
-    def _deviation(self, reading: Reading) -> float:
+    def _deviation(self, reading: Measurement) -> float:
         """By how much a reading lies from the nominal motion's (m or rad)."""
         if self.alone:
-            return reading.rotation - self._motion.foreseen_rotation(reading.time)
-        return self._station.position(reading) - self._motion.foreseen(reading.time)
+            return reading.rotation - self._motion.predicted_rotation(reading.time)
+        return self._station.position(reading) - self._motion.predicted(reading.time)
 
-    def _note(self, reading: Reading) -> None:
+    def _note(self, reading: Measurement) -> None:
         """Take in whether the cable pulls."""
         before = self.alone
-        self.cable.see(reading)
+        self.cable.update(reading)
         if self.alone != before:
             self._change_model()
         beyond = not 0.0 <= self._motion.voltage(reading.time - self._period) <= VOLTAGE_LIMIT
@@ -266,9 +268,9 @@ class DeviationFilter:
         """Update the estimate by a measured deviation (m or rad)."""
         covariance, error = self._covariance, deviation - float(self.estimate[0])
         noise = self._free_noise if self.alone else self._noise
-        surprise = error * error / (covariance[0, 0] + noise)
-        self._wonder(surprise)
-        if surprise > SURPRISE**2 and self._may_jump():
+        innovation = error * error / (covariance[0, 0] + noise)
+        self._wonder(innovation)
+        if innovation > INNOVATION_GATE**2 and self._may_jump():
             size, apart = FREE_JUMP if self.alone else JUMP
             self._next_jump = self._taken + apart / self._period
             jump = self._system(self._taken - 1).push.copy()
@@ -279,10 +281,10 @@ class DeviationFilter:
         self._keep_share()
         self._covariance = covariance - gain[:, None] * covariance[0]
 
-    def _wonder(self, surprise: float) -> None:
+    def _wonder(self, innovation: float) -> None:
         """Take a squared error over its variance into the mean of late."""
         share = self._period / DOUBT_TIME_S
-        self.doubt += share * (min(surprise, MOST_SURPRISE) - self.doubt)
+        self.doubt += share * (min(innovation, INNOVATION_GATE) - self.doubt)
 
     def _may_jump(self) -> bool:
         """Whether d may have jumped: not again at once, nor with a model that is wrong anyhow."""

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from scipy.linalg import expm
 
-from controllers.models.lag_model import Lags, lags_of
+from controllers.models.lag_model import LagDeadTimeModel, lag_dead_time_model
 from controllers.models.nominal_motion import NominalMotion
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 if TYPE_CHECKING:
     import control
@@ -31,12 +31,12 @@ class Place(NamedTuple):
         older: what the older of the two voltages that act in that period adds, shape of z.
         newer: what the newer one adds.
         since: which of the voltages sent the newer one is, 1 being the last.
-        correction: of z by the error that was not foreseen.
+        correction: of z by the error that was not predicted.
         ahead: z when a voltage sent now begins to act, by z.
         flying: what the last `since` voltages add to that, oldest first, shape (len(z), since).
     """
 
-    lags: Lags
+    lags: LagDeadTimeModel
     step: np.ndarray
     older: np.ndarray
     newer: np.ndarray
@@ -61,7 +61,7 @@ class Place(NamedTuple):
         return np.array([*np.zeros(len(self.lags.constants)), 1.0, 0.5 * period])
 
 
-def place_of(lags: Lags, period: float, delay: float, pole: float) -> Place:
+def place_of(lags: LagDeadTimeModel, period: float, delay: float, pole: float) -> Place:
     """The sampled lags at a place, with an observer's gains.
 
     Args:
@@ -99,7 +99,7 @@ def placed(a: np.ndarray, b: np.ndarray, pole: float) -> np.ndarray:
     return np.linalg.solve(reached.T, np.eye(n)[n - 1]) @ wanted
 
 
-class LagObserver:
+class ExtendedStateObserver:
     """Estimates x, its rate if there are two lags, d and its slope, from a reading a period.
 
     Places are those of the motion expected, not of the measured one, whose noise would be
@@ -124,7 +124,10 @@ class LagObserver:
         self.order, self.at = 2 if station.task.actuator == "regulator" else 1, 0
         self._loose = LOOSE_N if "cable" in station.model.parameters else -math.inf
         positions = np.linspace(stroke.first, stroke.last, PLACES).tolist()
-        lags = [lags_of(motion.local(position), self._period, self.order) for position in positions]
+        lags = [
+            lag_dead_time_model(motion.local(position), self._period, self.order)
+            for position in positions
+        ]
         self.places = [
             place_of(each, self._period, self._delay, self.pole(each, bandwidth)) for each in lags
         ]
@@ -133,7 +136,7 @@ class LagObserver:
         self._sent = np.zeros(max(place.since for place in self.places) + 1)
         self._begun = False
 
-    def pole(self, lags: Lags, bandwidth: float) -> float:
+    def pole(self, lags: LagDeadTimeModel, bandwidth: float) -> float:
         """Sampled pole of a bandwidth in units of 1 / reaction time.
 
         The reaction time is how long after something happens a voltage begins to act on it, at
@@ -147,7 +150,7 @@ class LagObserver:
         """Number of the place nearest to a position (m or rad)."""
         return round(min(max((position - self._first) * self._scale, 0.0), PLACES - 1.0))
 
-    def see(self, observation: Reading, time: float) -> np.ndarray:
+    def update(self, observation: Measurement, time: float) -> np.ndarray:
         """Take in a reading, once a period.
 
         A slack cable says nothing about the muscle: while it is, the slope of d is 0, or it would
@@ -183,20 +186,20 @@ class LagObserver:
 
         Args:
             at: number of the place.
-            feedback: on z as `see` returns it.
+            feedback: on z as `update` returns it.
         """
         import control
 
         place = self.places[at]
         n, sent = len(place.step), place.since + 1
         # z before its correction, by z and the voltages sent before, oldest first.
-        foreseen = np.hstack([place.step, np.zeros((n, sent))])
-        foreseen[:, n], foreseen[:, n + 1] = place.older, place.newer
+        predicted = np.hstack([place.step, np.zeros((n, sent))])
+        predicted[:, n], predicted[:, n + 1] = place.older, place.newer
         kept = np.eye(n) - np.outer(place.correction, np.eye(n)[0])
         flying = np.hstack([np.zeros((n, n + 1)), place.flying])
-        c = -feedback @ (place.ahead @ kept @ foreseen + flying)
+        c = -feedback @ (place.ahead @ kept @ predicted + flying)
         d = float(feedback @ place.ahead @ place.correction)
         shifted = np.hstack([np.zeros((sent - 1, n + 1)), np.eye(sent - 1)])
-        a = np.vstack([kept @ foreseen, shifted, c])
+        a = np.vstack([kept @ predicted, shifted, c])
         b = np.concatenate([-place.correction, np.zeros(sent - 1), [d]])
         return control.StateSpace(a, b[:, None], c[None, :], d, self._period)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from controllers.observers.filter_bank_design import FACTORS, BankDesign
-from pma_gym.envs import Reading
+from pma_gym.envs import Measurement
 
 PRIOR = (0.1, 0.2, 0.4, 0.2, 0.1)
 """How likely each of `FACTORS` is before a trial: our assumption."""
@@ -12,8 +12,8 @@ MEMORY = 0.98
 """Share of what is held likely that stays from one reading to the next; the rest is `PRIOR` again,
 so that a damping that changes on the way is found."""
 
-MOST_SURPRISED = 25.0
-"""Square of the surprise, in its standard deviations, beyond which a reading says no more against
+INNOVATION_GATE = 25.0
+"""Square of the innovation, in its standard deviations, beyond which a reading says no more against
 a damping: what jumps surprises all."""
 
 
@@ -22,7 +22,7 @@ class DampingBank:
 
     Every filter foresees the same reading. By how much it is wrong says how likely its damping is,
 
-        log w <- MEMORY log w + (1 - MEMORY) log prior - (surprise^2 / S + log S) / 2
+        log w <- MEMORY log w + (1 - MEMORY) log prior - (innovation^2 / S + log S) / 2
 
     and what is predicted is the mean over the dampings by their w.
 
@@ -88,8 +88,8 @@ class DampingBank:
             estimates = self.moved(estimates, period, sent[period])
         return estimates
 
-    def see(self, reading: Reading, sent: list[float]) -> None:
-        """Take in what the sensors say; a reading that was heard before says nothing new.
+    def update(self, reading: Measurement, sent: list[float]) -> None:
+        """Take in what the sensors say; a reading that came before adds nothing.
 
         Args:
             reading: with the time at which it was taken.
@@ -101,10 +101,10 @@ class DampingBank:
         self.estimates, self.taken = self.at(k, sent), k
         nominal = design.motion.readings[k]
         off = np.array([reading[1], reading[2], reading[4]]) - nominal[[0, 1, 3]]
-        surprise = off - self.estimates @ design.sensors.T
-        self.estimates = self.estimates + (design.gain[:, k] @ surprise[:, :, None])[:, :, 0]
+        innovation = off - self.estimates @ design.sensors.T
+        self.estimates = self.estimates + (design.gain[:, k] @ innovation[:, :, None])[:, :, 0]
         variance = design.variance[:, k]
-        wrong = np.minimum(surprise[:, design.own] ** 2 / variance, MOST_SURPRISED)
+        wrong = np.minimum(innovation[:, design.own] ** 2 / variance, INNOVATION_GATE)
         self._likely = MEMORY * self._likely + (1.0 - MEMORY) * self._prior
         self._likely -= 0.5 * (wrong + np.log(variance))
         self._likely -= self._likely.max()

@@ -32,7 +32,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from controllers.models.linear_motion import LOOSE_N, LinearMotion
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 
 FACTORS = (0.15, 0.5, 1.0, 2.0, 4.0)
@@ -70,7 +70,7 @@ class BankDesign(NamedTuple):
         drift: d, shape (M, steps, n).
         sensors: C: extension, rotation, pressure, shape (3, n).
         gain: K, shape (M, trial + 1, n, 3).
-        variance: of what the task's own sensor says against what was foreseen, shape
+        variance: of what the task's own sensor says against what was predicted, shape
             (M, trial + 1).
         ahead: position m = 0 ... N periods after k by x[k], shape (M, trial, N + 1, n).
         carried: what the drift adds to it, shape (M, trial, N + 1).
@@ -94,7 +94,7 @@ class BankDesign(NamedTuple):
 
 
 def bank_design(
-    motion: LinearMotion, station: Station, horizon: int, wander: float, jolt: float
+    motion: LinearMotion, station: StationInfo, horizon: int, wander: float, jolt: float
 ) -> BankDesign:
     """The design for a trial.
 
@@ -128,7 +128,7 @@ def bank_design(
     )
 
 
-def _sampled(motion: LinearMotion, station: Station) -> tuple[np.ndarray, ...]:
+def _sampled(motion: LinearMotion, station: StationInfo) -> tuple[np.ndarray, ...]:
     """A, b, d, and x[k+1] by a force (N) at the slide during period k.
 
     One exponential of [[A, columns], [0, 0]] T holds them all.
@@ -162,7 +162,9 @@ def _factors(motion: LinearMotion) -> tuple[float, ...]:
     return FACTORS if motion.damped is not None else (1.0,)
 
 
-def _process_noise(motion: LinearMotion, station: Station, count: int, wander: float) -> np.ndarray:
+def _process_noise(
+    motion: LinearMotion, station: StationInfo, count: int, wander: float
+) -> np.ndarray:
     """Variances that every period of the trial adds to x, shape (trial, n)."""
     wanders = np.array([wander, DRIVE_WANDER, REGULATOR_WANDER, 0.0, GAP_WANDER])
     rows = np.tile(np.concatenate([np.zeros(count), wanders]), (motion.last, 1))
@@ -172,7 +174,7 @@ def _process_noise(motion: LinearMotion, station: Station, count: int, wander: f
     return rows**2 * station.period
 
 
-def _sensor_noise(station: Station) -> np.ndarray:
+def _sensor_noise(station: StationInfo) -> np.ndarray:
     """Variances of LVDT, potentiometer and pressure transducer, the DAQ's rounding included."""
     levels = sensors.noise_levels(station.model)
     rounding = [line.resolution / math.sqrt(12.0) for _, line in sensors.SENSORS.values()]
@@ -187,7 +189,7 @@ def _gains(
     sensor: np.ndarray,
     own: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """K and the variance of the own sensor's surprise at the begin and after each period."""
+    """K and the variance of the own sensor's innovation at the begin and after each period."""
     bank, steps, n = step.shape[:3]
     gain, variance = np.zeros((bank, steps + 1, n, len(seen))), np.zeros((bank, steps + 1))
     covariance = np.zeros((bank, n, n))
@@ -198,9 +200,9 @@ def _gains(
             covariance = a @ covariance @ a.transpose(0, 2, 1)
             covariance += np.diag(noise[k - 1]) + jolted @ jolted.transpose(0, 2, 1)
         shared = covariance @ seen.T
-        surprise = seen @ shared + np.diag(sensor)
-        gain[:, k] = shared @ np.linalg.inv(surprise)
-        variance[:, k] = surprise[:, own, own]
+        innovation = seen @ shared + np.diag(sensor)
+        gain[:, k] = shared @ np.linalg.inv(innovation)
+        variance[:, k] = innovation[:, own, own]
         covariance -= gain[:, k] @ shared.transpose(0, 2, 1)
         # Rounding must not make it lopsided: that grows.
         covariance = 0.5 * (covariance + covariance.transpose(0, 2, 1))

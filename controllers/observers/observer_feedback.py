@@ -8,8 +8,8 @@ import numpy as np
 from controllers.controller import Reference
 from controllers.models.nominal_motion import NominalMotion, nominal_motion
 from controllers.models.voltage import VOLTAGE_LIMIT
-from controllers.observers.extended_state_observer import LagObserver
-from pma_gym.envs import Reading, Station
+from controllers.observers.extended_state_observer import ExtendedStateObserver
+from pma_gym.envs import Measurement, StationInfo
 
 if TYPE_CHECKING:
     import control
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 Settings = TypeVar("Settings", bound=NamedTuple)
 
 
-class LagControl(ABC, Generic[Settings]):
+class ObserverFeedback(ABC, Generic[Settings]):
     """A feed-forward, and beside it a voltage by what a lag observer estimates.
 
     z is the observer's estimate (`controllers.models.lag_model`) of when a voltage sent now begins
-    to act. What is sent is held to 0-10 V, and the observer is told what was sent: nothing winds
-    up.
+    to act. What is sent is held to 0-10 V, and the observer receives what was sent, so nothing
+    winds up.
 
     Args:
         settings: settings to use instead of the designed ones.
@@ -30,7 +30,7 @@ class LagControl(ABC, Generic[Settings]):
 
     name: str
     _motion: NominalMotion
-    _observer: LagObserver
+    _observer: ExtendedStateObserver
 
     def __init__(self, settings: Settings | None = None) -> None:
         self._given = settings
@@ -51,19 +51,19 @@ class LagControl(ABC, Generic[Settings]):
         """Feed-forward (V) to send at a time (s)."""
         return self._motion.command(time)
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Compute what all places need, and forget everything else."""
         self._design(nominal_motion(reference, station))
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Voltage (V) of the task's actuator to hold for the next control period."""
-        z = self._observer.see(observation, time)
+        z = self._observer.update(measurement, time)
         planned = self._planned(time)
         voltage = min(max(self._wanted(planned, z), 0.0), VOLTAGE_LIMIT)
         self._observer.send(voltage - planned)
         return voltage
 
-    def linear(self, station: Station, position: float) -> "control.StateSpace":
+    def linear(self, station: StationInfo, position: float) -> "control.StateSpace":
         """The feedback near a position (m or rad) where it is linear: volts by error."""
         made = type(self)(self._given)
         made._design(nominal_motion(station.task.protocol.at, station))

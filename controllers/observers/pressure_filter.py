@@ -4,18 +4,18 @@ The regulator brings the pressure P to what it is commanded, C, and to what nobo
 
     P[k+1] = z P[k] + (1 - z) (C[k] + J[k]) + w_P,   J[k+1] = J[k] + w_J,   z = exp(-T / tau)
 
-A Kalman filter of P and J. Where a reading lies further off than `SURPRISE` standard deviations, J
-has jumped, by `JUMP_PA` or so: then the filter believes the readings, and else its memory, so that
-little of the transducer's noise reaches the voltage. Knowing J it knows where the pressure will be
-when a command comes into force.
+A Kalman filter of P and J. Where a reading lies further off than `INNOVATION_GATE` standard
+deviations, J has jumped, by `JUMP_PA` or so: then the filter believes the readings, and else its
+memory, so that little of the transducer's noise reaches the voltage. Knowing J it knows where the
+pressure will be when a command comes into force.
 """
 
 import math
 
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 
-SURPRISE = 4.5
+INNOVATION_GATE = 4.5
 """Standard deviations of a reading beyond which J has jumped, or the transducer has an offset."""
 
 JUMP_PA = 25e3
@@ -24,7 +24,7 @@ JUMP_PA = 25e3
 DRIFT_PA = 500.0
 """Standard deviation of J's change in a second (Pa/s^0.5)."""
 
-AGITATION_PA = 50.0
+PROCESS_NOISE_PA = 50.0
 """Standard deviation of the pressure's own change in a period (Pa): what moves it but C and J."""
 
 NAME = "pressure_transducer"
@@ -41,7 +41,7 @@ class PressureFilter:
         excess: estimate of J (Pa).
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
         sensor, (_, calibration) = parameters.get(NAME), sensors.SENSORS[NAME]
         rounding = calibration.resolution / math.sqrt(12.0)
@@ -54,14 +54,14 @@ class PressureFilter:
         # Variance of P, covariance, variance of J: known at the start.
         self._own = self._both = self._excesses = 0.0
 
-    def see(self, reading: float) -> None:
+    def update(self, reading: float) -> None:
         """Take the transducer's reading (Pa) of a period's beginning."""
         if self._offset is None:
             # A trial begins at its pressure: what the transducer says beside it is its own.
             away = reading - self.pressure
-            self._offset = away if away * away > SURPRISE**2 * self._noise else 0.0
+            self._offset = away if away * away > INNOVATION_GATE**2 * self._noise else 0.0
         error, spread = reading - self._offset - self.pressure, self._own + self._noise
-        if error * error > SURPRISE**2 * spread:
+        if error * error > INNOVATION_GATE**2 * spread:
             # J jumped in the period before, and the pressure has gone part of the way.
             gone = 1.0 - self._kept
             self._excesses += JUMP_PA**2
@@ -81,7 +81,7 @@ class PressureFilter:
         self.pressure = z * self.pressure + gone * (commanded + self.excess)
         own = z * z * self._own + 2.0 * z * gone * self._both + gone * gone * self._excesses
         self._both = z * self._both + gone * self._excesses
-        self._own = own + AGITATION_PA**2
+        self._own = own + PROCESS_NOISE_PA**2
         self._excesses += self._drift
 
     def ahead(self, duration: float, commanded: float) -> float:

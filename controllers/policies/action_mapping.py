@@ -12,7 +12,7 @@ MIDDLE_V, HIGHEST_V = 5.0, 10.0
 
 
 @dataclass(frozen=True)
-class Form:
+class ActionMapping:
     """What an action of -1 to 1 does to the voltage, which is held to 0-10 V.
 
         direct     V = 5 + 5 a
@@ -50,7 +50,7 @@ class Form:
             )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "Form":
+    def of(cls, given: Mapping[str, Any]) -> "ActionMapping":
         """A form from JSON.
 
         Raises:

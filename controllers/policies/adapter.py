@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from controllers.controller import Controller, Reference
 from controllers.models.voltage import rest_voltage
-from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, Form
+from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, ActionMapping
 from controllers.policies.observation_spec import (
-    View,
+    ObservationSpec,
     ahead,
     clipped,
     environment_entries,
@@ -19,7 +19,7 @@ from controllers.policies.observation_spec import (
 )
 from controllers.policies.scales import scales_of
 from controllers.registry import CONTROLLERS
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 DIVERGED = (
     "the policy's action must be a finite number,{} got {}; its weights have diverged: train it "
@@ -28,10 +28,10 @@ DIVERGED = (
 """What is said of an action that is no number: which of many, and the action."""
 
 
-class Pilot:
+class PolicyAdapter:
     """One trial, seen and driven as a policy sees and drives it.
 
-    `see` comes first in every control step, then `volts`.
+    `update` comes first in every control step, then `volts`.
 
     Args:
         view: what the policy sees.
@@ -39,11 +39,13 @@ class Pilot:
         base: controller that a residual is added to; made from `form.base` if not given.
     """
 
-    def __init__(self, view: View, form: Form, base: Controller | None = None) -> None:
+    def __init__(
+        self, view: ObservationSpec, form: ActionMapping, base: Controller | None = None
+    ) -> None:
         self.view, self.form = view, form
         self.base = base_of(form) if base is None and form.base else base
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial.
 
         Raises:
@@ -60,16 +62,16 @@ class Pilot:
             self._scales = scales_of(station)
             rows = ahead(references, self.view.preview, self._scales)
             self._ahead: list[list[float]] = rows.tolist()
-            self._heard: deque[tuple[float, ...]] = deque(maxlen=self.view.history + 1)
+            self._delayed: deque[tuple[float, ...]] = deque(maxlen=self.view.history + 1)
             self._volts = deque([self._before] * (self._scales.delay + 1))
             self._actions = deque([0.0] * self.view.history, maxlen=self.view.history)
         else:
             self._table = self.view.table(station)
-            self._readings: deque[Reading] = deque(maxlen=self.view.history + 1)
+            self._readings: deque[Measurement] = deque(maxlen=self.view.history + 1)
         if self.base is not None:
             self.base.reset(reference, station)
 
-    def see(self, reading: Reading, time: float) -> NDArray[np.float32]:
+    def update(self, reading: Measurement, time: float) -> NDArray[np.float32]:
         """The entries of a control step, shape (entries,).
 
         Args:
@@ -86,11 +88,11 @@ class Pilot:
         if self.view.kind == "environment":
             return self._environment(reading, step)
         reference = self._references[max(step - self._late, 0)]
-        heard = self._scales.heard(reading[1:], reference, self._start, self._volts[0])
-        memory = self._heard
-        memory.appendleft(heard)
+        measured = self._scales.entries(reading[1:], reference, self._start, self._volts[0])
+        memory = self._delayed
+        memory.appendleft(measured)
         while len(memory) < self.view.history + 1:
-            memory.append(heard)
+            memory.append(measured)
         entries = [self._ahead[step][0], start_entry(self._start), *self._ahead[step][1:]]
         for four in memory:
             entries += four
@@ -100,7 +102,7 @@ class Pilot:
             entries.append(self._voltage - self._before)
         return clipped(entries)
 
-    def _environment(self, reading: Reading, step: int) -> NDArray[np.float32]:
+    def _environment(self, reading: Measurement, step: int) -> NDArray[np.float32]:
         self._readings.appendleft(reading)
         action = self._before / MIDDLE_V - 1.0
         return clipped(
@@ -127,12 +129,12 @@ class Pilot:
         return self._before
 
 
-def _no_number(reading: Reading, time: float) -> str:
+def _no_number(reading: Measurement, time: float) -> str:
     bad = [f"{k} is {v}" for k, v in reading._asdict().items() if not math.isfinite(v)]
     return f"every reading must be a number, at {time:g} s {', '.join(bad)}; check the sensor"
 
 
-def base_of(form: Form) -> Controller:
+def base_of(form: ActionMapping) -> Controller:
     """A new controller that a residual is added to.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Many pilots side by side: the same entries and voltages as `Pilot`, in arrays."""
+"""Many pilots side by side: the same entries and voltages as `PolicyAdapter`, in arrays."""
 
 from collections.abc import Callable
 
@@ -6,27 +6,37 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.models.voltage import rest_voltage
-from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, Form
+from controllers.policies.action_mapping import HIGHEST_V, MIDDLE_V, ActionMapping
 from controllers.policies.adapter import DIVERGED, base_of
-from controllers.policies.observation_spec import View, ahead, clipped, start_entry, steps_of
+from controllers.policies.observation_spec import (
+    ObservationSpec,
+    ahead,
+    clipped,
+    start_entry,
+    steps_of,
+)
 from controllers.policies.scales import scales_of
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
-class Pilots:
+class BatchPolicyAdapter:
     """Trials of one task and loop, each at its own pressure and at its own time.
 
-    What becomes of a trial is bit for bit what `Pilot` makes of it.
+    What becomes of a trial is bit for bit what `PolicyAdapter` makes of it.
 
     Args:
         count: how many.
         view: what the policy sees; `tracking`.
         form: what its action does.
-        station: what controllers are told at a pressure (Pa).
+        station: the station, as controllers know it, at a pressure (Pa).
     """
 
     def __init__(
-        self, count: int, view: View, form: Form, station: Callable[[float], Station]
+        self,
+        count: int,
+        view: ObservationSpec,
+        form: ActionMapping,
+        station: Callable[[float], StationInfo],
     ) -> None:
         if view.kind != "tracking":
             raise ValueError(
@@ -44,7 +54,7 @@ class Pilots:
         self._bases = [base_of(form) for _ in range(count)] if form.base else []
         self.steps = np.zeros(count, np.int64)
         self._start = np.zeros(count)
-        self._heard = np.zeros((count, view.history + 1, 4))
+        self._delayed = np.zeros((count, view.history + 1, 4))
         self._actions = np.zeros((count, view.history))
         self._volts = np.zeros((count, self._scales.delay + 1))
         self._base_volts = np.zeros(count)
@@ -53,10 +63,10 @@ class Pilots:
     def entries(self) -> int:
         """How many entries a policy is given."""
         own = 3 if self._bases else 2
-        return self._ahead.shape[1] + self._heard[0].size + self.view.history + own
+        return self._ahead.shape[1] + self._delayed[0].size + self.view.history + own
 
     def begin(self, which: NDArray[np.int64], pressures: NDArray[np.float64]) -> None:
-        """Begin trials anew; `see` fills their memory.
+        """Begin trials anew; `update` fills their memory.
 
         Args:
             which: numbers of the trials, shape (m,).
@@ -69,7 +79,7 @@ class Pilots:
             if self._bases:
                 self._bases[i].reset(self._task.protocol.at, station)
 
-    def see(
+    def update(
         self, readings: NDArray[np.float64], which: NDArray[np.int64] | None = None
     ) -> NDArray[np.float32]:
         """Entries of a control step, shape (count, entries) or (m, entries).
@@ -81,21 +91,21 @@ class Pilots:
         at = slice(None) if which is None else which
         steps, start, volts = self.steps[at], self._start[at], self._volts[at]
         reference = self._references[np.maximum(steps - self._late, 0)]
-        heard = np.stack(
-            self._scales.heard(readings[:, at], reference, start, volts[:, -1]), axis=1
+        measured = np.stack(
+            self._scales.entries(readings[:, at], reference, start, volts[:, -1]), axis=1
         )
         if which is None:
-            self._heard[:, 1:] = self._heard[:, :-1]
-            self._heard[:, 0] = heard
+            self._delayed[:, 1:] = self._delayed[:, :-1]
+            self._delayed[:, 0] = measured
         else:
-            self._heard[at] = heard[:, None]
+            self._delayed[at] = measured[:, None]
         self._ask_bases(readings, which)
         rows = self._ahead[np.minimum(steps, self._last)]
         parts = [
             rows[:, :1],
             start_entry(start)[:, None],
             rows[:, 1:],
-            self._heard[at].reshape(len(steps), -1),
+            self._delayed[at].reshape(len(steps), -1),
             self._actions[at],
             (volts[:, :1] - MIDDLE_V) / MIDDLE_V,
         ]
@@ -110,7 +120,7 @@ class Pilots:
         for i in range(self.count) if which is None else which.tolist():
             now = int(self.steps[i]) * self._period
             taken = max(int(self.steps[i]) - self._late, 0) * self._period
-            reading = Reading(taken, *readings[:, i].tolist())
+            reading = Measurement(taken, *readings[:, i].tolist())
             self._base_volts[i] = self._bases[i].act(reading, now)
 
     def volts(self, actions: NDArray[np.float64]) -> NDArray[np.float64]:

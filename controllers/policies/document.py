@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from controllers.design.designs import EXERCISE_KINDS, KINDS
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.network import ACTIVATIONS, OUTPUTS
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from pma_gym.documents import parse_json
 
 SCHEMA = 1
@@ -86,13 +86,13 @@ def parsed_document(text: bytes) -> dict[str, Any]:
 
 
 def _check_keys(document: Mapping[str, Any], section: str) -> None:
-    found = document[section] if section else document
-    _check(isinstance(found, dict), section, "an object", found)
+    table = document[section] if section else document
+    _check(isinstance(table, dict), section, "an object", table)
     what = section or "it"
-    missing = [key for key in KEYS[section] if key not in found]
+    missing = [key for key in KEYS[section] if key not in table]
     if missing:
         raise PolicyError(f"{what} lacks {', '.join(missing)}")
-    strange = [key for key in found if key not in KEYS[section]]
+    strange = [key for key in table if key not in KEYS[section]]
     if strange:
         raise PolicyError(
             f"{what} has {', '.join(map(_short, strange))}, which no policy of schema {SCHEMA} has"
@@ -119,11 +119,13 @@ def _check_network(network: Mapping[str, Any]) -> None:
 
 def _check_tensors(document: Mapping[str, Any]) -> None:
     wanted = tensor_shapes(document["network"]["layers"], bool(document["network"]["scaling"]))
-    found = document["tensors"]
-    _check(isinstance(found, dict), "tensors", "an object of shapes by name", found)
-    wrong = sorted(name for name in set(wanted) | set(found) if found.get(name) != wanted.get(name))
+    tensors = document["tensors"]
+    _check(isinstance(tensors, dict), "tensors", "an object of shapes by name", tensors)
+    wrong = sorted(
+        name for name in set(wanted) | set(tensors) if tensors.get(name) != wanted.get(name)
+    )
     for name in wrong[:1]:
-        came = _short(found[name]) if name in found else "none"
+        came = _short(tensors[name]) if name in tensors else "none"
         rule = f"the shape {wanted[name]}" if name in wanted else "no place"
         raise PolicyError(f"tensors: {name} has {rule} in network.layers, got {came}")
     digest = document["sha256"]
@@ -163,7 +165,7 @@ def _check_environment(environment: Mapping[str, Any]) -> None:
 
 
 def _check_view_and_form(document: Mapping[str, Any]) -> None:
-    for key, kind in (("view", View), ("form", Form)):
+    for key, kind in (("view", ObservationSpec), ("form", ActionMapping)):
         _check(isinstance(document[key], dict), key, "an object", document[key])
         try:
             kind.of(document[key])

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.controller import Reference
-from controllers.policies.scales import FINE_SHARE, Scales, heard_rows, share_of
+from controllers.policies.scales import FINE_SHARE, Scales, delayed_rows, share_of
 from pma_gym.engine.observation import BOUND, ObservationTable
 from pma_gym.engine.options import Options
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 ViewKind = Literal["tracking", "environment"]
 VIEW_KINDS: tuple[ViewKind, ...] = ("tracking", "environment")
@@ -24,7 +24,7 @@ PRESSURE_CENTRE, PRESSURE_HALF = 362.5e3, 212.5e3
 
 
 @dataclass(frozen=True)
-class View:
+class ObservationSpec:
     """Which entries a policy is given.
 
     `tracking` is made for small errors: those of both position sensors, the pressure's change since
@@ -56,7 +56,7 @@ class View:
                 )
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> "View":
+    def of(cls, given: Mapping[str, Any]) -> "ObservationSpec":
         """A view from JSON.
 
         Raises:
@@ -71,7 +71,7 @@ class View:
         """It as JSON."""
         return asdict(self)
 
-    def rows(self, station: Station, base: str | None = None) -> list[tuple[str, str]]:
+    def rows(self, station: StationInfo, base: str | None = None) -> list[tuple[str, str]]:
         """Entries and what 1.0 stands for, in order.
 
         Args:
@@ -93,14 +93,14 @@ class View:
         ]
         for k in range(self.history + 1):
             before = f", {k} before" if k else ""
-            rows += [(f"{name}{before}", unit) for name, unit in heard_rows(station.task)]
+            rows += [(f"{name}{before}", unit) for name, unit in delayed_rows(station.task)]
         rows += [(f"own action, {k} before", "1") for k in range(1, self.history + 1)]
         rows += [("voltage commanded last", "5 V, -1.0 = 0 V")]
         if base is not None:
             rows += [(f"voltage of {base} less the one commanded last", "1 V")]
         return rows
 
-    def table(self, station: Station) -> ObservationTable:
+    def table(self, station: StationInfo) -> ObservationTable:
         """The environment's own observation with this preview and history."""
         return ObservationTable(
             station.task,
@@ -114,7 +114,7 @@ class View:
         )
 
 
-def steps_of(reference: Reference, station: Station, preview: int) -> NDArray[np.float64]:
+def steps_of(reference: Reference, station: StationInfo, preview: int) -> NDArray[np.float64]:
     """The reference at every control step and `preview` steps past the end (m or rad)."""
     last = station.task.steps(1.0 / station.period) + preview
     return np.array([reference(k * station.period) for k in range(last + 1)])
@@ -136,13 +136,13 @@ def start_entry(start: Any) -> Any:  # noqa: ANN401
 
 def clipped(entries: Sequence[float] | NDArray[np.float64]) -> NDArray[np.float32]:
     """Entries as a network gets them."""
-    found = np.asarray(entries, np.float32)
-    return np.minimum(np.maximum(found, np.float32(-BOUND)), np.float32(BOUND))
+    clipped_entries = np.asarray(entries, np.float32)
+    return np.minimum(np.maximum(clipped_entries, np.float32(-BOUND)), np.float32(BOUND))
 
 
 def environment_entries(
     table: ObservationTable,
-    readings: Sequence[Reading],
+    readings: Sequence[Measurement],
     reference: Callable[[int], float],
     action: float,
 ) -> list[float]:
@@ -150,7 +150,7 @@ def environment_entries(
 
     Args:
         table: the environment's.
-        readings: as heard now and in the steps before, the latest first.
+        readings: as received now and in the steps before, the latest first.
         reference: reference (m or rad) so many steps ahead.
         action: the last one, -1 to 1.
     """

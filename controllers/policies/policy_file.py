@@ -15,10 +15,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.document import SCHEMA, PolicyError, parsed_document
 from controllers.policies.network import Weights, check_chain
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.tensors import safetensors, tensors_of, weights_of
 from pma_gym.files import replace_files
 
@@ -51,9 +51,9 @@ class PolicyFile:
     weights: Weights
     task: str
     environment: Mapping[str, Any]
-    view: View
+    view: ObservationSpec
     observation: tuple[tuple[str, str], ...]
-    form: Form
+    form: ActionMapping
     training: Mapping[str, Any]
 
 
@@ -140,9 +140,9 @@ def _parsed(text: bytes, blob: bytes, path: Path) -> PolicyFile:
         weights=weights,
         task=document["task"],
         environment=document["environment"],
-        view=View.of(document["view"]),
+        view=ObservationSpec.of(document["view"]),
         observation=tuple((entry, unit) for entry, unit in document["observation"]),
-        form=Form.of(document["form"]),
+        form=ActionMapping.of(document["form"]),
         training=document["training"],
     )
 

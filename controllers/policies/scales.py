@@ -4,7 +4,7 @@ from typing import Any
 
 from pma_gym.data.protocol import Protocol
 from pma_gym.engine.observation import ROTATION_SCALE, Prescribed
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
@@ -29,7 +29,7 @@ class Scales:
     """What the entries of a trial are measured by.
 
     Args:
-        station: what controllers are told; its model must be of a station.
+        station: as controllers know it; its model must be of a station.
 
     Attributes:
         fine: error that 1.0 stands for (m or rad).
@@ -39,7 +39,7 @@ class Scales:
         delay: control steps after which a command is in force.
     """
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
         if "drive" not in parameters or "rotor" not in parameters:
             raise ValueError(
@@ -54,7 +54,7 @@ class Scales:
         self._gain, self._offset = parameters["drive"].gain, parameters["drive"].offset
         self._held = station.load
 
-    def heard(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
+    def entries(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401
         """The four entries of a reading, before they are clipped; of numbers or arrays.
 
         Args:
@@ -84,14 +84,14 @@ class Scales:
 class ExerciseScales(Scales):
     """What the entries of an exercise are measured by: as `Scales`, of a regulator that resists."""
 
-    def __init__(self, station: Station) -> None:
+    def __init__(self, station: StationInfo) -> None:
         super().__init__(station)
         exercise = station.task.exercise
         assert exercise is not None
         self._plan = exercise.prescription
         self._coarse = COARSE_SHARE * self.span
 
-    def heard(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401, ARG002
+    def entries(self, reading: Any, reference: Any, start: Any, volts: Any) -> tuple[Any, ...]:  # noqa: ANN401, ARG002
         """The four entries of a reading, before they are clipped; of numbers or arrays.
 
         Args:
@@ -110,12 +110,12 @@ class ExerciseScales(Scales):
         return first, second, (pressure - start) / EXERCISE_PRESSURE, load / EXERCISE_LOAD
 
 
-def scales_of(station: Station) -> Scales:
+def scales_of(station: StationInfo) -> Scales:
     """What a station's entries are measured by."""
     return ExerciseScales(station) if station.task.exercise else Scales(station)
 
 
-def heard_rows(task: Task) -> list[tuple[str, str]]:
+def delayed_rows(task: Task) -> list[tuple[str, str]]:
     """Names of the four entries of a reading, and what 1.0 stands for, in order."""
     error, fine = "reference less measured position", share_of(task.protocol, FINE_SHARE)
     change, other = (

@@ -1,7 +1,7 @@
 """An example of a controller: integral action on the measured position."""
 
 from controllers import Reference
-from pma_gym.envs import Reading, Station
+from pma_gym.envs import Measurement, StationInfo
 
 
 class Integral:
@@ -9,7 +9,7 @@ class Integral:
 
     name = "integral"
 
-    def reset(self, reference: Reference, station: Station) -> None:
+    def reset(self, reference: Reference, station: StationInfo) -> None:
         """Prepare for a trial."""
         self.reference = reference
         self.period = station.period
@@ -18,9 +18,9 @@ class Integral:
         self.gain = 40.0 if self.rotation else 2500.0
         self.volts = 0.0
 
-    def act(self, observation: Reading, time: float) -> float:
+    def act(self, measurement: Measurement, time: float) -> float:
         """Motor voltage (V) for the next control period."""
-        measured = observation.rotation if self.rotation else observation.extension
+        measured = measurement.rotation if self.rotation else measurement.extension
         self.volts += self.gain * self.period * (self.reference(time) - measured)
         self.volts = min(max(self.volts, 0.0), 10.0)
         return self.volts

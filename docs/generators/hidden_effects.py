@@ -4,10 +4,10 @@ import json
 from pathlib import Path
 from typing import Any
 
+from benchmarks.hidden_effects.baselines.comparison import COLUMNS
+from benchmarks.hidden_effects.baselines.registry import WAYS
 from benchmarks.hidden_effects.bound import detected, told
-from benchmarks.hidden_effects.summary import report_blocks
-from benchmarks.hidden_effects.ways.compared import COLUMNS
-from benchmarks.hidden_effects.ways.registry import WAYS
+from benchmarks.hidden_effects.evaluation.summary import report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
 

@@ -3,8 +3,8 @@
 import inspect
 from pathlib import Path
 
-from benchmarks import tune
-from benchmarks.suite import load_suite
+from benchmarks.suites.reproduction import load_suite
+from benchmarks.tuning import tune
 from controllers import CONTROLLERS
 from generators.text import code, number, summary, table
 

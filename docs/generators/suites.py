@@ -1,7 +1,7 @@
 """The frozen suites: what they run, on which stations."""
 
-from benchmarks.comparison.case import cases
-from benchmarks.comparison.suite import FrozenSuite, frozen_suite, suite_names
+from benchmarks.runner.case import cases
+from benchmarks.suites.frozen import FrozenSuite, frozen_suite, suite_names
 from generators.text import code, number, table
 
 

@@ -28,10 +28,10 @@ def compare(
     ] = None,
 ) -> None:
     """Simulate a lab's trials with a model and print the misfit of every signal."""
-    from pma_gym.discovery.data_checks.checking import check_dataset
-    from pma_gym.discovery.preparation import prepared
-    from pma_gym.discovery.trial_states import misfits, read_states
-    from pma_gym.discovery.words import figure, signal_name, signal_unit
+    from pma_gym.discovery.fitting.trial_states import misfits, read_states
+    from pma_gym.discovery.preparation.data_checks.checking import check_dataset
+    from pma_gym.discovery.preparation.prepared_trials import prepared
+    from pma_gym.discovery.report.text import figure, signal_name, signal_unit
 
     with warnings_said():
         data = read_dataset(dataset)

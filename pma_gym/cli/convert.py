@@ -72,7 +72,7 @@ def _checked(folder: Path, model: Model) -> list[str]:
     ]
     if model.plant not in ("station", "slide"):
         return said
-    from pma_gym.discovery.data_checks import check_dataset
+    from pma_gym.discovery.preparation.data_checks import check_dataset
 
     try:
         return said + list(check_dataset(dataset, model, stop=False).checked or ())

@@ -83,9 +83,9 @@ def diagnose(
     results.check(force, resume)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
-    from pma_gym.discovery.proposed_file import proposed_file
-    from pma_gym.discovery.report import report_page
-    from pma_gym.discovery.trial_states import dump_states
+    from pma_gym.discovery.experiments.command_file import proposed_file
+    from pma_gym.discovery.fitting.trial_states import dump_states
+    from pma_gym.discovery.report.page import report_page
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
@@ -101,7 +101,7 @@ def diagnose(
         if found.next_experiment:
             files["next.csv"] = proposed_file(found.next_experiment.trial, trials, given)
         results.write(files)
-    from pma_gym.discovery.summary import diagnosis_summary
+    from pma_gym.discovery.report.summary import diagnosis_summary
 
     print(diagnosis_summary(found))
     _print_files(results)
@@ -123,7 +123,7 @@ def fit(
     results.check(force)
     trials, given = _inputs(dataset, model, effect, checks)
     from pma_gym import discovery
-    from pma_gym.discovery.trial_states import dump_states
+    from pma_gym.discovery.fitting.trial_states import dump_states
 
     with results.opened():
         arguments = {"seed": seed, "jobs": jobs}
@@ -137,7 +137,7 @@ def fit(
                 "trials.toml": dump_states(found.states).encode(),
             }
         )
-    from pma_gym.discovery.summary import print_fit
+    from pma_gym.discovery.report.summary import print_fit
 
     print_fit(found)
     _print_files(results)
@@ -169,7 +169,7 @@ def _inputs(
         load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)
     if given.plant in ("station", "slide"):
-        from pma_gym.discovery.data_checks import check_dataset
+        from pma_gym.discovery.preparation.data_checks import check_dataset
 
         trials = check_dataset(trials, given, stop=checks)
         for words in trials.checked or ():
@@ -187,7 +187,7 @@ def _run(
 ) -> "Diagnosis":
     """Runs a diagnosis or a fit, with progress; Ctrl-C says how to go on."""
     try:
-        from pma_gym.discovery.journal import JournalWarning
+        from pma_gym.discovery.fitting.journal import JournalWarning
 
         with StepProgress(time_left) as progress, warnings_said_at_once(JournalWarning):
             return function(trials, model, progress=progress, **arguments)

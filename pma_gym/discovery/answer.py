@@ -6,9 +6,6 @@ from dataclasses import replace
 import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
-from pma_gym.discovery.approximate import closing
-from pma_gym.discovery.approximate_words import why_approximate
-from pma_gym.discovery.blind_spots import for_blind
 from pma_gym.discovery.diagnosis import (
     ADDED,
     Approximate,
@@ -20,26 +17,29 @@ from pma_gym.discovery.diagnosis import (
     TrialRecord,
     Verdict,
 )
-from pma_gym.discovery.experiment import next_experiment
-from pma_gym.discovery.fewest import as_given
-from pma_gym.discovery.findings import Findings
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.leftovers import residuals
-from pma_gym.discovery.parameters import unit, values
-from pma_gym.discovery.quantisation import coarse_sensors
-from pma_gym.discovery.range_words import widened_ranges
-from pma_gym.discovery.records import floors_at_the_door, gaps, judgements, trial_records
-from pma_gym.discovery.residual_laws import residual_law
-from pma_gym.discovery.screening import Look
-from pma_gym.discovery.selection import passes
-from pma_gym.discovery.slowness import leftover, tones
-from pma_gym.discovery.suspects import Suspect
-from pma_gym.discovery.trial_states import misfits, trial_states
-from pma_gym.discovery.unknown import Reason, shapeless_laws, telling, why_unknown
-from pma_gym.discovery.verdict import suspicious, verdict_of
-from pma_gym.discovery.verdict_words import doubt, sentence, steps, twin, unidentified
-from pma_gym.discovery.where import localise
-from pma_gym.discovery.worsened import worsened
+from pma_gym.discovery.experiments.detectability import for_blind
+from pma_gym.discovery.experiments.next_experiment import next_experiment
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import unit, values
+from pma_gym.discovery.fitting.trial_states import misfits, trial_states
+from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.report.approximate_text import why_approximate
+from pma_gym.discovery.report.range_text import widened_ranges
+from pma_gym.discovery.report.records import floors_at_the_door, gaps, judgements, trial_records
+from pma_gym.discovery.report.verdict_text import doubt, sentence, steps, twin, unidentified
+from pma_gym.discovery.screening.localisation import localise
+from pma_gym.discovery.screening.residuals import residuals
+from pma_gym.discovery.screening.score_test import Look
+from pma_gym.discovery.selection.backward_elimination import as_given
+from pma_gym.discovery.selection.forward_selection import passes
+from pma_gym.discovery.verdict.approximate import closing
+from pma_gym.discovery.verdict.decision import suspicious, verdict_of
+from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.discovery.verdict.residual_fraction import leftover, tones
+from pma_gym.discovery.verdict.residual_laws import residual_law
+from pma_gym.discovery.verdict.unknown import Reason, shapeless_laws, telling, why_unknown
+from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
 

@@ -9,27 +9,28 @@ from pma_gym.codegen.threads.sharing import linear_algebra_alone
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
-from pma_gym.discovery.acceptance_floors import Stated, acceptance_floors
-from pma_gym.discovery.adequacy import Residual, adequacy
 from pma_gym.discovery.answer import answer
-from pma_gym.discovery.data_checks import check_dataset
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.fewest import Fewest, as_given, fewest
-from pma_gym.discovery.findings import Findings
-from pma_gym.discovery.fits import Bench, Fitted
-from pma_gym.discovery.floors import initial_floors
-from pma_gym.discovery.held_out import fold_of_rows, unseen
-from pma_gym.discovery.journal import Journal
-from pma_gym.discovery.leftovers import left_over, relearnt
-from pma_gym.discovery.nested_laws import nested
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import own_parameters
-from pma_gym.discovery.preparation import prepared
-from pma_gym.discovery.quantisation import coarse_sensors
-from pma_gym.discovery.rivals import rivals
-from pma_gym.discovery.selection import Selection, select
-from pma_gym.discovery.suspects import suspects
-from pma_gym.discovery.verdict import suspicious
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.fitting.held_out import unseen
+from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors
+from pma_gym.discovery.preparation.data_checks import check_dataset
+from pma_gym.discovery.preparation.initial_floors import initial_floors
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.preparation.splits import fold_of_rows
+from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.screening.residuals import left_over, relearnt
+from pma_gym.discovery.selection.backward_elimination import Fewest, as_given, fewest
+from pma_gym.discovery.selection.forward_selection import Selection, select
+from pma_gym.discovery.selection.nested_laws import nested
+from pma_gym.discovery.selection.rivals import rivals
+from pma_gym.discovery.verdict.adequacy import Residual, adequacy
+from pma_gym.discovery.verdict.decision import suspicious
+from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import Model, ModelError, load_model
 

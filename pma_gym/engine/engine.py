@@ -53,10 +53,10 @@ class Engine(Episodes):
     Attributes:
         count: how many environments.
         threads: how many threads step them.
-        record: places of an environment's numbers.
+        state_layout: places of an environment's numbers.
         table: the observation's entries.
         width: environments that share a block, one lane each.
-        told: the nominal model that controllers are told.
+        nominal_model: the nominal model that controllers receive.
         nominal: the Plant of the nominal model, with what `disturbances` need.
         models: the Model of every environment's episode.
         pressures: gauge pressure that every episode began at (Pa), shape (n,).
@@ -66,8 +66,8 @@ class Engine(Episodes):
         terminated: of the last step, bool, shape (n,).
         truncated: of the last step, bool, shape (n,).
         trace: true position at k / 384 s of a single environment (m or rad).
-        voltages: voltage of the task's actuator that a single environment's station heard in every
-            step (V).
+        voltages: voltage of the task's actuator that a single environment's station received in
+            every step (V).
         rest_motor: motor voltage that episodes begin at (V): it holds the load of a regulator's
             task, by the nominal drive.
     """
@@ -84,7 +84,7 @@ class Engine(Episodes):
         """Compile, make room, and send threads to work."""
         super().__init__(task, options, count, single, pressures)
         self.threads = threads = max(1, min(threads, self.blocks))
-        self._beginnings = np.tile(self._beginning, (threads * BEGUN_PARTS, 1))
+        self._beginnings = np.tile(self._reset_arguments, (threads * BEGUN_PARTS, 1))
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._steps = self._parts(threads)
@@ -162,7 +162,7 @@ class Engine(Episodes):
             truncated. With nothing done it gives BAD_ACTION for an action that is not finite, and
             NOT_READ for one that is no array of as many numbers in single or double precision.
         """
-        keys, known = self.record.info, arrays.are_known()
+        keys, known = self.state_layout.info, arrays.are_known()
         bound = {
             "arguments": self._address,
             "infos": dict.fromkeys(keys),

@@ -8,7 +8,7 @@ from pma_gym.engine.cpu.block_memory import ARGUMENTS, BEFORE
 from pma_gym.engine.cpu.kernel import Kernel
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Task
@@ -18,7 +18,7 @@ class EngineMemory:
     """Numbers of n environments, by place; see `Engine` for arguments and attributes.
 
     Args:
-        told: the nominal model that controllers are told.
+        nominal_model: the nominal model that controllers receive.
         nominal: the Plant of the nominal model.
     """
 
@@ -26,19 +26,19 @@ class EngineMemory:
         self,
         task: Task,
         options: Options,
-        told: Model,
+        nominal_model: Model,
         nominal: Plant,
         count: int,
         single: bool,
     ) -> None:
         """Compile, and make room."""
         self.task, self.options, self.count = task, options, count
-        self.told, self.nominal = told, nominal
-        self.record = Record(tuple(self.nominal.states), task, options)
+        self.nominal_model, self.nominal = nominal_model, nominal
+        self.state_layout = StateLayout(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self.width = 1 if count == 1 else simd_lanes(single)
         program = self.nominal.program
-        self.kernel = Kernel(program, self.record, self.table, self.width, single)
+        self.kernel = Kernel(program, self.state_layout, self.table, self.width, single)
         self.models = [self.nominal.model] * count
         self.pressures = np.zeros(count)
         self.horizon = options.horizon(task)
@@ -46,11 +46,11 @@ class EngineMemory:
         self._address = self._arguments.ctypes.data
 
     def _allocate(self) -> None:
-        record, width = self.record, self.width
+        state_layout, width = self.state_layout, self.width
         self.blocks = -(-self.count // width)
         padded = self.blocks * width
         options = self.options
-        self.records = np.zeros((self.blocks, record.size, width))
+        self.records = np.zeros((self.blocks, state_layout.size, width))
         self.integers = self.records.view(np.int64)
         self._shares_table = options.randomisation == "none"
         rows = 1 if self._shares_table else self.blocks
@@ -59,7 +59,7 @@ class EngineMemory:
         steps = self.task.steps(options.control_rate_hz)
         # What has ended may be stepped once more before it is reset.
         self._references = np.pad(self.table.references, (0, 2), mode="edge")
-        self.actions = np.zeros((padded, record.actions))
+        self.actions = np.zeros((padded, state_layout.actions))
         self._all_observations = np.zeros((padded, len(self.table.rows)), np.float32)
         self._all_rewards = np.zeros(padded)
         self._all_flags = np.zeros((2, padded), np.bool_)
@@ -102,7 +102,7 @@ class EngineMemory:
         }
         self._arguments[:BEFORE] = [given[name] for name in ARGUMENTS]
         self._count_attempts(1)
-        self._idle_lanes = self.integers[-1, record.places["count"], self.count % width :]
+        self._idle_lanes = self.integers[-1, state_layout.offsets["count"], self.count % width :]
         self._has_idle_lanes = self.count % width != 0
 
     def _count_attempts(self, parts: int) -> None:
@@ -117,7 +117,7 @@ class EngineMemory:
 
     def numbers(self, name: str) -> NDArray[np.float64]:
         """A number of every environment by its place's name, shape (n,); a copy."""
-        return self.records[:, self.record.places[name], :].reshape(-1)[: self.count].copy()
+        return self.records[:, self.state_layout.offsets[name], :].reshape(-1)[: self.count].copy()
 
     def row(self, index: int) -> list[float]:
         """All numbers of an environment, by place."""
@@ -127,7 +127,7 @@ class EngineMemory:
     def steps(self, index: int) -> int:
         """Control steps of an environment's episode so far."""
         block, lane = divmod(index, self.width)
-        return int(self.integers[block, self.record.places["count"], lane])
+        return int(self.integers[block, self.state_layout.offsets["count"], lane])
 
     def rows(self, indices: NDArray[np.int64]) -> NDArray[np.float64]:
         """All numbers of some environments, shape (m, size of the record); a copy."""
@@ -137,8 +137,10 @@ class EngineMemory:
     def _of(self, name: str, indices: NDArray[np.int64]) -> NDArray[np.float64]:
         """A number of some environments."""
         block, lane = np.divmod(indices, self.width)
-        return self.records[block, self.record.places[name], lane]
+        return self.records[block, self.state_layout.offsets[name], lane]
 
     def counts(self) -> NDArray[np.int64]:
         """Control steps of every episode so far, shape (n,)."""
-        return self.integers[:, self.record.places["count"], :].reshape(-1)[: self.count].copy()
+        return (
+            self.integers[:, self.state_layout.offsets["count"], :].reshape(-1)[: self.count].copy()
+        )

@@ -7,7 +7,7 @@ import numpy as np
 from gymnasium import spaces
 
 from pma_gym.engine.options import Options
-from pma_gym.tasks import TASKS, Plan, Task
+from pma_gym.tasks import TASKS, MomentProfile, Task
 from pma_gym.units import SI_FACTORS
 
 BOUND = 5.0
@@ -29,7 +29,7 @@ class Prescribed(NamedTuple):
     """
 
     radius: Any
-    plan: Plan
+    plan: MomentProfile
 
     def excess(self, load: Any, angle: Any) -> Any:  # noqa: ANN401
         """Moment that a load (N) makes, less the one that is prescribed at an angle (rad): N m."""
@@ -99,7 +99,7 @@ class ObservationTable:
         delay = self.delay
 
         def position(steps: int) -> Any:  # noqa: ANN401
-            return heard_position(self._quantity, lambda part: reading(part, steps), prescribed)
+            return measured_position(self._quantity, lambda part: reading(part, steps), prescribed)
 
         now = reference(0) * (1.0 / self._span)
         error = now - position(delay) * (1.0 / self._span)
@@ -119,7 +119,7 @@ class ObservationTable:
         ]
 
 
-def heard_position(
+def measured_position(
     quantity: str, reading: Callable[[str], Any], prescribed: Prescribed | None = None
 ) -> Any:  # noqa: ANN401
     """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""

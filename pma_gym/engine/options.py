@@ -57,8 +57,9 @@ class Options:
         control_rate_hz: control steps a second (Hz).
         preview: how many future references the observation holds, one a control step.
         noise: sensor noise and quantisation; the sensors' lag stays either way.
-        action_delay_s: how late an action reaches the drive (s), whole control steps.
-        observation_delay_s: how late the sensors are heard (s), whole control steps.
+        action_delay_s: time from an action to the drive (s), whole control steps.
+        observation_delay_s: age of the sensors' values when the agent receives them (s), whole
+            control steps.
         history: how many earlier readings of the position the observation holds.
         reward: name of a reward in `pma_gym.tasks.REWARDS`; or a function of four numbers, which
             is called after every step: the true error in percent of the range, the largest change
@@ -129,12 +130,12 @@ class Options:
 
     @property
     def action_delay(self) -> int:
-        """How late an action reaches the drive, in control steps."""
+        """Time from an action to the drive, in control steps."""
         return round(self.action_delay_s * self.control_rate_hz)
 
     @property
     def observation_delay(self) -> int:
-        """How late the sensors are heard, in control steps."""
+        """Age of the sensors' values when the agent receives them, in control steps."""
         return round(self.observation_delay_s * self.control_rate_hz)
 
     @property
@@ -264,14 +265,14 @@ def rig_model(task: Task, options: Options) -> Model:
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"
         )
-    model = told_model(task, model)
+    model = nominal_model(task, model)
     if not operated or "operator" in model.parameters:
         return model
     return model.with_effects({"operator": {"share": 1.0}})
 
 
-def told_model(task: Task, model: Model) -> Model:
-    """The nominal model that controllers are told: with a leg on its lever in an exercise."""
+def nominal_model(task: Task, model: Model) -> Model:
+    """The nominal model that controllers receive: with a leg on its lever in an exercise."""
     if task.exercise is None or "leg" in model.parameters or model.plant != "station":
         return model
     leg = CATALOGUE["leg"]

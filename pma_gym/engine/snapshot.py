@@ -55,8 +55,8 @@ def take(engine: EngineMemory) -> Snapshot:
     if engine.width == 1:
         row = engine.records[0, :, 0]
         numbers = row.tobytes()
-        places = engine.record.places
-        trajectory = engine.trace[: int(row[places["sample"]])].tobytes()
+        offsets = engine.state_layout.offsets
+        trajectory = engine.trace[: int(row[offsets["sample"]])].tobytes()
         voltages = engine.voltages[: engine.steps(0)].tobytes()
     else:
         numbers = engine.rows(np.arange(engine.count)).tobytes()
@@ -86,7 +86,7 @@ def put(engine: EngineMemory, state: Snapshot) -> None:
         StateError: a part of another size, or a number that no environment has; nothing has
             changed then.
     """
-    n, size = engine.count, engine.record.size
+    n, size = engine.count, engine.state_layout.size
     numbers = _array(state, "numbers", np.float64, n * size).reshape(n, size)
     pressures = _array(state, "pressures", np.float64, n)
     observations = _array(state, "observations", np.float32, engine.observations.size)
@@ -94,9 +94,9 @@ def put(engine: EngineMemory, state: Snapshot) -> None:
     flags = _array(state, "flags", np.uint8, 2 * n).reshape(2, n)
     _check_numbers(engine, numbers)
     alone = engine.width == 1
-    single = numbers[0, engine.record.places["sample"]] if alone else 0
+    single = numbers[0, engine.state_layout.offsets["sample"]] if alone else 0
     trajectory = _array(state, "trajectory", np.float64, int(single))
-    steps = numbers.view(np.int64)[:, engine.record.places["count"]]
+    steps = numbers.view(np.int64)[:, engine.state_layout.offsets["count"]]
     voltages = _array(state, "voltages", np.float64, int(steps[0]) if alone else 0)
     _check_models(engine, state.models)
     # From here on nothing can fail.
@@ -123,15 +123,15 @@ def _array(state: Snapshot, name: str, kind: Any, length: int) -> NDArray[Any]: 
 
 
 def _put_numbers(engine: EngineMemory, numbers: NDArray[np.float64]) -> None:
-    places, wholes = engine.record.places, numbers.view(np.int64)
+    offsets, wholes = engine.state_layout.offsets, numbers.view(np.int64)
     if engine.width == 1:
         engine.records[0, :, 0] = numbers[0]
     else:
         block, lane = np.divmod(np.arange(engine.count), engine.width)
         engine.records[block, :, lane] = numbers
     for i in range(2):
-        engine._keys[:, i] = wholes[:, places[f"key_{i}"]]
-    engine._episodes[:] = wholes[:, places["episode"]]
+        engine._keys[:, i] = wholes[:, offsets[f"key_{i}"]]
+    engine._episodes[:] = wholes[:, offsets["episode"]]
     # Before the first seed there is no key, and no episode either.
     if not engine._keys[:, 0].all():
         engine._episodes[~engine._keys.any(axis=1)] = -1
@@ -139,25 +139,25 @@ def _put_numbers(engine: EngineMemory, numbers: NDArray[np.float64]) -> None:
 
 def _check_numbers(engine: EngineMemory, numbers: NDArray[np.float64]) -> None:
     """Refuse what would be read or written beyond an array's end."""
-    places, wholes = engine.record.places, numbers.view(np.int64)
+    offsets, wholes = engine.state_layout.offsets, numbers.view(np.int64)
     steps = engine.task.steps(engine.options.control_rate_hz)
-    counts, samples = wholes[:, places["count"]], numbers[:, places["sample"]]
+    counts, samples = wholes[:, offsets["count"]], numbers[:, offsets["sample"]]
     lowest, highest = _range(counts)
     # Samples are counted up to the control step's end; a few are rounding.
     early = counts * (engine.options.period * SAMPLE_RATE_HZ) + 3.0 - samples
-    keys = [n for i in range(2) for n in _range(wholes[:, places[f"key_{i}"]])]
+    keys = [n for i in range(2) for n in _range(wholes[:, offsets[f"key_{i}"]])]
     if not (0 <= lowest and highest <= steps):
         rule = f"control steps must lie in 0-{steps}, got {lowest} to {highest}"
     # `not >=`: NaN is out of every range.
     elif not (_range(samples)[0] >= 0.0 and _range(early)[0] >= 0.0):
         rule = "samples at 384 Hz must go with the control steps"
-    elif not _range(numbers[:, places["size"]])[0] >= 0.0:
+    elif not _range(numbers[:, offsets["size"]])[0] >= 0.0:
         rule = "the integrator's next step must be 0 s or longer"
-    elif any(_range(numbers[:, places[name]])[0] < 0.0 for name in _squares(engine)):
+    elif any(_range(numbers[:, offsets[name]])[0] < 0.0 for name in _squares(engine)):
         rule = "sums of squares must not be negative"
     elif not (0 <= min(keys) and max(keys) < _WORD):
         rule = f"keys of random numbers must lie in 0-{_WORD - 1}, got {keys}"
-    elif not _range(wholes[:, places["episode"]])[0] >= -1:
+    elif not _range(wholes[:, offsets["episode"]])[0] >= -1:
         rule = "episodes must count from 0"
     else:
         return

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pma_gym.codegen.graph import Kind, Value
 from pma_gym.engine.options import Options
-from pma_gym.tasks import PACE, Exercise, Human, Mind, Plan, Task
+from pma_gym.tasks import PACE, Exercise, Human, MomentProfile, OperatorState, Task
 
 Part = Literal["extension", "rotation", "load", "pressure"]
 PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
@@ -34,27 +34,27 @@ joint and device (W), either way, at the control steps' ends."""
 WORK = ("work", "returned")
 """Places of the work that the joint did on the device and that it took back (J)."""
 
-TOLD = (
+NOMINAL_STATION = (
     *("told_radius", "told_drive_gain", "told_drive_offset"),
     *("told_line_gain", "told_line_offset", "told_lag_share"),
 )
 """Places of what the rig's computer knows of its station, drawn or not (SI): it plays the operator,
 and keeps the exercise safe. `told_lag_share` is how far the pressure goes in a control step."""
 
-GUARDED = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
+FILTER_STATE = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
 """Places of what the safety layer remembers: the pressure that the nominal regulator has come to
-(Pa), the extension that it heard last (m), the speed that it found (rad/s), the moment of late
+(Pa), the last measured extension (m), the estimated speed (rad/s), the moment of late
 (N m)."""
 
 
-def plan_of_places(number: Callable[[str], Value], exercise: Exercise) -> Plan:
-    """An operator's plan from the numbers at its places (`Record.plan`).
+def profile_at_offsets(number: Callable[[str], Value], exercise: Exercise) -> MomentProfile:
+    """An operator's plan from the numbers at its places (`StateLayout.plan`).
 
     Args:
         number: gives the value of a place.
         exercise: whose plan it is.
     """
-    return Plan(
+    return MomentProfile(
         number("plan_first"),
         [number(f"plan_angle_{i}") for i in range(exercise.knots)],
         [number(f"plan_slope_{i}") for i in range(exercise.knots - 1)],
@@ -62,7 +62,7 @@ def plan_of_places(number: Callable[[str], Value], exercise: Exercise) -> Plan:
 
 
 @dataclass(frozen=True)
-class Record:
+class StateLayout:
     """Places of an environment's numbers.
 
     Attributes:
@@ -139,9 +139,9 @@ class Record:
             *(f"human_{name}" for name in Human._fields),
             "human_share",
             *self.plan,
-            *TOLD,
-            *(f"mind_{name}" for name in Mind._fields),
-            *(GUARDED if self.options.safety else ()),
+            *NOMINAL_STATION,
+            *(f"mind_{name}" for name in OperatorState._fields),
+            *(FILTER_STATE if self.options.safety else ()),
             "operator_moment",
             *PEAKS,
             *WORK,
@@ -166,7 +166,7 @@ class Record:
         ]
 
     @cached_property
-    def places(self) -> dict[str, int]:
+    def offsets(self) -> dict[str, int]:
         """Place of every number by name."""
         delay = self.options.action_delay
         names = [
@@ -195,4 +195,4 @@ class Record:
     @property
     def size(self) -> int:
         """How many numbers there are."""
-        return len(self.places)
+        return len(self.offsets)

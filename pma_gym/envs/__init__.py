@@ -8,8 +8,9 @@ from pma_gym.engine.snapshot import StateError
 from pma_gym.envs.pma_env import PMAEnv
 from pma_gym.envs.specs import DefaultSteps, single_wrappers
 from pma_gym.envs.state import EnvState
-from pma_gym.envs.station_info import Reading, Reference, Station
+from pma_gym.envs.station_info import Measurement, Reference, StationInfo
 from pma_gym.envs.vector import PMAVectorEnv
+from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks import EVERY_TASK
 
 ENVIRONMENTS = {
@@ -44,9 +45,11 @@ __all__ = [
     "Options",
     "PMAEnv",
     "PMAVectorEnv",
-    "Reading",
+    "Measurement",
     "Reference",
     "RewardFunction",
     "StateError",
-    "Station",
+    "StationInfo",
 ]
+
+__getattr__ = renamed_names(__name__, {"Station": StationInfo, "Reading": Measurement})

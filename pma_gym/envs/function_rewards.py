@@ -15,9 +15,9 @@ from pma_gym.units import SI_FACTORS
 class FunctionRewards:
     """Writes the rewards of a user's function where an engine has its own.
 
-    The compiled step leaves the action's change in their place (`Circuit.reward`). A terminated
-    episode also gets, for every step that it did not reach, the reward of an error of the whole
-    range, as with the rewards by name.
+    The compiled step leaves the action's change in their place (`ControlStepGraph.reward`). A
+    terminated episode also gets, for every step that it did not reach, the reward of an error of
+    the whole range, as with the rewards by name.
 
     Args:
         engine: whose rewards; its options have the function.
@@ -43,7 +43,7 @@ class FunctionRewards:
         columns = [engine.numbers(name).tolist() for name in ("reward", *self._names)]
         ended, counts = engine.numbers("ended").tolist(), engine.counts().tolist()
         left_out = set(np.asarray(skipped, int).tolist())
-        place, width = engine.record.places["reward"], engine.width
+        place, width = engine.state_layout.offsets["reward"], engine.width
         for i, (change, error, position, reference) in enumerate(zip(*columns, strict=True)):
             if i in left_out:
                 continue

@@ -91,7 +91,7 @@ class BatchMember(PMAEnv):
             "action_space": batch.single_action_space,
         }
         self.__dict__.update(values)
-        self._find_places()
+        self._find_offsets()
 
     @property
     def index(self) -> int:
@@ -214,7 +214,7 @@ class BatchMember(PMAEnv):
         """Do nothing: the batch has the picture and the threads."""
 
 
-_OWN = ("_places", "_datum", "_heard", "_np_random", "_np_random_seed")
+_OWN = ("_offsets", "_datum", "_measured", "_np_random", "_np_random_seed")
 
 
 def refusal(name: str) -> str:

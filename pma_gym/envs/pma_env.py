@@ -33,11 +33,12 @@ from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.station_info import Reading, Reference, Station, detached_task
+from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary, last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Events, Human, Task
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     A float32 Box, each entry clipped to -5 to 5. "Position" is the quantity that the task asks
     for, and its range 25 mm, 90 deg, or the contraction's stroke. Extension and rotation count from
     the trial's beginning, so that extension is negative while a regulator's task contracts the
-    muscle. With `observation_delay_s` everything measured is so old.
+    muscle. `observation_delay_s` is the age of everything measured.
 
     | index | entry | 1.0 = |
     |---|---|---|
@@ -139,8 +140,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | pressure | 600 kPa |
 
     An exercise also ends where moment (24 N m) or speed of the joint (60 deg/s) are not safe. Its
-    safety layer (`safety`, on by default; `pma_gym.tasks.guard`) holds the regulator's command
-    away from there.
+    safety layer (`safety`, on by default; `pma_gym.tasks.safety_filter`) holds the regulator's
+    command away from there.
 
     `truncated` once the last sample of the trial at 384 Hz, 1922/384 s after its last phase began,
     is reached: at 100 Hz after 501 steps (displacement), 1501 (rotation), 1001 (the unseen
@@ -166,10 +167,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     |---|---|---|
     | `time_s` | since the trial began | s |
     | `extension_mm`, `rotation_deg` or `contraction_mm` | true position | mm, deg |
-    | `measured_` and the same | as heard by the agent | mm, deg |
+    | `measured_` and the same | as the agent receives it | mm, deg |
     | `reference_mm` or `reference_deg` | reference now | mm, deg |
     | `error_mm` or `error_deg` | true position less reference | mm, deg |
-    | `motor_voltage_v`, `regulator_voltage_v` | as heard by the station in this step | V |
+    | `motor_voltage_v`, `regulator_voltage_v` | as the station receives it in this step | V |
     | `pressure_kpa`, `load_n` | true gauge pressure and cable tension | kPa, N |
     | `extrapolated` | pressure outside the dissertation's trials or the model's validity | |
     | of an exercise: `moment_nm`, `operator_nm` | at the joint; that the operator means | N m |
@@ -236,7 +237,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._attach()
 
     _ATTACHED = frozenset(
-        {"nominal_plant", "table", "plant", "_places", "_row", "_heard", "_observed", "_given"}
+        {"nominal_plant", "table", "plant", "_offsets", "_row", "_measured", "_observed", "_given"}
         | {"_made", "_datum", "_picture", "_advance"}
     )
 
@@ -245,7 +246,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self.nominal_plant = self._engine.nominal
         self.table = self._engine.table
         self._row = self._engine.records[0, :, 0]
-        self._find_places()
+        self._find_offsets()
         self._observed = self._engine.observations[0]
         self._given = self._engine.actions[0]
         self._made = self._engine.advance(self._observed.copy, self._given)
@@ -254,12 +255,12 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._picture: Picture | None = None
         self._wait(self._idle)
 
-    def _find_places(self) -> None:
-        self._places = self._engine.record.places
+    def _find_offsets(self) -> None:
+        self._offsets = self._engine.state_layout.offsets
         # The record holds a reading's parts side by side.
-        heard = self._places[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._heard = slice(heard, heard + len(PARTS))
-        self._datum = START if START in self._places else "zero_contraction"
+        first = self._offsets[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._measured = slice(first, first + len(PARTS))
+        self._datum = START if START in self._offsets else "zero_contraction"
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -291,7 +292,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     def step(
         self, action: NDArray[np.floating]
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """Command the station, let one control step pass, look what came of it.
+        """Command the station, let one control step pass, return its result.
 
         Raises:
             ValueError: an action of the wrong shape, or not finite.
@@ -360,7 +361,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self.options.pressure_kpa
 
     def _number(self, name: str) -> float:
-        return float(self._row[self._places[name]])
+        return float(self._row[self._offsets[name]])
 
     # -- states ------------------------------------------------------------------------------------
 
@@ -455,7 +456,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     @property
     def _count(self) -> int:
         """Control steps so far."""
-        return int(self._row.view(np.int64)[self._places["count"]])
+        return int(self._row.view(np.int64)[self._offsets["count"]])
 
     @property
     def time(self) -> float:
@@ -463,10 +464,12 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._count * self.options.period
 
     @property
-    def reading(self) -> Reading:
-        """What the sensors say now, as late as `observation_delay_s` makes them."""
+    def measurement(self) -> Measurement:
+        """What the sensors say, `observation_delay_s` ago."""
         taken = max(self._count - self.options.observation_delay, 0) * self.options.period
-        return Reading(taken, *self._row[self._heard].tolist())
+        return Measurement(taken, *self._row[self._measured].tolist())
+
+    reading = renamed_attribute("reading", "measurement")
 
     @property
     def truth(self) -> dict[str, float]:
@@ -499,12 +502,12 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     @property
     def disturbance(self) -> tuple[float, float]:
         """What disturbed the last step: the regulator's jump (V) and the operator's force (N)."""
-        jumps = [name for name in self._places if name.startswith("jump_step_")]
+        jumps = [name for name in self._offsets if name.startswith("jump_step_")]
         count = self._count - 1
         volts = [
             self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
         ]
-        force = self._number(OPERATOR) if OPERATOR in self._places else 0.0
+        force = self._number(OPERATOR) if OPERATOR in self._offsets else 0.0
         return sum(volts), force
 
     @property
@@ -513,11 +516,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return self._engine.events(self._index)
 
     @property
-    def station(self) -> Station:
+    def station(self) -> StationInfo:
         """What a controller may know, in copies: what it was designed with, how it is driven."""
         options = self.options
-        return Station(
-            copy.copy(self._engine.told),
+        return StationInfo(
+            copy.copy(self._engine.nominal_model),
             self._detached_task,
             self.pressure,
             options.period,
@@ -537,17 +540,17 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     @property
     def motor_voltage(self) -> float:
-        """Motor voltage that the station heard in the last step (V)."""
+        """Motor voltage that the station received in the last step (V)."""
         return self._number("motor_voltage")
 
     @property
     def regulator_voltage(self) -> float:
-        """Regulator voltage that the station heard in the last step (V)."""
+        """Regulator voltage that the station received in the last step (V)."""
         return self._number("regulator_voltage")
 
     @property
     def motor_voltages(self) -> NDArray[np.float64]:
-        """Motor voltage that the station heard in every step so far (V), shape (steps,).
+        """Motor voltage that the station received in every step so far (V), shape (steps,).
 
         Raises:
             AttributeError: in an exercise, whose operator is not written down step by step.
@@ -563,7 +566,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     @property
     def voltages(self) -> NDArray[np.float64]:
-        """Voltage of the task's actuator that the station heard in every step so far (V)."""
+        """Voltage of the task's actuator that the station received in every step so far (V)."""
         return self._engine.voltages[: self._count].copy()
 
     @property

@@ -33,7 +33,7 @@ def setup(engine: Engine, **others: object) -> Setup:
     """
     said = {name: _text(value) for name, value in others.items()}
     said |= _task(engine)
-    # The told model stands below, number by number, wherever it was read from.
+    # The nominal model stands below, number by number, wherever it was read from.
     skipped = ("model", "pressure_kpa")
     said |= {
         field.name: _text(getattr(engine.options, field.name))
@@ -44,8 +44,8 @@ def setup(engine: Engine, **others: object) -> Setup:
     said["pressures_kpa" if several else "pressure_kpa"] = _text(
         engine.wanted if several else engine.wanted[0]
     )
-    said |= _model(engine.told)
-    said["numbers"] = " ".join(engine.record.places)
+    said |= _model(engine.nominal_model)
+    said["numbers"] = " ".join(engine.state_layout.offsets)
     return tuple(said.items())
 
 
@@ -68,12 +68,12 @@ def differences(theirs: Setup, ours: Setup) -> str:
         odd.remove("numbers")
     if "task" in odd:
         odd = [name for name in odd if not name.startswith("task.")]
-    told = [
+    shown = [
         f"{name} is {_shortened(known.get(name))} there and {_shortened(here.get(name))} here"
         for name in odd[:FEW]
     ]
     more = [f"{len(odd) - FEW} more"] if len(odd) > FEW else []
-    return ", ".join(told + more)
+    return ", ".join(shown + more)
 
 
 def _shortened(text: str | None) -> str:
@@ -88,10 +88,10 @@ def _task(engine: Engine) -> dict[str, str]:
     said = {"task": task.name, "task.load": _text(task.load), "task.starts": _text(task.starts)}
     if task.exercise is not None:
         said["task.exercise"] = _text(task.exercise)
-    told = hashlib.sha256(repr(task.structure).encode())
-    told.update(engine.table.references.tobytes())
-    told.update(engine._ideals.tobytes())
-    return said | {"task.reference": f"{task.name} {told.hexdigest()[:12]}"}
+    digest = hashlib.sha256(repr(task.structure).encode())
+    digest.update(engine.table.references.tobytes())
+    digest.update(engine._ideals.tobytes())
+    return said | {"task.reference": f"{task.name} {digest.hexdigest()[:12]}"}
 
 
 def _model(model: Model) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What a controller may know: the station before a trial, the sensors' readings during it.
+"""What a controller receives: the station before a trial, a measurement in every control step.
 
 All of it is detached: copies that hold no environment, so that neither the true state nor anything
 that the simulation reads can be reached or changed through them.
@@ -11,6 +11,7 @@ from typing import NamedTuple
 from pma_gym.data.protocol import Protocol
 from pma_gym.engine.options import rest_load
 from pma_gym.plant.model import Model
+from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks import Task
 
 
@@ -38,7 +39,7 @@ def detached_task(task: Task) -> Task:
 
 
 @dataclass(frozen=True)
-class Station:
+class StationInfo:
     """What a controller may know of the station before a trial.
 
     Attributes:
@@ -46,8 +47,8 @@ class Station:
         task: the task, with its protocol; a copy.
         pressure: gauge pressure that the trial begins at (Pa).
         period: time of a control step (s).
-        action_delay: how late a command reaches the station (s), whole periods.
-        observation_delay: how old a reading is when it is heard (s), whole periods.
+        action_delay: time from a command to the station (s), whole periods.
+        observation_delay: age of a measurement when the controller receives it (s), whole periods.
     """
 
     model: Model
@@ -65,22 +66,24 @@ class Station:
         """
         return rest_load(self.model, self.task)
 
-    def moment(self, reading: "Reading") -> float:
+    def moment(self, measurement: "Measurement") -> float:
         """Moment at an exercise's joint, as the load cell says it by the nominal pulley (N m)."""
-        return self.model.parameters["rotor"].radius * reading.load
+        return self.model.parameters["rotor"].radius * measurement.load
 
-    def position(self, reading: "Reading") -> float:
+    def position(self, measurement: "Measurement") -> float:
         """The position that the task asks for, as the sensors say it (m, rad or N m)."""
         quantity = self.task.protocol.quantity
         if quantity == "rotation":
-            return reading.rotation
+            return measurement.rotation
         if quantity == "excess":
             assert self.task.exercise and self.task.exercise.prescription
-            return self.moment(reading) - self.task.exercise.prescription.at(reading.rotation)
-        return -reading.extension if quantity == "contraction" else reading.extension
+            return self.moment(measurement) - self.task.exercise.prescription.at(
+                measurement.rotation
+            )
+        return -measurement.extension if quantity == "contraction" else measurement.extension
 
 
-class Reading(NamedTuple):
+class Measurement(NamedTuple):
     """What the sensors said at one instant, in SI; extension and rotation from their zeros.
 
     Attributes:
@@ -98,3 +101,6 @@ class Reading(NamedTuple):
     rotation: float
     load: float
     pressure: float
+
+
+__getattr__ = renamed_names(__name__, {"Station": StationInfo, "Reading": Measurement})

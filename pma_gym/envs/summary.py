@@ -1,6 +1,6 @@
-"""What an episode was worth: RMSE by phase, from the sums that were kept while it ran.
+"""Score of an episode: RMSE by phase, from the sums that were kept while it ran.
 
-What an agent is told at its end is here too, of one environment among however many.
+The last info of an episode is here too, of one environment of any number.
 """
 
 import math
@@ -35,20 +35,20 @@ def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
 
 
 def _step_info(engine: Engine, row: list[float]) -> dict[str, Any]:
-    keys, first = engine.record.info, engine.record.places["ended"] + 1
+    keys, first = engine.state_layout.info, engine.state_layout.offsets["ended"] + 1
     found = dict(zip(keys, row[first : first + len(keys)], strict=True))
     return found | {name: found[name] != 0.0 for name in TRUTHS}
 
 
 def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, Any]:
-    task, places = engine.task, engine.record.places
-    sums = {phase.name: row[places[f"sum_{phase.name}"]] for phase in task.protocol.phases}
-    found = summary(task, sums, row[places["sample"]])
-    code = row[places["ended"]]
+    task, offsets = engine.task, engine.state_layout.offsets
+    sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.protocol.phases}
+    found = summary(task, sums, row[offsets["sample"]])
+    code = row[offsets["ended"]]
     found["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
     if task.exercise is None:
         return found
-    numbers = {name: np.array([row[places[name]]]) for name in exercise_places()}
+    numbers = {name: np.array([row[offsets[name]]]) for name in exercise_offsets()}
     other = exercise_summaries(numbers, np.array([engine.steps(index)]), engine.options.period)
     return found | {name: float(values[0]) for name, values in other.items()}
 
@@ -108,7 +108,7 @@ def summaries(
     }
 
 
-def exercise_places() -> list[str]:
+def exercise_offsets() -> list[str]:
     """Places of what `exercise_summaries` needs."""
     return [*PEAKS, *WORK, *(f"pace_{phase.name}" for phase in PACE.phases)]
 
@@ -119,7 +119,7 @@ def exercise_summaries(
     """What exercises came to beside their RMSE, at the door.
 
     Args:
-        numbers: of `exercise_places` by name, shape (m,) each.
+        numbers: of `exercise_offsets` by name, shape (m,) each.
         counts: control steps so far, shape (m,).
         period: of the control steps (s).
     Returns:

@@ -38,6 +38,7 @@ from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
 from pma_gym.envs.summary import exercise_summaries, summaries
+from pma_gym.renamed_names import renamed_attribute
 from pma_gym.tasks import Task, limit_in_words
 
 if TYPE_CHECKING:
@@ -275,7 +276,7 @@ class PMAVectorEnv(
         NDArray[np.bool_],
         dict[str, Any],
     ]:
-        """Command every station, let one control step pass, look what came of it.
+        """Command every station, let one control step pass, return its result.
 
         Args:
             actions: shape (num_envs, entries of an action).
@@ -351,7 +352,7 @@ class PMAVectorEnv(
         return engine.observations.copy(), rewards, terminated, truncated, info
 
     def _final(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[Any, Any]:
-        """What is told of episodes that end before the next ones begin in the same step."""
+        """The info of episodes that end before the next ones begin in the same step."""
         final = np.full(self.num_envs, None, object)
         for i in indices.tolist():
             final[i] = self.engine.observations[i].copy()
@@ -409,9 +410,9 @@ class PMAVectorEnv(
         """Last infos of the episodes that ended, in Gymnasium's form: arrays with masks."""
         engine, task = self.engine, self.task
         columns = engine.rows(indices).T
-        numbers = {name: columns[place] for name, place in engine.record.places.items()}
+        numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
         sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
-        found: dict[str, Any] = {name: numbers[name] for name in engine.record.info}
+        found: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
         found |= {name: found[name] != 0.0 for name in TRUTHS}
         found |= summaries(task, sums, numbers["sample"])
         if task.exercise:
@@ -425,18 +426,20 @@ class PMAVectorEnv(
     def station_info(self) -> dict[str, NDArray[Any]]:
         """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
         found: dict[str, NDArray[Any]] = {
-            name: self.engine.numbers(name) for name in self.engine.record.info
+            name: self.engine.numbers(name) for name in self.engine.state_layout.info
         }
         return found | {name: found[name] != 0.0 for name in TRUTHS}
 
-    def readings(self) -> NDArray[np.float64]:
-        """What the sensors say now, as controllers hear it (SI), shape (4, num_envs).
+    def measurements(self) -> NDArray[np.float64]:
+        """What the sensors say, `observation_delay_s` ago (SI), shape (4, num_envs).
 
-        Extension (m), rotation (rad), load (N), pressure (Pa), as late as `observation_delay_s`
-        makes them: of each environment what `PMAEnv.reading` has.
+        Extension (m), rotation (rad), load (N), pressure (Pa): of each environment what
+        `PMAEnv.measurement` has.
         """
         late = self.options.observation_delay
         return np.stack([self.engine.numbers(f"{part}_{late}") for part in PARTS])
+
+    readings = renamed_attribute("readings", "measurements")
 
     @property
     def pressures(self) -> NDArray[np.float64]:

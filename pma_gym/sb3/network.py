@@ -125,12 +125,16 @@ def network(x: Tensor, layers: Layers) -> Tensor:
 
 
 def derivatives(
-    of_y: Tensor, x: Tensor, weights: Sequence[Tensor], hidden: Sequence[Tensor], out: "Derivatives"
+    grad_output: Tensor,
+    x: Tensor,
+    weights: Sequence[Tensor],
+    hidden: Sequence[Tensor],
+    out: "Derivatives",
 ) -> Tensor:
     """Of a sum: from its derivatives by y those by weights and biases, which are written to `out`.
 
     Args:
-        of_y: shape (rows, outputs).
+        grad_output: shape (rows, outputs).
         x: the same for all networks, shape (rows, inputs).
         weights: of the layers.
         hidden: what they passed on.
@@ -140,20 +144,22 @@ def derivatives(
     """
     back = zip(weights[:0:-1], hidden[::-1], out.layers[:0:-1], out.hidden[::-1], strict=True)
     for weight, s, (of_weight, of_bias), place in back:
-        torch.sum(of_y, -2, out=of_bias)
+        torch.sum(grad_output, -2, out=of_bias)
         # By h = 2 s - 1.
-        _added(of_y)(of_bias[..., None], of_y.mT, s, beta=-1, alpha=2, out=of_weight)
-        if of_y.shape[-1] == 1:
+        _added(grad_output)(of_bias[..., None], grad_output.mT, s, beta=-1, alpha=2, out=of_weight)
+        if grad_output.shape[-1] == 1:
             # The same, in 0.4 of the time.
-            of_y = torch.mul(of_y, 4.0 * weight, out=place)
+            grad_output = torch.mul(grad_output, 4.0 * weight, out=place)
         else:
-            of_y = _added(of_y)(place, of_y, weight, alpha=4.0, beta=0.0, out=place)
-        torch.ops.aten.sigmoid_backward.grad_input(of_y, s, grad_input=of_y)
+            grad_output = _added(grad_output)(
+                place, grad_output, weight, alpha=4.0, beta=0.0, out=place
+            )
+        torch.ops.aten.sigmoid_backward.grad_input(grad_output, s, grad_input=grad_output)
     of_weight, of_bias = out.layers[0]
-    torch.sum(of_y, -2, out=of_bias)
+    torch.sum(grad_output, -2, out=of_bias)
     # So, and not the other way round: few columns on the left are four times as fast.
-    of_weight.copy_(_shared(x, of_y).mT.matmul(of_y).mT)
-    return of_y
+    of_weight.copy_(_shared(x, grad_output).mT.matmul(grad_output).mT)
+    return grad_output
 
 
 class Derivatives:
@@ -182,10 +188,10 @@ class _Network(torch.autograd.Function):
         ctx: Any,  # noqa: ANN401
         *grad_outputs: Tensor,
     ) -> tuple[Tensor | None, ...]:
-        (of_y,), saved = grad_outputs, ctx.saved_tensors
+        (grad_output,), saved = grad_outputs, ctx.saved_tensors
         weights, (x, *hidden) = saved[: len(saved) // 2], saved[len(saved) // 2 :]
         layers = [(torch.empty_like(one), one.new_empty(len(one))) for one in weights]
         out = Derivatives(layers, [torch.empty_like(one) for one in hidden])
-        first = derivatives(of_y, x, weights, hidden, out)
+        first = derivatives(grad_output, x, weights, hidden, out)
         of_x = first.mm(weights[0]) if ctx.needs_input_grad[0] else None
         return of_x, *chain.from_iterable(layers)

@@ -29,7 +29,7 @@ from pma_gym.sb3.network import (
     side_by_side,
 )
 from pma_gym.sb3.policy import HALF_LOG_TAU, LeanMlpPolicy
-from pma_gym.sb3.threads import Pace, threads
+from pma_gym.sb3.threads import ThreadTuner, threads
 
 Numbers = NDArray[np.floating]
 
@@ -69,10 +69,10 @@ class LeanPPO(PPO):
 
     def _setup_model(self) -> None:
         super()._setup_model()
-        self._pace = Pace()
+        self._thread_tuner = ThreadTuner()
 
     def _excluded_save_params(self) -> list[str]:
-        return [*super()._excluded_save_params(), "_pace"]
+        return [*super()._excluded_save_params(), "_thread_tuner"]
 
     def is_lean(self) -> bool:
         """Whether it learns so, or as `PPO` does."""
@@ -126,7 +126,7 @@ class LeanPPO(PPO):
         most = min(self.batch_size, rollout.rows)
         updates, losses = _Updates(policy), _Losses()
         large = most * self._weights() > MOST_ALONE and torch.get_num_threads() > 1
-        pace = self._pace.work if large and updates.are_together else nullcontext
+        pace = self._thread_tuner.work if large and updates.are_together else nullcontext
         with threads(1):
             for epoch in range(self.n_epochs):
                 losses.divergences.clear()
@@ -135,11 +135,11 @@ class LeanPPO(PPO):
                     rows = order[start : start + most]
                     with pace(len(rows)):
                         part = rollout.part(rows)
-                        of_y = self._derivatives(updates, part, clip, clip_values, losses)
+                        grad_output = self._derivatives(updates, part, clip, clip_values, losses)
                         if self._has_changed_too_much(losses.divergences[-1], epoch):
                             self._n_updates += 1
                             return losses
-                        updates.make(of_y, part.observations, self.max_grad_norm)
+                        updates.make(grad_output, part.observations, self.max_grad_norm)
                 self._n_updates += 1
         return losses
 
@@ -296,8 +296,8 @@ class _Group:
         *self._hidden, y = passed(seen, self._scaled, self._places(len(seen))[0])
         return self._each(y)
 
-    def derive(self, of_y: Sequence[Tensor], seen: Tensor) -> None:
-        together = of_y[0] if self.count == 1 else torch.stack(list(of_y))
+    def backward(self, grad_output: Sequence[Tensor], seen: Tensor) -> None:
+        together = grad_output[0] if self.count == 1 else torch.stack(list(grad_output))
         out = Derivatives(self._gradients, self._places(len(seen))[1])
         derivatives(together, seen, self._weights, self._hidden, out)
 
@@ -341,17 +341,17 @@ class _Updates:
         """What actor and critic say; shapes (rows, outputs)."""
         return [y for group in self._groups for y in group.passed(seen)]
 
-    def make(self, of_y: Sequence[Numbers], seen: Tensor, most: float) -> None:
+    def make(self, grad_output: Sequence[Numbers], seen: Tensor, most: float) -> None:
         """An update, by derivatives whose norm is limited.
 
         Args:
-            of_y: the loss's derivatives by what actor and critic said.
+            grad_output: the loss's derivatives by what actor and critic said.
             seen: what they said it of.
             most: of the norm.
         """
-        left = [torch.from_numpy(one) for one in of_y]
+        left = [torch.from_numpy(one) for one in grad_output]
         for group in self._groups:
-            group.derive(left[: group.count], seen)
+            group.backward(left[: group.count], seen)
             del left[: group.count]
         self._gradient.mul_((most / (self._gradient.norm() + 1e-6)).clamp(max=1.0))
         self.policy.optimizer.step()

@@ -28,7 +28,7 @@ def threads(count: int) -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-class Pace:
+class ThreadTuner:
     """Chooses by how long the work has taken.
 
     PyTorch's threads wait for each other many times in a minibatch. Where another program wants a

@@ -180,8 +180,8 @@ class SB3VecEnv(EngineVecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Step; an environment whose episode ends returns the next one's first observation."""
-        observations, rewards, terminated, truncated, told = self.envs.step(self._actions)
-        ended: dict[Any, dict[str, Any]] = told
+        observations, rewards, terminated, truncated, last = self.envs.step(self._actions)
+        ended: dict[Any, dict[str, Any]] = last
         over = terminated | truncated
         self._returns += rewards
         self._lengths += 1

@@ -9,8 +9,17 @@ from pma_gym.tasks.exercises import (
     moment_exercise,
     numbered_exercise,
 )
-from pma_gym.tasks.follow import obstacle
-from pma_gym.tasks.human import HUMAN_BOUNDS, PACED, PACING, Human, Mind, Plan, Population, plan_of
+from pma_gym.tasks.follow import infeasibility_reason
+from pma_gym.tasks.human import (
+    HUMAN_BOUNDS,
+    PACED,
+    PACING,
+    Human,
+    MomentProfile,
+    OperatorState,
+    Population,
+    moment_profile,
+)
 from pma_gym.tasks.isotonic import ISOTONIC, isotonic, pressure_triangle
 from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words, unsafe
 from pma_gym.tasks.randomisation import (
@@ -73,8 +82,8 @@ __all__ = [
     "Events",
     "Exercise",
     "Human",
-    "Mind",
-    "Plan",
+    "OperatorState",
+    "MomentProfile",
     "Population",
     "Randomisation",
     "Reward",
@@ -94,10 +103,10 @@ __all__ = [
     "named_task",
     "nominal_station",
     "numbered_exercise",
-    "obstacle",
+    "infeasibility_reason",
     "phase_errors",
     "phase_rmse",
-    "plan_of",
+    "moment_profile",
     "pressure_triangle",
     "quadratic_reward",
     "sine",

@@ -8,7 +8,7 @@ as in the dissertation's rotation. What the device is to do is prescribed:
     profile       hold the moment that is prescribed at the joint's angle
 
 Neither moment nor speed may exceed what is safe: an episode ends there, and a safety layer between
-agent and regulator keeps away from it (`pma_gym.tasks.guard`).
+agent and regulator keeps away from it (`pma_gym.tasks.safety_filter`).
 
 Source:
     Serres 2008, sections 3.3, 4.3 and 6.3. Moments of the prescriptions, safe moment and safe speed
@@ -18,8 +18,8 @@ Source:
 from dataclasses import dataclass
 
 from pma_gym.data.protocol import ROTATION
-from pma_gym.tasks.guard import Guard
-from pma_gym.tasks.human import Plan, Population
+from pma_gym.tasks.human import MomentProfile, Population
+from pma_gym.tasks.safety_filter import SafetyFilter
 from pma_gym.units import SI_FACTORS
 
 _DEG = SI_FACTORS["deg"]
@@ -50,14 +50,14 @@ class Exercise:
     Attributes:
         prescription: moment over the angle; None where the speed is prescribed.
         population: whom the operators are drawn from.
-        guard: numbers of the safety layer.
+        safety_filter: numbers of the safety layer.
         safe_moment: largest moment at the joint (N m).
         safe_speed: largest speed of the joint (rad/s).
     """
 
-    prescription: Plan | None
+    prescription: MomentProfile | None
     population: Population
-    guard: Guard
+    safety_filter: SafetyFilter
     safe_moment: float = SAFE_MOMENT
     safe_speed: float = SAFE_SPEED
 
@@ -75,4 +75,11 @@ class Exercise:
     def structure(self) -> tuple[object, ...]:
         """What compiled environments depend on: no moment, and nobody's numbers."""
         prescribed = "speed" if self.prescription is None else "moment"
-        return ("exercise", prescribed, self.knots, self.guard, self.safe_moment, self.safe_speed)
+        return (
+            "exercise",
+            prescribed,
+            self.knots,
+            self.safety_filter,
+            self.safe_moment,
+            self.safe_speed,
+        )

@@ -5,8 +5,8 @@ from collections.abc import Sequence
 
 from pma_gym.data.protocol import ROTATION, Phase, Protocol
 from pma_gym.tasks.exercise import PACE, SAFE_MOMENT, Exercise
-from pma_gym.tasks.guard import GUARD_PACED, GUARD_PACING
-from pma_gym.tasks.human import PACED, PACING, plan_of
+from pma_gym.tasks.human import PACED, PACING, moment_profile
+from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING
 from pma_gym.tasks.task import TASKS, Task
 from pma_gym.units import SI_FACTORS
 
@@ -30,7 +30,7 @@ def isokinetic_exercise(
         name: name of the task.
     """
     _check_pressures(pressures)
-    exercise = Exercise(None, PACED, GUARD_PACED)
+    exercise = Exercise(None, PACED, FILTER_PACED)
     return Task(name, ROTATION, *pressures, "regulator", exercise=exercise)
 
 
@@ -59,7 +59,7 @@ def moment_exercise(
     phases = tuple(Phase(p.name, p.start, p.duration, 0.0, 0.0) for p in PACE.phases)
     protocol = Protocol(name, "excess", "N m", max(moments), phases)
     lowest, highest = TASKS["displacement"].lowest_pressure, TASKS["displacement"].highest_pressure
-    exercise = Exercise(plan_of(angles, moments), PACING, GUARD_PACING)
+    exercise = Exercise(moment_profile(angles, moments), PACING, FILTER_PACING)
     return Task(
         name,
         protocol,

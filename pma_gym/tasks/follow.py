@@ -19,7 +19,7 @@ ROUNDING_N, ROUNDING_V = 1.0, 0.02
 _HALVINGS = 40
 
 
-def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
+def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str | None:
     """What keeps the actuator of a station from following a task, in words; None if nothing.
 
     A jump of the reference; a voltage of less than 0 or more than 10 V; or, where the motor moves,
@@ -38,9 +38,9 @@ def obstacle(task: Task, model: str | Model, pressure: float) -> str | None:
 
     Example:
         >>> from pma_gym.tasks import UNSEEN
-        >>> obstacle(UNSEEN["displacement_speeds"], "station", 300e3) is None
+        >>> infeasibility_reason(UNSEEN["displacement_speeds"], "station", 300e3) is None
         True
-        >>> obstacle(UNSEEN["displacement_steps"], "station", 300e3)
+        >>> infeasibility_reason(UNSEEN["displacement_steps"], "station", 300e3)
         'the reference jumps by ... mm at 0.5 s'
     """
     nominal = load_model(model)

@@ -176,7 +176,7 @@ of the ankle, or within 1-3 deg. Effort: an assumption.
 """
 
 
-class Plan(NamedTuple):
+class MomentProfile(NamedTuple):
     """Moment over the angle, linear between its knots and constant beyond; numbers or values.
 
     Attributes:
@@ -200,13 +200,13 @@ class Plan(NamedTuple):
         return self.angles[i + 1] - self.angles[i]
 
 
-def plan_of(angles: Sequence[float], moments: Sequence[float]) -> Plan:
+def moment_profile(angles: Sequence[float], moments: Sequence[float]) -> MomentProfile:
     """The plan through knots: angles (rad) and moments (N m)."""
     slopes = np.diff(moments) / np.diff(angles)
-    return Plan(float(moments[0]), tuple(map(float, angles)), tuple(slopes.tolist()))
+    return MomentProfile(float(moments[0]), tuple(map(float, angles)), tuple(slopes.tolist()))
 
 
-class Mind(NamedTuple):
+class OperatorState(NamedTuple):
     """What changes in a person from step to step.
 
     Attributes:
@@ -220,9 +220,9 @@ class Mind(NamedTuple):
     freshness: Any
 
 
-def moved(
+def operator_step(
     human: Human,
-    mind: Mind,
+    state: OperatorState,
     wish: Any,  # noqa: ANN401
     away: Any,  # noqa: ANN401
     coming: Any,  # noqa: ANN401
@@ -230,14 +230,14 @@ def moved(
     normal: Any,  # noqa: ANN401
     period: float,
     share: Any,  # noqa: ANN401
-) -> tuple[Any, Mind]:
+) -> tuple[Any, OperatorState]:
     """A person's moment during a control step, and how he comes out of it.
 
     Numbers or traced values; the equations are the module's, a step long.
 
     Args:
         human: who.
-        mind: as it was.
+        state: as it was before the step.
         wish: effort times plan at the intended angle (N m).
         away: intended angle less the true one (rad).
         coming: angle of the knee so far ahead as he sees (rad).
@@ -246,24 +246,24 @@ def moved(
         period: of the control step (s).
         share: how far the moment rises in a step, 1 - exp(-period / rise).
     Returns:
-        The moment (N m), and his mind after the step.
+        The moment (N m), and the state after the step.
     """
     kept = math.exp(-period / WANDER_S)
-    wander = kept * mind.wander + math.sqrt(1.0 - kept * kept) * normal
+    wander = kept * state.wander + math.sqrt(1.0 - kept * kept) * normal
     cut = where(wander > FARTHEST_WANDER, FARTHEST_WANDER, wander)
     cut = where(cut < -FARTHEST_WANDER, -FARTHEST_WANDER, cut)
-    drive = mind.drive + share * (wish * (1.0 + human.unsteadiness * cut) - mind.drive)
+    drive = state.drive + share * (wish * (1.0 + human.unsteadiness * cut) - state.drive)
     turns = human.tremor_phase + human.tremor_rate * time
     sine, _ = sine_cosine(turns - floor(turns))
     moment = drive * (1.0 + human.tremor * sine) + human.stiffness * away
     full = human.strength * knee_share(coming)
-    able = mind.freshness * full
+    able = state.freshness * full
     moment = where(moment > able, able, moment)
     moment = where(moment < 0.0, 0.0, moment)
     # Where there is no strength at all nothing is asked of it.
     used = moment / where(full > 0.0, full, 1.0)
-    freshness = mind.freshness * (1.0 - period * human.fatigue * used)
-    return moment, Mind(drive, wander, freshness)
+    freshness = state.freshness * (1.0 - period * human.fatigue * used)
+    return moment, OperatorState(drive, wander, freshness)
 
 
 def unsteady(count: Any, stream: Any, key: tuple[Any, Any], zero: Any) -> Any:  # noqa: ANN401

@@ -5,7 +5,8 @@ the dissertation's ranges (25 mm, 90 deg) and begin at 0, and an error is given 
 range, so that figures of all of them compare. Sines and their sums are faded in over 2.5 s, without
 a jump of speed. But for the steps, which nothing follows, they are no faster than three times the
 dissertation's own speed, 5 mm/s and 18 deg/s (a sum of sines up to five times while it is faded
-in), and do not go back to where the muscle has no force left to pull the cable out; `obstacle` says
+in), and do not go back to where the muscle has no force left to pull the cable out;
+`infeasibility_reason` says
 what a station lacks for one.
 """
 

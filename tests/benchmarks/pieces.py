@@ -3,7 +3,7 @@
 import os
 import signal
 
-from benchmarks.worker import begin_limited, end_limited
+from benchmarks.runner.worker import begin_limited, end_limited
 
 
 class Awkward(Exception):

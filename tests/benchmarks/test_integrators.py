@@ -8,10 +8,10 @@ import pytest
 from rich.console import Console
 
 from benchmarks import integrators
+from benchmarks.accuracy.reference import TRIALS, demanding_commands, reference, shares
 from benchmarks.integrators import Point, at_equal_error
 from benchmarks.methods import DORMAND_PRINCE, EXPRB43, RK4
 from benchmarks.prototype import Prototype, slow_share
-from benchmarks.reference import TRIALS, demanding_commands, reference, shares
 from pma_gym.plant.plant import Plant
 
 

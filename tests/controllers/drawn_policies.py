@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.network import Layer, Scaling, Weights
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyFile
 
 
@@ -23,7 +23,7 @@ def drawn_weights(sizes=(48, 64, 64, 1), activation="tanh", output="clip", scale
 
 def drawn_policy(station, name="displacement-100hz-ppo", view=None, form=None, **network):
     """A policy as if trained for a station."""
-    view, form = view or View("environment", 2, 3), form or Form("direct", 5.0)
+    view, form = view or ObservationSpec("environment", 2, 3), form or ActionMapping("direct", 5.0)
     rows = view.rows(station, form.base)
     return PolicyFile(
         name=name,

@@ -8,14 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
-from benchmarks.bound import achievable_bound
+from benchmarks.bounds.achievable import achievable_bound
 from controllers import CONTROLLERS
 from pma_gym.plant.model import load_model
 
 RIVALS = [
     make
     for make in CONTROLLERS.values()
-    if not hasattr(make, "see") and "rotation" in getattr(make, "kinds", ["rotation"])
+    if not hasattr(make, "receive") and "rotation" in getattr(make, "kinds", ["rotation"])
 ]
 
 bound_of = lru_cache(achievable_bound)

@@ -33,17 +33,17 @@ def task_for(name):
 def test_a_copy_in_the_middle_of_a_trial_goes_on_alike_and_alone(name):
     env, controller = PMAEnv(task_for(name), pressure_kpa=500), CONTROLLERS[name]()
     env.reset(seed=3)
-    if hasattr(controller, "see"):
-        controller.see(env)
+    if hasattr(controller, "receive"):
+        controller.receive(env)
     controller.reset(env.reference, env.station)
     for _ in range(BEFORE):
-        env.step(env.action(controller.act(env.reading, env.time)))
+        env.step(env.action(controller.act(env.measurement, env.time)))
     copied = copy.deepcopy(controller)
     readings, given = [], []
-    for _ in range(1 if hasattr(controller, "see") else AFTER):
-        readings.append((env.reading, env.time))
+    for _ in range(1 if hasattr(controller, "receive") else AFTER):
+        readings.append((env.measurement, env.time))
         given.append(float(controller.act(*readings[-1])))
-        if not hasattr(controller, "see"):
+        if not hasattr(controller, "receive"):
             env.step(env.action(given[-1]))
     # The original has gone on by now; its copy stands where it was made.
     assert [float(copied.act(*reading)) for reading in readings] == given

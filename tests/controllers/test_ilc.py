@@ -7,7 +7,7 @@ import pytest
 
 from controllers import ILC
 from controllers.ilc import BOUNDS, DEFAULTS, LearningGain, Settings
-from controllers.models.lifted_model import LiftedPlant
+from controllers.models.lifted_model import LiftedModel
 from controllers.models.nominal_motion import nominal_motion
 from pma_gym.envs import PMAEnv
 
@@ -18,7 +18,7 @@ PERIOD = 0.01
 def plant(station):
     """The lifted plant of a displacement trial, from its second half on."""
     motion = nominal_motion(lambda time: 5e-3 * time, station())
-    return LiftedPlant(motion, 100, 400)
+    return LiftedModel(motion, 100, 400)
 
 
 def bump(at, width=40.0, count=400):
@@ -27,7 +27,7 @@ def bump(at, width=40.0, count=400):
 
 def test_lifted_plant_is_the_local_model_step_by_step(station):
     motion = nominal_motion(lambda time: 5e-3 * time, station())
-    plant = LiftedPlant(motion, 0, 60)
+    plant = LiftedModel(motion, 0, 60)
     impulse = np.zeros(60)
     impulse[20] = 1.0
     model = motion.local(motion.expected(21 * PERIOD))
@@ -101,7 +101,7 @@ def trials(controller, env, nominal=None, count=10, seed=50):
         controller.reset(env.reference, told)
         ended, info = False, {}
         while not ended:
-            volts = controller.act(env.reading, env.time)
+            volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))
             ended = terminated or truncated
         left.append(info["rmse_mm"])

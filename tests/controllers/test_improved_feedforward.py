@@ -8,7 +8,7 @@ import pytest
 from controllers import ImprovedFeedforward, SerresReplay
 from controllers.models.inverse import inverse_of
 from pma_gym.data.serres2008 import pressures
-from pma_gym.envs import Station
+from pma_gym.envs import StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK, TASKS
@@ -25,7 +25,7 @@ def voltages(station):
 
 
 def inverted(station):
-    """As the inverse gives them, before they are rehearsed."""
+    """As the inverse gives them, before they are nominal_rollout."""
     inverse, steps = inverse_of(station.model), station.task.steps(1.0 / station.period)
     parts = inverse.parts(station.period)
     times = np.arange(steps * parts + 1) * station.period / parts
@@ -34,7 +34,7 @@ def inverted(station):
 
 def test_while_held_it_asks_for_the_voltage_that_settles_there():
     model = load_model("serres2008").replace(FRICTIONLESS)
-    volts = voltages(Station(model, TASKS["rotation"], 350e3, 0.01))
+    volts = voltages(StationInfo(model, TASKS["rotation"], 350e3, 0.01))
     plant = Plant(model)
     rest = plant.settle(volts[800], pressure=350e3)
     truth = plant.observe(rest.state[None, :], rest.zero_contraction)
@@ -44,7 +44,7 @@ def test_while_held_it_asks_for_the_voltage_that_settles_there():
 def test_lag_is_compensated_by_the_damping_of_the_model():
     # Constant speed, no friction, no hysteresis: L = K y + B y'.
     model = load_model("serres2008").replace(FRICTIONLESS)
-    where = Station(model, TASKS["displacement"], 300e3, 0.01)
+    where = StationInfo(model, TASKS["displacement"], 300e3, 0.01)
     plant = Plant(model)
     volts, middle = inverted(where), 5e-3 * 2.505
     static = plant.settle(3.0, pressure=300e3)
@@ -57,7 +57,7 @@ def test_lag_is_compensated_by_the_damping_of_the_model():
 
 def test_cascade_gets_the_lower_root_of_its_map():
     model = load_model("cascade")
-    volts = inverted(Station(model, TASKS["displacement"], 300e3, 0.01))
+    volts = inverted(StationInfo(model, TASKS["displacement"], 300e3, 0.01))
     lag = 1.57e3 / (32.7e3 - 0.0321e3 * 300)
     wanted = 5e-3 * (2.505 + lag)
     assert np.polyval([-0.0005, 0.0107, -0.0050], volts[250]) == pytest.approx(wanted, abs=1e-8)
@@ -66,7 +66,7 @@ def test_cascade_gets_the_lower_root_of_its_map():
 
 def test_dead_zone_of_the_map_is_passed_at_once():
     # Table 18 at 300 kPa moves nothing below 0.478 V.
-    volts = voltages(Station(load_model("cascade"), TASKS["rotation"], 300e3, 0.01))
+    volts = voltages(StationInfo(load_model("cascade"), TASKS["rotation"], 300e3, 0.01))
     edge = min(np.roots([-0.0005, 0.0107, -0.0050]))
     assert volts[0] == pytest.approx(edge, abs=0.01)
 
@@ -138,7 +138,7 @@ def test_the_regulator_is_led_as_well(task, pressure, drive):
 def test_the_regulator_gets_the_voltage_that_holds(station):
     # In the hold of the isotonic task: settle there by the plant's own statics.
     model = load_model("serres2008").replace(FRICTIONLESS)
-    where = Station(model, EVERY_TASK["isotonic"], 300e3, 0.01)
+    where = StationInfo(model, EVERY_TASK["isotonic"], 300e3, 0.01)
     controller, plant = ImprovedFeedforward(), Plant(model)
     controller.reset(where.task.protocol.at, where)
     motor = (200.0 + 2.0) / 97.84

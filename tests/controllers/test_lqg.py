@@ -13,13 +13,15 @@ from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
 from controllers.observers.deviation_filter import SHARE, SHARE_TIME_S, Unknowns, with_disturbance
 from controllers.observers.pressure_filter import PressureFilter
-from pma_gym.envs import PMAEnv, Reading, Station
+from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, RANDOMISATIONS
 
 
 def station_of(task="displacement", pressure_kpa=300.0, model="station", rate=100.0, **delays):
-    return Station(load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays)
+    return StationInfo(
+        load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays
+    )
 
 
 def test_regulator_solves_the_scalar_riccati_equation():
@@ -116,7 +118,7 @@ def test_free_rotor_is_exact_under_held_voltage():
 def readings(where, ways_mm, loads_n, period=0.01):
     radius = where.model.parameters["rotor"].radius
     for k, (way, load) in enumerate(zip(ways_mm, loads_n, strict=True)):
-        yield Reading(k * period, 0.0, 1e-3 * way / radius, load + 7.0, 300e3)
+        yield Measurement(k * period, 0.0, 1e-3 * way / radius, load + 7.0, 300e3)
 
 
 def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
@@ -126,7 +128,7 @@ def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
     ways = [0.0] * 3 + [1.2] * 10 + [0.5, 1.2] + [1.2] * 5 + [0.5] * 8
     loads = [0.0] * 3 + [20.0] * 10 + [0.0, 20.0] + [20.0] * 5 + [0.0] * 8
     for reading in readings(where, ways, loads):
-        cable.see(reading)
+        cable.update(reading)
         seen.append((cable.loose, cable.settling))
     assert seen[2] == (True, True)
     assert seen[4] == (False, True) and seen[6] == (False, False)
@@ -141,7 +143,7 @@ def test_pressure_filter_foresees_a_step_of_the_regulator():
     sensor_lag = 1.0 / (2.0 * math.pi * 50.0)
     for k in range(40):
         elapsed = max(0.01 * (k - 20), 0.0)
-        filter_.see(300e3 + 25e3 * -math.expm1(-elapsed / lag))
+        filter_.update(300e3 + 25e3 * -math.expm1(-elapsed / lag))
         if k == 19:
             assert filter_.ahead(0.05, 300e3) == pytest.approx(300e3, abs=50.0)
         if k == 23:
@@ -155,7 +157,7 @@ def test_pressure_filter_keeps_noise_and_a_wrong_zero_away():
     where, generator = station_of(), np.random.default_rng(0)
     filter_, said = PressureFilter(where), []
     for noise in generator.normal(0.0, 330.0, 500).tolist():
-        filter_.see(303e3 + noise)
+        filter_.update(303e3 + noise)
         said.append(filter_.pressure)
         filter_.advance(300e3)
     assert np.std(said) < 150.0
@@ -194,7 +196,7 @@ def run(env, controller, nominal):
     controller.reset(env.reference, replace(env.station, model=nominal))
     ended, info = False, {}
     while not ended:
-        voltage = controller.act(env.reading, env.time)
+        voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
         *_, broken, ended, info = env.step(env.action(voltage))
         assert not broken

@@ -44,7 +44,9 @@ def driven(controller, seed=3, task="displacement", **options):
     controller.reset(env.reference, replace(env.station, model=nominal))
     ended = False
     while not ended:
-        *_, terminated, truncated, _ = env.step(env.action(controller.act(env.reading, env.time)))
+        *_, terminated, truncated, _ = env.step(
+            env.action(controller.act(env.measurement, env.time))
+        )
         ended = terminated or truncated
     position = env.trajectory()
     return position - env.task.protocol.reference(np.arange(len(position)) / 384.0), env.voltages

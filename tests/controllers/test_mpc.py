@@ -59,8 +59,8 @@ def test_the_plan_is_the_least_squares_solution_of_the_stepped_model(station):
         x, found = start, []
         for k, volts in enumerate(plan):
             x = bank.moved(x, first + k, nominal[first + k] + volts)
-            foreseen = x @ design.ahead[0, first, 0]
-            found.append(design.motion.error[first + k + 1] + weights @ foreseen)
+            predicted = x @ design.ahead[0, first, 0]
+            found.append(design.motion.error[first + k + 1] + weights @ predicted)
         return np.array(found)
 
     free = errors(np.zeros(count))
@@ -104,7 +104,7 @@ def test_it_tracks_rotation_within_the_target(drive):
 
 
 def test_it_lets_the_cable_go_loose_without_throwing_the_rotor(drive):
-    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bound`).
+    # The achievable bound of phase III is under 0.01 deg here (`benchmarks.bounds.achievable`).
     by_phase, _ = drive(PreviewMPC(), "rotation", 575)
     assert by_phase["III"] < 0.2
 
@@ -131,7 +131,7 @@ def driven(controller, seed=3):
     ended, info = False, {}
     while not ended:
         *_, terminated, truncated, info = env.step(
-            env.action(controller.act(env.reading, env.time))
+            env.action(controller.act(env.measurement, env.time))
         )
         ended = terminated or truncated
     return info["rmse_mm"], env.voltages

@@ -7,7 +7,7 @@ from scipy.optimize import lsq_linear
 from controllers import FeedforwardPID, ImprovedFeedforward, Oracle
 from controllers.design.bounded_least_squares import Space, best_plan
 from controllers.design.horizon import HORIZON_S, LONGEST, block_lengths, horizon
-from controllers.models.prediction import PLANS, Commands, Foresight
+from controllers.models.prediction import PLANS, Commands, Prediction
 from pma_gym.envs import PMAEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
@@ -22,10 +22,10 @@ def commands_of(task, seed: int = 1, **options):
     env = PMAEnv(task, **options)
     env.reset(seed=seed)
     oracle, ended, volts = Oracle(), False, []
-    oracle.see(env)
+    oracle.receive(env)
     oracle.reset(env.reference, env.station)
     while not ended:
-        volts.append(oracle.act(env.reading, env.time))
+        volts.append(oracle.act(env.measurement, env.time))
         _, _, terminated, truncated, _ = env.step(env.action(volts[-1]))
         ended = terminated or truncated
     return np.array(volts), env
@@ -39,7 +39,7 @@ def test_foresight_is_what_the_plant_does():
     condition, regulator = plant.settle(3.0, pressure=300e3), plant.regulator_voltage(300e3)
     times = np.array([0.0, 0.01, 0.02, 0.05])
     volts = np.array([[4.0, 2.0, 3.0], [0.0, 10.0, 5.0]])
-    seen = Foresight(plant, times)(condition, Commands(volts, regulator), 2)
+    seen = Prediction(plant, times)(condition, Commands(volts, regulator), 2)
     for plan, row in enumerate(volts):
         stepped = Condition(condition.state.copy(), condition.zero_contraction)
         for k, volt in enumerate(row):
@@ -53,7 +53,7 @@ def test_what_is_foreseen_depends_on_no_other_plan_and_leaves_the_plant_alone():
     plant = Plant("station")
     condition = plant.settle(3.0, pressure=300e3)
     before = condition.state.copy()
-    foresight = Foresight(plant, np.array([0.0, 0.01, 0.02]))
+    foresight = Prediction(plant, np.array([0.0, 0.01, 0.02]))
     volts = np.linspace(0.0, 10.0, PLANS)[:, None] * np.ones(2)
     together = foresight(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
     alone = foresight(condition, Commands(volts[7:8], 5.0), 1)["extension"]
@@ -114,7 +114,7 @@ def test_horizon_counts_every_scored_sample_once(rate, delay):
 
 
 def test_it_must_be_shown_the_environment(station):
-    with pytest.raises(ValueError, match=r"must be shown the environment.*see\(environment\)"):
+    with pytest.raises(ValueError, match=r"must be shown the environment.*receive\(environment\)"):
         Oracle().reset(lambda time: 0.0, station())
 
 

@@ -11,19 +11,19 @@ import pytest
 pytest.importorskip("safetensors")
 
 from controllers.controller import Controller
-from controllers.policies.action_mapping import Form
-from controllers.policies.adapter import Pilot
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import PolicyAdapter
 from controllers.policies.network import Network
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import PolicyError, save_policy_file
 from controllers.policy import Policy, ShippedPolicy, shipped_policies
 from pma_gym.envs import PMAEnv
 from tests.controllers.drawn_policies import drawn_policy
 
 KINDS = [
-    (View("environment", 2, 3), Form("direct", 5.0)),
-    (View("tracking", 6, 6), Form("increment", 0.5)),
-    (View("tracking", 1, 0), Form("residual", 1.0, "pid")),
+    (ObservationSpec("environment", 2, 3), ActionMapping("direct", 5.0)),
+    (ObservationSpec("tracking", 6, 6), ActionMapping("increment", 0.5)),
+    (ObservationSpec("tracking", 1, 0), ActionMapping("residual", 1.0, "pid")),
 ]
 
 
@@ -42,20 +42,20 @@ def test_it_is_the_pilot_and_the_network(view, form, written, station, reading):
     path = written(view=view, form=form, scaled=True)
     policy = Policy(path)
     assert isinstance(policy, Controller) and policy.name == "displacement-100hz-ppo"
-    pilot, network = Pilot(view, form), Network(policy.file.weights)
+    pilot, network = PolicyAdapter(view, form), Network(policy.file.weights)
     for _ in range(2):
         # The second trial is as the first: a reset forgets.
         policy.reset(lambda time: 0.005 * time, station())
         pilot.reset(lambda time: 0.005 * time, station())
         for step in range(20):
             said = reading(extension=1e-4 * step, rotation=1e-3 * step, time=0.01 * step)
-            action = network(pilot.see(said, 0.01 * step))[0]
+            action = network(pilot.update(said, 0.01 * step))[0]
             assert policy.act(said, 0.01 * step) == pilot.volts(float(action))
 
 
 def test_it_drives_the_environment_as_its_own_actions_do(written, drive):
     """What an agent does that was trained on the environment, action by action."""
-    path = written(view=View("environment", 2, 3), form=Form("direct", 5.0))
+    path = written(view=ObservationSpec("environment", 2, 3), form=ActionMapping("direct", 5.0))
     policy, network = Policy(path), Network(Policy(path).file.weights)
     _, volts = drive(policy, "displacement", 300, seed=4, preview=2, history=3)
     env = PMAEnv("displacement", model="station", pressure_kpa=300.0, preview=2, history=3)
@@ -101,8 +101,10 @@ def test_a_view_that_has_other_rows_now_is_refused(station, tmp_path):
     message = "entry 0 of the observation is measured extension (1.0 = 25 mm), trained for measured"
     with pytest.raises(PolicyError, match=re.escape(message)):
         Policy(path, anywhere=True).reset(lambda time: 0.0, station())
-    longer = drawn_policy(station(), view=View("environment", 4, 3))
-    path = save_policy_file(replace(longer, view=View("environment", 2, 3)), tmp_path / "longer")
+    longer = drawn_policy(station(), view=ObservationSpec("environment", 4, 3))
+    path = save_policy_file(
+        replace(longer, view=ObservationSpec("environment", 2, 3)), tmp_path / "longer"
+    )
     with pytest.raises(PolicyError, match="the observation has 12 entries, trained for 14"):
         Policy(path, anywhere=True).reset(lambda time: 0.0, station())
 

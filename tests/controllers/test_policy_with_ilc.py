@@ -1,4 +1,5 @@
-"""A policy that practises: what it learns, what it is told less of, and when it begins anew."""
+"""A policy with iterative learning: what it learns, what it receives less of, and when it begins
+anew."""
 
 import re
 from dataclasses import replace
@@ -6,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from controllers import PractisedPolicy
+from controllers import PolicyWithILC
 from controllers.models.nominal_motion import nominal_motion
 from controllers.policy import PolicyError
 from controllers.policy_with_ilc import LEAST_SHARE, EarlierTrials, Softened, smooth
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
 
 PERIOD, STEPS = 0.01, 501
@@ -31,7 +32,7 @@ def trials(controller, seeds, env):
         told = replace(env.station, model=load_model("station"))
         controller.reset(env.reference, told)
         while not ended:
-            volts = controller.act(env.reading, env.time)
+            volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))
             ended = terminated or truncated
         assert truncated
@@ -55,10 +56,10 @@ def test_a_line_is_drawn_through_steps_that_say_nothing():
 
 
 @pytest.mark.parametrize("pressure", [200.0, 400.0])
-def test_practice_makes_better_on_a_station_that_the_model_does_not_know(pressure):
+def test_learning_trials_help_on_a_station_that_the_model_does_not_know(pressure):
     env = PMAEnv("displacement", pressure_kpa=pressure, model=weaker())
-    left = trials(PractisedPolicy(), range(300, 310), env)
-    alone = [trials(PractisedPolicy(), [seed], env)[0] for seed in range(307, 310)]
+    left = trials(PolicyWithILC(), range(300, 310), env)
+    alone = [trials(PolicyWithILC(), [seed], env)[0] for seed in range(307, 310)]
     assert np.mean(left[-3:]) < 0.85 * np.mean(alone)
 
 
@@ -73,7 +74,7 @@ def scattered(motion, scatter, generator, moved=0.0):
 
 
 def _reading(row):
-    return Reading(0.0, *row)
+    return Measurement(0.0, *row)
 
 
 @pytest.fixture
@@ -91,8 +92,8 @@ def test_what_is_not_noise_is_told(motion):
 
 def test_a_reading_is_moved_to_what_is_expected_by_a_share():
     softened = Softened([[1.0, 2.0, 3.0, 4.0]], 0.5)
-    assert softened.told(_reading((3.0, 2.0, 1.0, 8.0)), 0)[1:] == (2.0, 2.0, 2.0, 6.0)
-    assert softened.told(_reading((3.0, 2.0, 1.0, 8.0)), 1)[1:] == (3.0, 2.0, 1.0, 8.0)
+    assert softened.reading(_reading((3.0, 2.0, 1.0, 8.0)), 0)[1:] == (2.0, 2.0, 2.0, 6.0)
+    assert softened.reading(_reading((3.0, 2.0, 1.0, 8.0)), 1)[1:] == (3.0, 2.0, 1.0, 8.0)
 
 
 def test_expected_positions_follow_the_reference_as_it_has_been_moved_since(motion):
@@ -109,9 +110,9 @@ def test_trials_that_broke_off_are_no_measure():
     assert earlier.softened(np.zeros(STEPS + 1), None) is None
 
 
-def test_practice_begins_anew_elsewhere_and_after_its_repetitions():
+def test_learning_begins_anew_elsewhere_and_after_its_repetitions():
     """The first trial of all is met again to the last bit."""
-    controller = PractisedPolicy()
+    controller = PolicyWithILC()
     env = PMAEnv("displacement", pressure_kpa=300.0, model=weaker())
     first = trials(controller, [5], env)
     assert trials(controller, [5], env) != first
@@ -128,13 +129,13 @@ def test_practice_begins_anew_elsewhere_and_after_its_repetitions():
         (
             "isokinetic_exercise",
             {},
-            "ppo_ilc practises displacement and rotation, the task's kind is isokinetic; take a "
-            "policy that needs no practice, such as ppo",
+            "ppo_ilc learns displacement and rotation, the task's kind is isokinetic; take a "
+            "policy that needs no learning trials, such as ppo",
         ),
     ],
 )
 def test_what_it_cannot_do_is_refused_and_changes_nothing(task, options, message):
-    controller, fresh = PractisedPolicy(), PractisedPolicy()
+    controller, fresh = PolicyWithILC(), PolicyWithILC()
     refused = PMAEnv(task, pressure_kpa=400.0, **options)
     refused.reset(seed=1)
     env = PMAEnv("displacement", pressure_kpa=300.0, model=weaker())
@@ -147,11 +148,11 @@ def test_what_it_cannot_do_is_refused_and_changes_nothing(task, options, message
 
 def test_without_a_trial_there_is_nothing_to_act_on(reading):
     with pytest.raises(RuntimeError, match="ppo_ilc has no trial: call reset"):
-        PractisedPolicy().act(reading(), 0.0)
+        PolicyWithILC().act(reading(), 0.0)
 
 
 def test_of_a_trial_that_broke_off_the_rest_is_left_as_it_was(station, reading):
-    controller = PractisedPolicy()
+    controller = PolicyWithILC()
     for steps in (100, 0):
         controller.reset(lambda time: 5e-3 * time, station())
         for k in range(steps):

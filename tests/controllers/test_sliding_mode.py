@@ -55,7 +55,7 @@ def test_switching_asks_for_no_more_than_k(station, reading):
         heard = reading(extension=float(generator.normal(0.0, 1e-3)), load=200.0)
         voltage = controller.act(heard, k * PERIOD)
         observer = controller._observer
-        # What `see` returned, anew: it does not depend on what is sent afterwards.
+        # What `update` returned, anew: it does not depend on what is sent afterwards.
         place = observer.places[observer.at]
         flying = place.flying @ observer._sent[-place.since - 1 : -1]
         ahead = place.ahead @ observer._estimate + flying

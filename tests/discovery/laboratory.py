@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fits import Bench
-from pma_gym.discovery.noise import white_noise
-from pma_gym.discovery.parameters import own_parameters
+from pma_gym.discovery.fitting.fit_problem import Bench
+from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model

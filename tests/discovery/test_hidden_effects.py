@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.hidden_effects.groups import group
+from benchmarks.hidden_effects.generation.groups import group
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import diagnose
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import pma_gym.envs  # noqa: F401
-from benchmarks.hidden_effects.groups import group
+from benchmarks.hidden_effects.generation.groups import group
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import write_trial
 from pma_gym.data.quality.clipping import ends
@@ -142,15 +142,15 @@ def test_nothing_is_claimed_of_a_driven_slide_whose_parameters_are_off():
     assert viscous == pytest.approx(SLIDE["viscous"], rel=0.03)
 
 
-def thirty_pulls():
-    return driven_slide(12.0, lanes=30, seconds=0.4, rate=100)
+def fifteen_pulls():
+    return driven_slide(12.0, lanes=15, seconds=0.4, rate=100)
 
 
 def one_long_drive():
     return driven_slide(12.0, lanes=1, seconds=10.0)
 
 
-@pytest.mark.parametrize("log", [thirty_pulls, one_long_drive])
+@pytest.mark.parametrize("log", [fifteen_pulls, one_long_drive])
 def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(log):
     found = diagnose(log(), DRIVEN, propose=False)
     assert found.verdict == "effect", found.sentence

@@ -12,7 +12,7 @@ from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery import workflow
-from pma_gym.discovery.selection import Selection
+from pma_gym.discovery.selection.forward_selection import Selection
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.plant.model import dump_model, load_model
 from pma_gym.plant.plant import Plant

@@ -7,7 +7,7 @@ in which they are there, and another effect delays some.
 import numpy as np
 import pytest
 
-from benchmarks.reference import TRIALS
+from benchmarks.accuracy.reference import TRIALS
 from pma_gym.effects import CATALOGUE
 
 DELAYING_NOTHING = (

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.reference import TRIALS
+from benchmarks.accuracy.reference import TRIALS
 from pma_gym.plant.simulation import Run, simulate_all
 
 EVERY = (

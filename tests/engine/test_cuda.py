@@ -11,7 +11,7 @@ from pma_gym.codegen.machine import cuda_driver
 from pma_gym.codegen.machine.control import INTEGER, function
 from pma_gym.codegen.machine.native import Library
 from pma_gym.engine.cuda import engine
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.cuda.kernel import CudaKernel, shared_job
 from pma_gym.engine.engine import Engine
@@ -35,7 +35,7 @@ class Pair:
     def __init__(self, task, options, count, precision="double", threads=None):
         self.task, options = TASKS[task], Options(**options)
         self.own = Engine(self.task, options, count)
-        self.other = DeviceEngine(self.task, options, count, precision, StandIn(threads))
+        self.other = DeviceEngine(self.task, options, count, precision, CpuDevice(threads))
         every = np.arange(count)
         self.own.seed(every, [7 + i for i in every.tolist()])
         self.own.reset(every)
@@ -47,7 +47,7 @@ class Pair:
 
     def states(self):
         """Numbers of both by name."""
-        names = [*self.own.record.states, "size", "tare_contraction"]
+        names = [*self.own.state_layout.states, "size", "tare_contraction"]
         return {n: (self.own.numbers(n), self.other.numbers(n)) for n in names}
 
     def step(self, actions):
@@ -73,7 +73,7 @@ class Pair:
 
 def actions_of(generator, pair, step, rough):
     """Random volts, or a swing around a pull that is not let go."""
-    shape = pair.own.count, pair.own.record.actions
+    shape = pair.own.count, pair.own.state_layout.actions
     if rough:
         return generator.uniform(-1.0, 1.0, shape).astype(np.float32)
     swing = -0.65 + 0.2 * np.sin(0.05 * step + np.arange(shape[0]))
@@ -156,7 +156,7 @@ def test_some_environments_begin_anew():
     assert pair.other.numbers("episode").tolist() == [1, 0, 0, 1, 0, 0]
     found = pair.step(actions)
     assert np.array_equal(*found["observations"])
-    unseeded = DeviceEngine(pair.task, Options(), 3, "single", StandIn())
+    unseeded = DeviceEngine(pair.task, Options(), 3, "single", CpuDevice())
     first = unseeded.reset().copy()
     assert len({row.tobytes() for row in first}) == 3
     assert not np.array_equal(first, unseeded.reset())
@@ -165,8 +165,8 @@ def test_some_environments_begin_anew():
 def test_mistakes_are_named():
     task = TASKS["displacement"]
     with pytest.raises(ValueError, match="precision must be double or single, got 'half'"):
-        DeviceEngine(task, Options(), 2, "half", StandIn())
-    engine = DeviceEngine(task, Options(), 2, "double", StandIn())
+        DeviceEngine(task, Options(), 2, "half", CpuDevice())
+    engine = DeviceEngine(task, Options(), 2, "double", CpuDevice())
     with pytest.raises(RuntimeError, match="call reset"):
         engine.step(np.zeros((2, 1)))
     with pytest.raises(ValueError, match="one for each of the 2 environments; got 3"):
@@ -178,7 +178,7 @@ def test_mistakes_are_named():
 
 @pytest.fixture(scope="module", params=["double", "single"])
 def kernel(request) -> CudaKernel:
-    engine = DeviceEngine(TASKS["displacement"], Options(), 2, request.param, StandIn())
+    engine = DeviceEngine(TASKS["displacement"], Options(), 2, request.param, CpuDevice())
     return engine.kernel
 
 

@@ -26,7 +26,7 @@ def test_a_step_returns_what_the_record_holds(task):
         observation, reward, terminated, truncated, info = made
         assert type(made) is tuple and type(info) is dict
         assert terminated is False and truncated is False
-        assert list(info) == list(begun) == env._engine.record.info
+        assert list(info) == list(begun) == env._engine.state_layout.info
         assert info == env._info()
         assert {type(value) for name, value in info.items() if name != "extrapolated"} == {float}
         assert type(info["extrapolated"]) is bool
@@ -49,7 +49,7 @@ def test_steps_keep_nothing_and_take_no_reference_that_is_not_theirs():
     env = PMAEnv("displacement")
     env.reset(seed=0)
     action = np.zeros(1, np.float32)
-    keys = env._engine.record.info
+    keys = env._engine.state_layout.info
     held = [False, True, *keys, env._observed]
     env.step(action)
     gc.collect()

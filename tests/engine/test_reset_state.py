@@ -10,7 +10,8 @@ from pma_gym.engine.reset import reset_state
 from pma_gym.engine.reset.reset_state import holding_voltages, settled_at_no_load
 from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
-from pma_gym.plant.plant import Plant, vector
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import vector
 
 PRESSURES = np.array([150e3, 300e3, 500e3, 300e3])
 
@@ -103,7 +104,9 @@ def test_compiled_beginnings_are_those_of_a_search_bit_for_bit(task, options):
         found = []
         for seed in (5, None, None, 6):
             envs.reset(seed=seed)
-            names = [n for n in engine.record.places if engine.record.kind(n) == "real"]
+            names = [
+                n for n in engine.state_layout.offsets if engine.state_layout.kind(n) == "real"
+            ]
             found.append([engine.pressures.copy(), *map(engine.numbers, names)])
         envs.close()
         return np.array(found)

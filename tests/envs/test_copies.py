@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.options import Options
 from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
@@ -179,7 +179,7 @@ def test_plants_and_what_controllers_get_pickle(single, same):
         assert plant.model == env.plant.model and plant.tolerance == env.plant.tolerance
         states, again = plant.settle(0.0, pressure=300e3), env.plant.settle(0.0, pressure=300e3)
         np.testing.assert_array_equal(states.state, again.state)
-        assert made(env.station) == env.station and made(env.reading) == env.reading
+        assert made(env.station) == env.station and made(env.measurement) == env.measurement
         assert made(env.options) == env.options and made(env.task) == env.task
         assert made(env.events).step_times.size == 0
         assert same(made(env.condition).state, env.condition.state)
@@ -255,7 +255,7 @@ def test_what_cannot_be_pickled_is_named_with_the_fix():
 
 def test_environments_on_a_device_say_that_they_cannot_be_copied():
     engine = DeviceEngine(
-        TASKS["displacement"], Options(model="serres2008"), 2, "double", StandIn()
+        TASKS["displacement"], Options(model="serres2008"), 2, "double", CpuDevice()
     )
     for made in (pickle.dumps, copy.copy, copy.deepcopy):
         with pytest.raises(TypeError, match="DeviceEngine cannot be copied or pickled.*; make"):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pma_gym.engine.engine import Engine
-from pma_gym.envs import PMAEnv, Reading, Reference
+from pma_gym.envs import Measurement, PMAEnv, Reference
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import following
 
@@ -42,14 +42,16 @@ def made(task, **options):
 @pytest.mark.parametrize("task", TASKS)
 def test_nothing_that_a_controller_receives_leads_to_the_environment(task):
     env = made(task)
-    for handed in (env.reference, env.station, env.reading):
+    for handed in (env.reference, env.station, env.measurement):
         reached = reachable(handed)
         assert not [each for each in reached if isinstance(each, PMAEnv | Engine | Plant)]
         assert not any(each is env.plant.model for each in reached)
     assert not hasattr(env.reference, "__self__") and not hasattr(env.reference, "__closure__")
     assert env.station.model == env.plant.model and env.station.model is not env.plant.model
     assert env.station.task == env.task and env.station.task is not env.task
-    assert type(env.reading) is Reading and all(type(value) is float for value in env.reading)
+    assert type(env.measurement) is Measurement and all(
+        type(value) is float for value in env.measurement
+    )
 
 
 def test_a_reference_is_called_copied_and_pickled():

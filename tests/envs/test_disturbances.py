@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
@@ -175,7 +175,7 @@ def test_threads_have_the_bits_of_the_processor():
     task, options = TASKS["displacement"], Options(control_rate_hz=20.0, disturbances=BOTH)
     for precision in ("double", "single"):
         own = Engine(task, options, 7)
-        other = DeviceEngine(task, options, 7, precision, StandIn(3))
+        other = DeviceEngine(task, options, 7, precision, CpuDevice(3))
         every = np.arange(7)
         own.seed(every, [7 + i for i in range(7)])
         own.reset(every)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pma_gym.codegen.random import normals, philox
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.options import Options
 from pma_gym.envs import PMAEnv, PMAVectorEnv
@@ -22,11 +22,11 @@ from pma_gym.tasks import (
     PACED,
     PACING,
     Human,
-    Mind,
+    OperatorState,
     moment_exercise,
     phase_rmse,
 )
-from pma_gym.tasks.human import FORESIGHT_S, moved
+from pma_gym.tasks.human import FORESIGHT_S, operator_step
 
 EXACT = PACED.typical._replace(effort=1.0, unsteadiness=0.0, tremor=0.0, fatigue=0.0, stiffness=0.0)
 """Somebody who gives just what the device takes."""
@@ -93,7 +93,7 @@ def test_the_compiled_operator_is_the_plain_one(name):
         given = resistive_moment(
             env.station.model, own_device(env.station.model), env.pressure, angles
         ).moment
-    mind, key = Mind(exercise.start_moment, 0.0, 1.0), env._engine._keys[0]
+    mind, key = OperatorState(exercise.start_moment, 0.0, 1.0), env._engine._keys[0]
     words = tuple(np.array([int(word)], np.uint64) for word in key)
     zero = np.zeros(1, np.uint64)
     for k in range(400):
@@ -104,7 +104,7 @@ def test_the_compiled_operator_is_the_plain_one(name):
             normals(philox((zero + np.uint64(k), zero, zero + np.uint64(1), zero), words))[0][0]
         )
         speed = env._number("spin")
-        moment, mind = moved(
+        moment, mind = operator_step(
             human,
             mind,
             human.effort * expected,
@@ -236,7 +236,7 @@ def test_many_are_as_one(name, threads):
 @pytest.mark.parametrize("name", ["isokinetic_exercise", "profile_exercise"])
 def test_threads_of_a_device_play_the_same_operators(name):
     task, options = EXERCISES[name], Options(control_rate_hz=50.0)
-    made = DeviceEngine(task, options, 5, "double", StandIn())
+    made = DeviceEngine(task, options, 5, "double", CpuDevice())
     envs = PMAVectorEnv(5, name, control_rate_hz=50.0, autoreset_mode="SameStep")
     np.testing.assert_array_equal(made.reset(seed=7), envs.reset(seed=7)[0])
     for k in range(780):
@@ -313,7 +313,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
     volts = env.regulator_voltage
     for _ in range(300):
         observation, *_ = env.step(env.action(volts))
-    reading, station, span = env.reading, env.station, env.task.protocol.span
+    reading, station, span = env.measurement, env.station, env.task.protocol.span
     plan = env.task.exercise.prescription
     assert observation[4] == pytest.approx(plan.at(reading.rotation) / span, rel=1e-6)
     assert observation[5] == pytest.approx(-station.position(reading) / span, rel=1e-5)

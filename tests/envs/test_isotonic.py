@@ -6,11 +6,11 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 from pma_gym.plant.model import load_model
 from pma_gym.plant.statics import contraction_at, muscle_force
 from pma_gym.tasks import ISOTONIC, TASKS, isotonic, phase_rmse
@@ -95,12 +95,12 @@ def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
     env = make("isotonic", history=2, preview=1)
     env.reset(seed=2)
     start = env.truth["contraction"]
-    heard = [env.reading] * 2
+    heard = [env.measurement] * 2
     for _ in range(80):
         observation, *_, info = env.step(env.action(7.0))
-        heard.append(env.reading)
-    position = env.station.position(env.reading)
-    assert position == -env.reading.extension > 5e-3
+        heard.append(env.measurement)
+    position = env.station.position(env.measurement)
+    assert position == -env.measurement.extension > 5e-3
     assert 1e-3 * info["measured_contraction_mm"] == pytest.approx(position)
     assert 1e-3 * info["contraction_mm"] == pytest.approx(env.truth["contraction"] - start)
     assert env.position == pytest.approx(-env.truth["extension"])
@@ -161,7 +161,7 @@ def test_a_batch_has_the_bits_of_environments_alone(twins, options, mode):
 def test_threads_have_the_bits_of_the_processor():
     task, options = ISOTONIC["triangle_low"], Options(control_rate_hz=20.0)
     own = Engine(task, options, 7)
-    other = DeviceEngine(task, options, 7, "double", StandIn(3))
+    other = DeviceEngine(task, options, 7, "double", CpuDevice(3))
     every = np.arange(7)
     own.seed(every, [7 + i for i in range(7)])
     own.reset(every)
@@ -225,6 +225,6 @@ def test_a_load_that_nothing_balances_is_refused():
 def test_a_station_that_pulls_is_told_positions_as_before(make):
     env = make("rotation")
     env.reset(seed=0)
-    reading = Reading(0.0, 1.0, 2.0, 3.0, 4.0)
+    reading = Measurement(0.0, 1.0, 2.0, 3.0, 4.0)
     assert env.station.position(reading) == 2.0 and env.station.load == 0.0
     assert replace(env.station, task=TASKS["displacement"]).position(reading) == 1.0

@@ -7,7 +7,7 @@ import pytest
 
 from pma_gym.data.protocol import Phase, Protocol
 from pma_gym.engine.cpu import kernel
-from pma_gym.engine.cuda.cpu_device import StandIn
+from pma_gym.engine.cuda.cpu_device import CpuDevice
 from pma_gym.engine.cuda.device_engine import DeviceEngine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
@@ -93,7 +93,7 @@ def test_a_batch_has_the_bits_of_environments_alone(twins, options):
 def test_threads_have_the_bits_of_the_processor(precision):
     task, options = steps("rotation", 2), Options(control_rate_hz=20.0)
     own = Engine(task, options, 7)
-    other = DeviceEngine(task, options, 7, precision, StandIn(3))
+    other = DeviceEngine(task, options, 7, precision, CpuDevice(3))
     every = np.arange(7)
     own.seed(every, [7 + i for i in range(7)])
     own.reset(every)

@@ -17,12 +17,12 @@ def test_entries_are_those_of_the_table(make, task, regulator):
     env.reset(seed=0)
     at = TASKS[task].protocol.quantity
     span = {"extension": 25e-3, "rotation": np.pi / 2}[at]
-    heard = [env.reading]
+    heard = [env.measurement]
     for k in range(30):
         action = env.action(0.1 * k)
         observation, *_ = env.step(action)
-        heard.append(env.reading)
-        reading = env.reading
+        heard.append(env.measurement)
+        reading = env.measurement
         references = [env.reference(env.time + 0.01 * ahead) / span for ahead in range(3)]
         past = [getattr(heard[max(-1 - back, -len(heard))], at) / span for back in (1, 2, 3)]
         expected = [
@@ -52,7 +52,7 @@ def test_without_noise_readings_are_the_lagged_truth(make):
     env.reset(seed=0)
     for _ in range(100):
         env.step(env.action(3.0))
-    reading, truth = env.reading, env.truth
+    reading, truth = env.measurement, env.truth
     # Sensors lag: LVDT 1/(2 pi 100 Hz) = 1.6 ms behind a motion of some 5 mm/s.
     assert reading.extension == pytest.approx(truth["extension"], abs=5e-5)
     assert reading.load == pytest.approx(truth["load"], abs=2.0)
@@ -66,7 +66,7 @@ def test_spread_of_readings_at_rest_is_the_models_noise_and_the_quantisation(mak
     readings = []
     for _ in range(1500):
         env.step(env.action(0.0))
-        readings.append(env.reading[1:])
+        readings.append(env.measurement[1:])
     spread = np.std(readings, axis=0)
     steps = [
         calibration.LVDT.resolution,
@@ -91,7 +91,7 @@ def test_noise_is_the_models_where_no_step_of_the_daq_hides_it(make):
     readings = []
     for _ in range(1500):
         env.step(env.action(0.0))
-        readings.append(env.reading[1:])
+        readings.append(env.measurement[1:])
     # The standard deviation of 1500 normal numbers is known to 1.8 %; five of those.
     np.testing.assert_allclose(np.std(readings, axis=0), noise_levels(model), rtol=0.09)
 
@@ -100,8 +100,8 @@ def test_zeros_are_tared_at_rest(make, model):
     env = make("rotation", model=model)
     for seed in range(5):
         env.reset(seed=seed)
-        assert abs(env.reading.extension) < 2 * calibration.LVDT.resolution
-        assert abs(env.reading.rotation) < 2 * calibration.POTENTIOMETER.resolution
+        assert abs(env.measurement.extension) < 2 * calibration.LVDT.resolution
+        assert abs(env.measurement.rotation) < 2 * calibration.POTENTIOMETER.resolution
 
 
 @pytest.mark.parametrize("lanes", [1, 2, 16])
@@ -118,7 +118,7 @@ def test_zeros_are_the_same_however_many_readings_are_computed_at_once(monkeypat
 def test_before_history_has_begun_the_first_reading_stands_in(make):
     env = make(history=4, observation_delay_s=0.02)
     observation, _ = env.reset(seed=0)
-    np.testing.assert_array_equal(observation[7:], np.float32(env.reading.extension / 25e-3))
+    np.testing.assert_array_equal(observation[7:], np.float32(env.measurement.extension / 25e-3))
 
 
 def test_observations_are_new_arrays_within_their_space(make):

@@ -248,7 +248,7 @@ def test_damaged_states_are_refused_and_change_nothing(count):
     before = env.get_state()
     numbers = np.frombuffer(before.simulation.numbers).reshape(max(count, 1), -1)
     engine = env.engine if count else env._engine
-    places = engine.record.places
+    offsets = engine.state_layout.offsets
     bad = []
     for name, values in {
         "count": [-1, 10**6, 2**62],
@@ -260,7 +260,7 @@ def test_damaged_states_are_refused_and_change_nothing(count):
         for value in values:
             changed = numbers.copy()
             column = changed.view(np.int64) if isinstance(value, int) else changed
-            column[-1, places[name]] = value
+            column[-1, offsets[name]] = value
             bad.append(damaged(before, "numbers", changed.tobytes()))
     for name in before.simulation._fields[:-1]:
         data = getattr(before.simulation, name)

@@ -143,12 +143,12 @@ def test_a_delayed_reading_is_that_of_so_many_steps_before(make, steps):
     late = make(history=2, observation_delay_s=0.01 * steps)
     prompt.reset(seed=3)
     late.reset(seed=3)
-    readings, observations = [prompt.reading], [None]
+    readings, observations = [prompt.measurement], [None]
     for k in range(1, 60):
         observations.append(prompt.step(prompt.action(1.5))[0])
-        readings.append(prompt.reading)
+        readings.append(prompt.measurement)
         observation = late.step(late.action(1.5))[0]
-        assert late.reading == readings[max(k - steps, 0)]
+        assert late.measurement == readings[max(k - steps, 0)]
         if k > steps:
             measured = [0, 1, 2, 3, 7, 8]
             np.testing.assert_array_equal(observation[measured], observations[k - steps][measured])

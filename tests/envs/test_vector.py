@@ -179,7 +179,7 @@ def test_single_precision_is_near(model, task):
     envs = [PMAVectorEnv(17, task, precision=p, **made) for p in ("double", "single")]
     for one in envs:
         one.reset(seed=8)
-    key, worst = envs[0].engine.record.info[1], np.zeros(17)
+    key, worst = envs[0].engine.state_layout.info[1], np.zeros(17)
     for k in range(400):
         volts = 3.0 * np.sin(0.01 * k) ** 2
         results = [one.step(np.full((17, 1), 0.2 * volts - 1.0)) for one in envs]
@@ -217,7 +217,7 @@ def test_parked_stations_disturb_nobody(model, mode):
         ends += int(terminated.sum())
         assert np.isfinite(observations).all() and np.isfinite(rewards).all()
         assert envs.engine.attempts < 20_000
-        numbers = envs.engine.records[:, : len(envs.engine.record.states)]
+        numbers = envs.engine.records[:, : len(envs.engine.state_layout.states)]
         assert np.isfinite(numbers).all()
     assert ends >= 19
 

@@ -13,9 +13,9 @@ import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from benchmarks.comparison.journal import case_rows
-from benchmarks.comparison.suite import parse_suite
-from benchmarks.training.preset import PresetError, load_preset
+from benchmarks.runner.journal import case_rows
+from benchmarks.suites.frozen import parse_suite
+from benchmarks.training.configuration.preset import PresetError, load_preset
 from controllers.policies.document import PolicyError, parsed_document
 from controllers.policies.tensor_header import check_header
 from pma_gym.data.datasets.dataset_toml import read_description

@@ -5,9 +5,15 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.accuracy import MODELS, POSITION_LIMIT, STATE_LIMIT, error_ladder
-from benchmarks.limits import FRICTIONLESS, energies, energy_drift, mass_effect, one_mass_error
-from benchmarks.reference import (
+from benchmarks.accuracy.job import MODELS, POSITION_LIMIT, STATE_LIMIT, error_ladder
+from benchmarks.accuracy.limits import (
+    FRICTIONLESS,
+    energies,
+    energy_drift,
+    mass_effect,
+    one_mass_error,
+)
+from benchmarks.accuracy.reference import (
     integrated,
     random_commands,
     reference,

@@ -130,7 +130,7 @@ class Run(Command):
 PRESET = """
 pma_gym/IsokineticDisplacement-v0:
   env_wrapper:
-    - benchmarks.training.piloted_env.PilotedEnv:
+    - benchmarks.training.policy_env.PilotedEnv:
         view: {kind: tracking, preview: 2, history: 2}
         form: {kind: increment, authority_v: 0.5}
         options: {control_rate_hz: 10.0, pressure_kpa: 300.0}

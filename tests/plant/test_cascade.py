@@ -4,7 +4,7 @@ import control
 import numpy as np
 import pytest
 
-from benchmarks.limits import with_effect
+from benchmarks.accuracy.limits import with_effect
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.plant.model import load_model

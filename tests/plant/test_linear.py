@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import sympy
 
-from benchmarks.limits import with_effect
+from benchmarks.accuracy.limits import with_effect
 from pma_gym.plant.linear import linearize, operating_point
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant

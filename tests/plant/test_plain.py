@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.reference import demanding_commands
+from benchmarks.accuracy.reference import demanding_commands
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plain import PlainPlant

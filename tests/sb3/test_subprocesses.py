@@ -33,7 +33,7 @@ def test_get_attr_of_what_workers_hold(start_method):
         assert all(isinstance(plant, Plant) for plant in plants)
         assert [env.plant.model for env in copies] == [plant.model for plant in plants]
         assert [env.station for env in copies] == envs.get_attr("station")
-        for name in ("reading", "task", "options", "table", "condition", "nominal_plant"):
+        for name in ("measurement", "task", "options", "table", "condition", "nominal_plant"):
             assert len(envs.get_attr(name)) == 2
         # The copies go on as those in the workers do.
         action = np.full((2, 1), -0.3, np.float32)

@@ -9,14 +9,14 @@ pytest.importorskip("torch")
 import torch
 
 import pma_gym.sb3.threads as sb3_threads
-from pma_gym.sb3.threads import FIRST, PAUSES_S, Pace, threads
+from pma_gym.sb3.threads import FIRST, PAUSES_S, ThreadTuner, threads
 
 
 class Clock:
     """Work on a clock of its own: what it takes follows from the threads that it gets."""
 
     def __init__(self, monkeypatch):
-        self.now, self.pace = 100.0, Pace()
+        self.now, self.pace = 100.0, ThreadTuner()
         monkeypatch.setattr(sb3_threads.time, "perf_counter", lambda: self.now)
 
     def done(self, times, one=1e-3, two=0.6e-3, amount=1.0):

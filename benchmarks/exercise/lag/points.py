@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.options import told_model
+from pma_gym.engine.options import nominal_model
 from pma_gym.plant.exercise_device.device import own_device, resistive_moment
 from pma_gym.plant.exercise_device.prescription import follow_from
 from pma_gym.plant.linear import linearize
@@ -132,7 +132,7 @@ class Rates:
 
 def rates(point: Point, model: Model) -> Rates:
     """The nominal plant with a leg on its lever, linear near a point, friction sliding."""
-    plant = Plant(told_model(EVERY_TASK[point.task], model))
+    plant = Plant(nominal_model(EVERY_TASK[point.task], model))
     system = linearize(plant, point.pressure, point.contraction)
     radius, gain = model.parameters["rotor"].radius, model.parameters["drive"].gain
     sizes = np.array([SIZES[name] for name in system.state_labels])

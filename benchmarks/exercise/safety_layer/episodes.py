@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.exercise.safety_layer.wild import KINDS, PUMPING, kind_of, planned, pumped
-from benchmarks.hidden_effects.scoring import wilson
+from benchmarks.exercise.safety_layer.adversarial import KINDS, PUMPING, kind_of, planned, pumped
+from benchmarks.hidden_effects.evaluation.scoring import wilson
 from benchmarks.training.stations import Stations
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options

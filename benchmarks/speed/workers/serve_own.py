@@ -13,13 +13,7 @@ import gymnasium as gym
 import numpy as np
 
 import pma_gym.envs  # noqa: F401 - registers the environments
-from benchmarks.accuracy import (
-    Commands,
-    Error,
-    demanding_commands,
-    error_ladder,
-    simulated,
-)
+from benchmarks.accuracy.job import Commands, Error, demanding_commands, error_ladder, simulated
 from benchmarks.speed.core import core
 from benchmarks.speed.loops import ACTIONS, BATCHES, Missing, Prepared, single, vector
 from benchmarks.speed.starts import start

@@ -49,8 +49,8 @@ def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
 def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "") -> None:
     """Run every seed's policies through the suites; what ran before stays."""
     from benchmarks.training.study.cells import cells
-    from benchmarks.training.study.judged import SUITES, judge_pid, seed_folders
-    from benchmarks.training.study.judged import judge as judge_group
+    from benchmarks.training.study.scored_policies import SUITES, judge_pid, seed_folders
+    from benchmarks.training.study.scored_policies import judge as judge_group
     from pma_gym.terminal import SafeConsole
 
     algorithms = {cell.group: cell.algorithm for cell in cells()}
@@ -80,8 +80,8 @@ def conditions(out: Out = OUT) -> None:
     import json
 
     from benchmarks.files import write_text
-    from benchmarks.training.study.judged import SHIPPED_GROUP
     from benchmarks.training.study.robustness import robustness
+    from benchmarks.training.study.scored_policies import SHIPPED_GROUP
     from benchmarks.training.study.ship import best_policies
 
     best = {path.stem.rpartition("-")[0]: path for path in best_policies([out / SHIPPED_GROUP])}
@@ -102,8 +102,8 @@ def report(
     from benchmarks.files import write_text
     from benchmarks.training.study.cells import cells
     from benchmarks.training.study.figures import pid_errors, study_figures, variation
-    from benchmarks.training.study.judged import PID_FOLDER, SHIPPED
     from benchmarks.training.study.pictures import write_curves
+    from benchmarks.training.study.scored_policies import PID_FOLDER, SHIPPED
     from benchmarks.training.study.ship import ship as ship_policies
     from pma_gym.documents import read_json
 

@@ -4,9 +4,9 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
+from benchmarks.training.configuration.preset import Preset, load_preset
 from benchmarks.training.job import ENVIRONMENT_OF
-from benchmarks.training.preset import Preset, load_preset
-from controllers.policies.action_mapping import MIDDLE_V, Form
+from controllers.policies.action_mapping import MIDDLE_V, ActionMapping
 
 HEADLINE = "ppo"
 """Algorithm with the most seeds."""
@@ -67,7 +67,7 @@ CHANGES: dict[str, Callable[[Preset], Preset]] = {
     "no history": lambda p: p.changed(view=replace(p.view, history=0)),
     "no randomisation": lambda p: p.changed(stations=""),
     "no averaging": lambda p: p.changed(average_share=0.0),
-    "direct form": lambda p: p.changed(form=Form("direct", MIDDLE_V)),
+    "direct form": lambda p: p.changed(form=ActionMapping("direct", MIDDLE_V)),
 }
 """What may be changed of a preset, by name."""
 

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.comparison.journal import JOURNAL, case_rows
-from benchmarks.comparison.statistics import interquartile_mean
+from benchmarks.report.statistics import interquartile_mean
+from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.training.study.cells import Cell, cells
-from benchmarks.training.study.judged import PID_FOLDER, SUITES, pools, seed_folders
 from benchmarks.training.study.pooled import Pool
+from benchmarks.training.study.scored_policies import PID_FOLDER, SUITES, pools, seed_folders
 from benchmarks.training.validation import measure_of
 from controllers.policies.policy_file import PolicyFile, load_policy_file
 

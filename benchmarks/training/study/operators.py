@@ -71,7 +71,7 @@ def _driven(env: PMAEnv, controller: Controller, seed: int) -> dict[str, Any] | 
     env.reset(seed=seed)
     controller.reset(env.reference, env.station)
     while True:
-        command: Any = env.action(controller.act(env.reading, env.time))
+        command: Any = env.action(controller.act(env.measurement, env.time))
         _, _, terminated, truncated, info = env.step(command)
         if terminated or truncated:
             return None if terminated else info

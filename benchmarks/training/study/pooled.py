@@ -5,13 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.comparison.errors import Errors
-from benchmarks.comparison.statistics import (
-    SEED,
-    Interval,
-    interquartile_mean,
-    positive_interval,
-)
+from benchmarks.report.errors import Errors
+from benchmarks.report.statistics import SEED, Interval, interquartile_mean, positive_interval
 
 WITHIN = 2.0
 """Factor on the best seed's error within which a seed counts as having worked."""
@@ -42,7 +37,7 @@ class Pool:
     def mean(self) -> Interval:
         """Interquartile mean over seeds and cases, seeds and stations resampled.
 
-        Source: Agarwal et al. 2021, see `benchmarks.comparison.statistics`; stratified as there,
+        Source: Agarwal et al. 2021, see `benchmarks.report.statistics`; stratified as there,
         each resample also draws the seeds anew, with replacement.
         """
         values, draws = self.errors.values, self.errors.draws

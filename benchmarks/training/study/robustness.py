@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.comparison.statistics import interquartile_mean
-from benchmarks.rollout import rollout
+from benchmarks.report.statistics import interquartile_mean
+from benchmarks.runner.rollout import rollout
 from benchmarks.training.stations import VALIDATION_FIRST, Stations
 from benchmarks.training.validation import measure_of
 from controllers import CONTROLLERS, Policy

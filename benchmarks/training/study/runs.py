@@ -7,7 +7,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
-from benchmarks.training.product import policy_name, policy_of
+from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.run import Order, train
 from benchmarks.training.study.cells import Cell
 from controllers.policies.policy_file import PolicyFile, load_policy_file, save_policy_file

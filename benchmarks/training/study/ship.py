@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.training.stations import TRAINING, VALIDATION
-from benchmarks.training.study.judged import seed_folders
 from benchmarks.training.study.operators import table_of
+from benchmarks.training.study.scored_policies import seed_folders
 from controllers.design.designs import EXERCISE_KINDS
 from controllers.policies.policy_file import PolicyFile, load_policy_file, save_policy_file
 from controllers.policy import POLICIES

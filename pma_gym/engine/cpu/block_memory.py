@@ -21,10 +21,10 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.simd import Lanes
 from pma_gym.codegen.trace import live_inputs
-from pma_gym.engine.graph.control_step_graph import Circuit
+from pma_gym.engine.graph.control_step_graph import ControlStepGraph
 from pma_gym.engine.graph.scoring import Sampling
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 from pma_gym.integrator.integration import FUSED
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
@@ -44,7 +44,7 @@ BEFORE = len(ARGUMENTS)
 """Place, behind them, of the address of those of another part that the same thread took before."""
 
 
-class Plan(Protocol):
+class KernelSpec(Protocol):
     """What a writer needs to know: a `Kernel`, or a kernel for other machines.
 
     Attributes:
@@ -52,7 +52,7 @@ class Plan(Protocol):
     """
 
     program: Program
-    record: Record
+    state_layout: StateLayout
     observed: ObservationTable
     width: int
     abreast: int
@@ -71,18 +71,18 @@ class BlockMemory:
 
     Attributes:
         element: type of a number in the records.
-        places: place of every number that is kept, by name.
+        offsets: offset of every number that is kept, by name.
         fixed: what is computed once for a model, in the order of its table.
     """
 
-    def __init__(self, kernel: Plan) -> None:
+    def __init__(self, kernel: KernelSpec) -> None:
         model: Model = kernel.program.model
-        self.kernel, self.record, self.width = kernel, kernel.record, kernel.width
+        self.kernel, self.state_layout, self.width = kernel, kernel.state_layout, kernel.width
         self.element: ir.Type = DOUBLE
-        self.places = kernel.record.places
+        self.offsets = kernel.state_layout.offsets
         self.eq = PlantEquations(model.effects, model.parameters)
         PLANTS[model.plant].write_equations(self.eq)
-        self.circuit = Circuit(kernel.record, self.eq)
+        self.step_graph = ControlStepGraph(kernel.state_layout, self.eq)
         self.fixed: list[Value] = []
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
@@ -97,13 +97,13 @@ class BlockMemory:
         self, b: Builder, records: Operand, block: Operand, name: str, lane: Operand | int
     ) -> Operand:
         """Address of one environment's number."""
-        row = b.mul(block, integer(self.record.size * self.width))
-        at = b.add(row, integer(self.record.places[name] * self.width))
+        row = b.mul(block, integer(self.state_layout.size * self.width))
+        at = b.add(row, integer(self.state_layout.offsets[name] * self.width))
         return offset(b, records, b.add(at, integer(lane)))
 
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
         """How many numbers of a block lie before those of a place, or before one lane's."""
-        return integer(self.places[name] * self.width + lane)
+        return integer(self.offsets[name] * self.width + lane)
 
     def _cell(self, b: Builder, records: Operand, name: str, lane: Operand | int) -> Operand:
         """Address of a number of one lane of a block."""
@@ -153,7 +153,7 @@ class BlockMemory:
     ) -> dict[int, Operand]:
         """Inputs and table of a block (or, in scalar code, of one lane of it), as far as used."""
         known: dict[int, Operand] = {}
-        names = {self.circuit.slot(name).id: name for name in self.places}
+        names = {self.step_graph.slot(name).id: name for name in self.offsets}
         alone = lanes.width == 1
         for value in live_inputs(values):
             if value.id in names:
@@ -174,16 +174,18 @@ class BlockMemory:
     ) -> None:
         alone = lanes.width == 1
         for name, value in values.items():
-            if name not in self.places:
+            if name not in self.offsets:
                 continue
             at = self._row(b, name)
             index = b.add(at, integer(lane)) if alone else at
             where = offset(b, records, index, self.element)
-            self._keep(b, lanes, found[value.id], where, self.record.kind(name))
+            self._keep(b, lanes, found[value.id], where, self.state_layout.kind(name))
 
     def _block(self, b: Builder, given: dict[str, Operand], block: Operand) -> tuple[Operand, ...]:
         """Addresses of a block's records and tables."""
-        records = offset(b, given["records"], b.mul(block, integer(self.record.size * self.width)))
+        records = offset(
+            b, given["records"], b.mul(block, integer(self.state_layout.size * self.width))
+        )
         return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
 
     def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:

@@ -18,7 +18,7 @@ from pma_gym.codegen.machine.control import (
     offset,
 )
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 
 BOUND = (
     *("arguments", "infos", "keys", "copy", "no", "yes"),
@@ -37,7 +37,7 @@ TRUTHS = ("extrapolated",)
 _TYPES = {"p": POINTER, "i": INTEGER, "n": INDEX, "d": DOUBLE, "v": ir.VoidType()}
 
 
-def write_advance(module: ir.Module, record: Record) -> None:
+def write_advance(module: ir.Module, state_layout: StateLayout) -> None:
     """Write `advance`, which makes a step by the module's own `check` and `step`.
 
     Its argument is the action: an array of one dimension and of single or double precision with an
@@ -47,7 +47,7 @@ def write_advance(module: ir.Module, record: Record) -> None:
 
     Args:
         module: where to.
-        record: places of a single environment's numbers.
+        state_layout: places of a single environment's numbers.
     """
     b, (bound, action) = function(
         module, "advance", [("bound", POINTER), ("action", POINTER)], POINTER
@@ -57,7 +57,7 @@ def write_advance(module: ir.Module, record: Record) -> None:
     with b.if_then(b.icmp_unsigned("!=", action, parts["given"])):
         at = offset(b, arguments, ARGUMENTS.index("actions"), INTEGER)
         given = b.inttoptr(b.load(at, typ=INTEGER), POINTER)
-        _read(b, action, parts, given, record.actions)
+        _read(b, action, parts, given, state_layout.actions)
     bad = b.call(module.get_global("check"), [arguments])
     with b.if_then(b.icmp_signed("!=", bad, integer(0)), likely=False):
         b.ret(_call(b, "PyLong_FromLongLong", bad))
@@ -74,8 +74,8 @@ def write_advance(module: ir.Module, record: Record) -> None:
     _unless(b, _is_null(b, info), lost)
     at = offset(b, arguments, ARGUMENTS.index("records"), INTEGER)
     records = b.inttoptr(b.load(at, typ=INTEGER), POINTER)
-    for i, key in enumerate(record.info):
-        number = b.load(offset(b, records, record.places[key]), typ=DOUBLE)
+    for i, key in enumerate(state_layout.info):
+        number = b.load(offset(b, records, state_layout.offsets[key]), typ=DOUBLE)
         if key in TRUTHS:
             truth = b.fcmp_unordered("!=", number, ir.Constant(DOUBLE, 0.0))
             value = b.select(truth, parts["yes"], parts["no"])
@@ -87,7 +87,7 @@ def write_advance(module: ir.Module, record: Record) -> None:
         failed = _call(b, "PyDict_SetItem", info, name, value)
         _call(b, "Py_DecRef", value)
         _unless(b, b.icmp_signed("!=", failed, ir.Constant(INDEX, 0)), lost)
-    number = b.load(offset(b, records, record.places["reward"]), typ=DOUBLE)
+    number = b.load(offset(b, records, state_layout.offsets["reward"]), typ=DOUBLE)
     reward = _call(b, "PyFloat_FromDouble", number)
     _unless(b, _is_null(b, reward), lost)
     made = _call(b, "PyTuple_New", integer(5))

@@ -17,7 +17,7 @@ from pma_gym.codegen.machine.control import (
 from pma_gym.codegen.machine.simd import Lanes
 from pma_gym.codegen.random import philox, uniform
 from pma_gym.codegen.substitute import substitute
-from pma_gym.engine.cpu.block_memory import BlockMemory, Plan, narrowed, widened
+from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, widened
 from pma_gym.engine.state_layout import DRAW, TARE
 from pma_gym.integrator.integration import FUSED, memory
 from pma_gym.plant.program import FIRST_S, balanced
@@ -37,7 +37,7 @@ _AT_REST = {
 See `pma_gym.plant.equilibrium.solver.NoLoadEquilibria`."""
 
 
-class BeginningWriter(BlockMemory):
+class ResetWriter(BlockMemory):
     """Writes beginnings.
 
     Attributes:
@@ -47,18 +47,18 @@ class BeginningWriter(BlockMemory):
         tare: readings at rest.
     """
 
-    def __init__(self, kernel: Plan) -> None:
+    def __init__(self, kernel: KernelSpec) -> None:
         super().__init__(kernel)
         self.module = ir.Module()
         self.traces = kernel.width == 1
 
-    def _trace_beginning(self) -> list[Value]:
+    def _trace_reset(self) -> list[Value]:
         """Trace what a beginning computes; returns it, for its part of the table."""
-        circuit, graph = self.circuit, self.eq.graph
-        self.begun = circuit.sense(circuit.slot("count"), first=True)
-        self.begun |= circuit.first_score(self.begun)
-        self.first_position = circuit.position(self.begun)
-        self.tare = circuit.read(TARE, graph.input("reading", 2, "integer"))
+        step_graph, graph = self.step_graph, self.eq.graph
+        self.begun = step_graph.sense(step_graph.slot("count"), first=True)
+        self.begun |= step_graph.first_score(self.begun)
+        self.first_position = step_graph.position(self.begun)
+        self.tare = step_graph.read(TARE, graph.input("reading", 2, "integer"))
         first = [*self.begun.values(), self.first_position, *self.tare]
         return [*first, *self._trace_rest()] if self.kernel.draws else first
 
@@ -69,8 +69,8 @@ class BeginningWriter(BlockMemory):
         self.reach = [limits.stretch, limits.contraction]
         self.line = [line.gain, line.offset]
         nothing = eq.graph.constant(0, "integer")
-        keys = self.circuit.slot("key_0"), self.circuit.slot("key_1")
-        stream = self.circuit.slot("episode") * 4 + DRAW
+        keys = self.step_graph.slot("key_0"), self.step_graph.slot("key_1")
+        stream = self.step_graph.slot("episode") * 4 + DRAW
         self.share = uniform(philox((nothing, stream, nothing, nothing), keys)[0])
         return [self.force, *self.reach, *self.line]
 
@@ -109,10 +109,10 @@ class BeginningWriter(BlockMemory):
         known = self._fixed(b, exact, tables, lane)
         before = self._count(b, self._cell(b, records, "episode", lane))
         episode = b.and_(b.add(before, integer(1)), integer(0xFFFFFFFF))
-        drawn = {self.circuit.slot("episode").id: episode}
+        drawn = {self.step_graph.slot("episode").id: episode}
         for name in ("key_0", "key_1"):
             key = self._count(b, self._cell(b, records, name, lane))
-            drawn[self.circuit.slot(name).id] = key
+            drawn[self.step_graph.slot(name).id] = key
         share = exact.emit(b, [self.share], drawn)[self.share.id]
         pressure = self._pressure(b, given, share, row)
         gain, start = (known[value.id] for value in self.line)
@@ -127,11 +127,11 @@ class BeginningWriter(BlockMemory):
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
         real |= self._asked_before(b, regulator)
         whole = {"episode": episode, "count": integer(0)}
-        for name in self.places:
+        for name in self.offsets:
             where = self._cell(b, records, name, lane)
             if name in whole:
                 self._keep(b, exact, whole[name], where, "integer")
-            elif self.record.kind(name) == "real":
+            elif self.state_layout.kind(name) == "real":
                 b.store(narrowed(b, real.get(name, none), self.element), where)
 
     def _pressure(
@@ -156,9 +156,9 @@ class BeginningWriter(BlockMemory):
         found = {}
         actions = ir.Constant(DOUBLE, -1.0), action
         volts = ir.Constant(DOUBLE, 0.0), regulator
-        for i in range(self.record.actions):
+        for i in range(self.state_layout.actions):
             found[f"action_{i}"] = actions[i]
-            for k in range(self.record.options.action_delay):
+            for k in range(self.state_layout.options.action_delay):
                 found[f"wire_{k}_{i}"] = volts[i]
         return found
 
@@ -167,7 +167,7 @@ class BeginningWriter(BlockMemory):
 
         They are summed in their order, so that no bit depends on how many these are.
         """
-        readings = TARE_READINGS if self.record.options.noise else 1
+        readings = TARE_READINGS if self.state_layout.options.noise else 1
         abreast = self._lanes(self.kernel.abreast if readings > 1 else 1)
         assert readings % abreast.width == 0
         own = self._known(b, self._lanes(1), self.tare, records, tables, lane)
@@ -198,12 +198,12 @@ class BeginningWriter(BlockMemory):
         lane: Operand,
         index: Operand,
     ) -> None:
-        options = self.record.options
-        entries = self.circuit.observation(self.kernel.observed, self.begun)
+        options = self.state_layout.options
+        entries = self.step_graph.observation(self.kernel.observed, self.begun)
         values = [*self.begun.values(), self.first_position, *entries]
         known = self._known(b, lanes, values, records, tables, lane)
         for ahead in range(options.preview + 1):
-            known[self.circuit.reference(ahead).id] = self._references(
+            known[self.step_graph.reference(ahead).id] = self._references(
                 b, lanes, given, records, lane, ahead, 0
             )
         found = lanes.emit(b, values, known)

@@ -25,9 +25,9 @@ from pma_gym.codegen.machine.native import pairs
 from pma_gym.codegen.machine.simd import Lanes
 from pma_gym.codegen.threads.thread_pool import write_another
 from pma_gym.codegen.trace import split
-from pma_gym.engine.cpu.block_memory import BEFORE, Plan, narrowed, widened
+from pma_gym.engine.cpu.block_memory import BEFORE, KernelSpec, narrowed, widened
 from pma_gym.engine.cpu.python_step import write_advance
-from pma_gym.engine.cpu.reset_writer import BeginningWriter
+from pma_gym.engine.cpu.reset_writer import ResetWriter
 from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
 from pma_gym.integrator.integration import FUSED, Lane, Layout, march, memory
 from pma_gym.integrator.step_attempt import attempt
@@ -49,20 +49,20 @@ class Numbers(Protocol):
         ...
 
 
-class Writer(BeginningWriter):
+class Writer(ResetWriter):
     """Writes a kernel's module."""
 
-    def __init__(self, kernel: Plan) -> None:
+    def __init__(self, kernel: KernelSpec) -> None:
         super().__init__(kernel)
         self.attempt = attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
-        self.course: Course = course(self.eq, self.attempt, kernel.record.task)
+        self.course: Course = course(self.eq, self.attempt, kernel.state_layout.task)
         extra = [*self.course.values, self.attempt.taken, self.attempt.length]
         layout = Layout.of(self.attempt, extra)
         self.extra = extra
-        self.commanded = self.circuit.command()
-        self.sensed = self.circuit.sense(self.circuit.slot("count") + 1, first=False)
-        self.sensed["reward"] = self.circuit.reward(self.sensed)
-        later = [*self.sensed.values(), *self._trace_beginning()]
+        self.commanded = self.step_graph.command()
+        self.sensed = self.step_graph.sense(self.step_graph.slot("count") + 1, first=False)
+        self.sensed["reward"] = self.step_graph.reward(self.sensed)
+        later = [*self.sensed.values(), *self._trace_reset()]
         self._prepare()
         fixed = {v.id: v for v in [*layout.fixed, *split(later, FIXED)]}
         self.fixed = [fixed[i] for i in sorted(fixed)]
@@ -78,7 +78,7 @@ class Writer(BeginningWriter):
         self._step()
         self._begin()
         if self.width == 1:
-            write_advance(self.module, self.record)
+            write_advance(self.module, self.state_layout)
 
     def _table(self) -> None:
         b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
@@ -99,7 +99,7 @@ class Writer(BeginningWriter):
         bad, lanes = memory(b, INTEGER), Lanes(self.width)
         b.store(integer(0), bad)
         with loop(b, given["last"], given["first"]) as block:
-            for i in range(self.record.actions):
+            for i in range(self.state_layout.actions):
                 action = self._actions(b, lanes, given, block, i)
                 # Zero times a number that is not finite is none.
                 nothing = b.fmul(action, lanes.constant(0.0))
@@ -155,7 +155,7 @@ class Writer(BeginningWriter):
         return first, b.select(b.icmp_signed("<", last, given["count"]), last, given["count"])
 
     def _action(self, b: Builder, given: dict[str, Operand], index: Operand, i: int) -> Operand:
-        at = b.add(b.mul(index, integer(self.record.actions)), integer(i))
+        at = b.add(b.mul(index, integer(self.state_layout.actions)), integer(i))
         return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
 
     def _actions(
@@ -173,8 +173,8 @@ class Writer(BeginningWriter):
         records, tables = self._block(b, given, block)
         values = list(self.commanded.values())
         known = self._known(b, lanes, values, records, tables, 0)
-        for i in range(self.record.actions):
-            known[self.circuit.action(i).id] = self._actions(b, lanes, given, block, i)
+        for i in range(self.state_layout.actions):
+            known[self.step_graph.action(i).id] = self._actions(b, lanes, given, block, i)
         found = lanes.emit(b, values, known)
         self._store(b, lanes, found, self.commanded, records, 0)
 
@@ -186,12 +186,12 @@ class Writer(BeginningWriter):
     ) -> None:
         real, paired = "float" if self.kernel.single else "double", pairs(self.width)
         lanes = Lanes(self.width, real, FUSED, paired)
-        sums = [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
+        sums = [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
         lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
-        period = self.record.options.period
+        period = self.state_layout.options.period
         following, behind = (variable(b, INTEGER, job) for job in self._jobs(b, given))
-        kept = [*self.record.states, "size"]
-        values = {name: self.circuit.slot(name) for name in self.record.states}
+        kept = [*self.state_layout.states, "size"]
+        values = {name: self.step_graph.slot(name) for name in self.state_layout.states}
         values["size"] = self.attempt.size
         own = ["sample", *sums]
 
@@ -216,8 +216,8 @@ class Writer(BeginningWriter):
                 b.store(job, lane.job(k))
                 if self.width == 1:
                     steps = b.load(address(job, "count"), typ=INTEGER)
-                    heard = number(job, f"{self.record.task.actuator}_voltage")
-                    b.store(heard, offset(b, given["voltages"], steps))
+                    voltage = number(job, f"{self.state_layout.task.actuator}_voltage")
+                    b.store(voltage, offset(b, given["voltages"], steps))
                 for name in kept:
                     lane.put(values[name], k, lane.narrow(number(job, name)))
                 for name in own:
@@ -227,8 +227,8 @@ class Writer(BeginningWriter):
                 time = b.fmul(b.uitofp(steps, DOUBLE), ir.Constant(DOUBLE, period))
                 lane.put("clock", k, lane.narrow(time))
                 inputs = {
-                    self.circuit.slot(name).id: lane.narrow(number(job, name))
-                    for name in self.record.held
+                    self.step_graph.slot(name).id: lane.narrow(number(job, name))
+                    for name in self.state_layout.held
                 }
                 block, rest = b.sdiv(job, integer(self.width)), b.srem(job, integer(self.width))
                 _, tables = self._block(b, given, block)
@@ -262,7 +262,7 @@ class Writer(BeginningWriter):
         given: dict[str, Operand],
     ) -> None:
         """Take every sample that lies in the attempt."""
-        options, task = self.record.options, self.record.task
+        options, task = self.state_layout.options, self.state_layout.task
         one = sampling(self.eq, self.attempt, task, options.period)
         graph = self.eq.graph
         known = {self.attempt.left.id: found[self.attempt.left.id]}
@@ -310,17 +310,17 @@ class Writer(BeginningWriter):
     def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
         lanes = self._lanes(self.width)
         records, tables = self._block(b, given, block)
-        entries = self.circuit.observation(self.kernel.observed, self.sensed)
-        options = self.record.options
+        entries = self.step_graph.observation(self.kernel.observed, self.sensed)
+        options = self.state_layout.options
         is_over = self.sensed["ended"] > 0.0
-        at_end = to_real(self.sensed["count"]) >= self.circuit.horizon
+        at_end = to_real(self.sensed["count"]) >= self.step_graph.horizon
         truncated = at_end & ~is_over
         values = [*self.sensed.values(), *entries, is_over, truncated]
         known = self._known(b, lanes, values, records, tables, 0)
         horizon = lanes.spread(b, b.uitofp(given["horizon"], lanes.element))
-        known[self.circuit.horizon.id] = horizon
+        known[self.step_graph.horizon.id] = horizon
         for ahead in range(options.preview + 1):
-            known[self.circuit.reference(ahead).id] = self._references(
+            known[self.step_graph.reference(ahead).id] = self._references(
                 b, lanes, given, records, 0, ahead, 1
             )
         found = lanes.emit(b, values, known)

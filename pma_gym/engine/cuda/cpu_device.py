@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.cuda.kernel import ARGUMENTS, CudaKernel, Name
 
 
-class StandIn:
+class CpuDevice:
     """Runs the threads of a kernel on the processor, one after another: to test without a GPU.
 
     Args:
@@ -52,7 +52,7 @@ class StandIn:
     def prepare(self, kernel: CudaKernel) -> None:
         """Compile a kernel."""
         self._kernel = kernel
-        library = kernel.stand_in()
+        library = kernel.cpu_library()
         kinds = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_int64]
         self._functions = {name: library.function(name, kinds) for name in kernel.names}
 

@@ -16,7 +16,7 @@ from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options, rig_model
 from pma_gym.engine.reset.reset_state import hangs_slack
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.compiled_model import regulator_voltage
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.plant import Plant
@@ -101,16 +101,16 @@ class DeviceEngine:
             )
         self.task, self.options, self.count, self._device = task, options, count, device
         self.nominal = Plant(rig_model(task, options), options.tolerance)
-        self.record = Record(tuple(self.nominal.states), task, options)
+        self.state_layout = StateLayout(tuple(self.nominal.states), task, options)
         self.table = ObservationTable(task, options)
         self._own_tables = options.randomisation != "none"
         pressures = self._pressures()
         # What comes beside pressure and rest is drawn by the processor.
-        alone = not self._own_tables and not self.record.events and task.actuator == "motor"
+        alone = not self._own_tables and not self.state_layout.events and task.actuator == "motor"
         self._draws = alone and self._hangs_slack(pressures)
         self.kernel = CudaKernel(
             self.nominal.program,
-            self.record,
+            self.state_layout,
             self.table,
             precision == "single",
             self._own_tables,
@@ -149,7 +149,7 @@ class DeviceEngine:
     def _allocate(self, pressures: NDArray[np.float64]) -> None:
         made, kernel, n = self._device, self.kernel, self.count
         zeros, entries = made.zeros, len(self.table.rows)
-        self.records = zeros((len(kernel.places), n), kernel.element)
+        self.records = zeros((len(kernel.offsets), n), kernel.element)
         self._whole = made.view(self.records, kernel.whole)
         own = (kernel.table_size, n) if self._own_tables else (1, 1)
         self.tables = zeros(own, kernel.element)
@@ -248,8 +248,8 @@ class DeviceEngine:
             drawn = np.array([np.random.SeedSequence(one).generate_state(2) for one in seeds])
         for i in range(2):
             key = drawn[:, i].astype(np.int64).astype(self.kernel.whole)
-            self._whole[self.kernel.places[f"key_{i}"]] = self._device.put(key)
-        self._whole[self.kernel.places["episode"]] = -1
+            self._whole[self.kernel.offsets[f"key_{i}"]] = self._device.put(key)
+        self._whole[self.kernel.offsets["episode"]] = -1
 
     def _begin_on_host(self, indices: NDArray[np.int64]) -> None:
         """Let the processor begin episodes, and take them over."""
@@ -260,17 +260,17 @@ class DeviceEngine:
         host.reset(indices)
         block, lane = np.divmod(indices, host.width)
         # As integers: not every integer is a number that keeps its bits.
-        rows = np.empty((len(kernel.places), len(indices)), kernel.whole)
-        for name, place in kernel.places.items():
-            at = block, self.record.places[name], lane
-            if self.record.kind(name) == "integer":
+        rows = np.empty((len(kernel.offsets), len(indices)), kernel.whole)
+        for name, place in kernel.offsets.items():
+            at = block, self.state_layout.offsets[name], lane
+            if self.state_layout.kind(name) == "integer":
                 rows[place] = host.integers[at]
             else:
                 rows[place] = host.records[at].astype(kernel.element).view(kernel.whole)
         where = put(indices)
         self.final_observations[where] = self.observations[where]
         for i, name in enumerate(self._scored):
-            self.scores[i, where] = self.records[kernel.places[name], where]
+            self.scores[i, where] = self.records[kernel.offsets[name], where]
         self._whole[:, where] = put(rows)
         self.observations[where] = put(host.observations[indices])
         if self._own_tables:
@@ -293,7 +293,7 @@ class DeviceEngine:
         """
         if not self._begun:
             raise RuntimeError("no episode has begun: call reset() before step()")
-        shape = (self.count, self.record.actions)
+        shape = (self.count, self.state_layout.actions)
         self._actions = self._device.actions(actions, shape, self.kernel.element)
         self._given["actions"] = self._device.address(self._actions)
         self._device.launch("step", self._given, self._shared)
@@ -317,6 +317,6 @@ class DeviceEngine:
             )
 
     def numbers(self, name: str) -> Array:
-        """A number of every environment by its place's name (`kernel.places`), shape (n,)."""
-        whole = self.record.kind(name) == "integer"
-        return (self._whole if whole else self.records)[self.kernel.places[name]]
+        """A number of every environment by its place's name (`kernel.offsets`), shape (n,)."""
+        whole = self.state_layout.kind(name) == "integer"
+        return (self._whole if whole else self.records)[self.kernel.offsets[name]]

@@ -38,7 +38,7 @@ from pma_gym.codegen.machine.ptx import (
 )
 from pma_gym.engine.cuda.thread_writer import ThreadWriter
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.state_layout import Record
+from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.program import Program, structure
 
 Name = Literal["step", "begin"]
@@ -63,7 +63,7 @@ class CudaKernel:
 
     Args:
         program: the compiled plant.
-        record: what an environment's numbers are.
+        state_layout: what an environment's numbers are.
         table: the observation's entries.
         single: compute and keep in single precision.
         own_tables: whether every environment has a table of its own (a drawn station).
@@ -71,7 +71,7 @@ class CudaKernel:
         ranged: whether pressures are drawn from a range, else from several.
 
     Attributes:
-        places: place of every number that is kept, by name; they lie as [place, environment].
+        offsets: offset of every number that is kept, by name; they lie as [place, environment].
         element: NumPy's type of a number.
         whole: NumPy's type of an integer, of the same size.
         table_size: how many numbers a table has.
@@ -80,20 +80,20 @@ class CudaKernel:
     def __init__(
         self,
         program: Program,
-        record: Record,
+        state_layout: StateLayout,
         table: ObservationTable,
         single: bool,
         own_tables: bool = False,
         draws: bool = True,
         ranged: bool = True,
     ) -> None:
-        self.program, self.record, self.observed = program, record, table
+        self.program, self.state_layout, self.observed = program, state_layout, table
         self.width, self.abreast, self.single = 1, 1, single
         self.own_tables, self.draws, self.ranged = own_tables, draws, ranged
         self.element: type[np.floating] = np.float32 if single else np.float64
         self.whole: type[np.signedinteger] = np.int32 if single else np.int64
         self._writer = ThreadWriter(self, own_tables, ranged)
-        self.places = self._writer.places
+        self.offsets = self._writer.offsets
         library = compiled(
             ["table", *self._key()], lambda: self._writer.table, "tables of environments"
         )
@@ -112,13 +112,13 @@ class CudaKernel:
         return out
 
     def _key(self) -> list[str]:
-        options, record = self.record.options, self.record
+        options, state_layout = self.state_layout.options, self.state_layout
         said = (
             *(options.control_rate_hz, options.preview, options.noise, options.action_delay),
             *(options.observation_delay, options.history, options.reward_name),
             options.reward_scale,
             *(options.regulator_action, options.safety, self.single),
-            *(record.task.structure, record.events),
+            *(state_layout.task.structure, state_layout.events),
             *(self.own_tables, self.draws, self.ranged),
         )
         return ["threads", *structure(self.program.model), *map(str, said)]
@@ -168,7 +168,7 @@ class CudaKernel:
 
     # -- without one -------------------------------------------------------------------------------
 
-    def stand_in(self) -> Library:
+    def cpu_library(self) -> Library:
         """The functions for the processor: (arguments, table, threads), one thread after another.
 
         `arguments` leads to 64-bit integers in the order of `ARGUMENTS`, `table` to the numbers

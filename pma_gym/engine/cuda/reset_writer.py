@@ -17,7 +17,7 @@ from pma_gym.engine.cuda.thread_memory import ThreadMemory
 _BYTE = ir.IntType(8)
 
 
-class BeginWriter(ThreadMemory):
+class CudaResetWriter(ThreadMemory):
     """Writes beginnings: the numbers that `Engine.reset` finds, in the same order of rounding."""
 
     def begin(

@@ -17,7 +17,7 @@ from pma_gym.codegen.machine.control import (
 )
 from pma_gym.codegen.machine.simd import Lanes
 from pma_gym.codegen.trace import live_inputs
-from pma_gym.engine.cpu.block_memory import Plan, narrowed
+from pma_gym.engine.cpu.block_memory import KernelSpec, narrowed
 from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.integrator.integration import FUSED
 
@@ -32,10 +32,10 @@ class ThreadMemory(Writer):
 
     Attributes:
         table: module of the functions that make a table, for the processor.
-        places: place of every number that is kept; fewer than the processor keeps.
+        offsets: offset of every number that is kept; fewer than the processor keeps.
     """
 
-    def __init__(self, kernel: Plan, own_tables: bool, ranged: bool) -> None:
+    def __init__(self, kernel: KernelSpec, own_tables: bool, ranged: bool) -> None:
         self.own_tables, self.ranged = own_tables, ranged
         super().__init__(kernel)
 
@@ -43,21 +43,24 @@ class ThreadMemory(Writer):
         self.traces = False
         self.element = FLOAT if self.kernel.single else DOUBLE
         self.real = "float" if self.kernel.single else "double"
-        self._find_places()
+        self._find_offsets()
 
-    def _find_places(self) -> None:
+    def _find_offsets(self) -> None:
         """Keep what some part reads, and the score."""
-        circuit, record = self.circuit, self.record
-        told = {*record.info, *(f"true_{part}" for part in ("rotation", "load", "pressure"))}
-        sensed = [value for name, value in self.sensed.items() if name not in told]
-        entries = circuit.observation(self.kernel.observed, self.sensed)
+        step_graph, state_layout = self.step_graph, self.state_layout
+        info_only = {
+            *state_layout.info,
+            *(f"true_{part}" for part in ("rotation", "load", "pressure")),
+        }
+        sensed = [value for name, value in self.sensed.items() if name not in info_only]
+        entries = step_graph.observation(self.kernel.observed, self.sensed)
         made = [*self.layout_values, *sensed, *entries, *self.tare, *self.commanded.values()]
         read = {value.id for value in live_inputs(made)}
         always = {"sample", "ended", *self.sums, "count", "key_0", "key_1", "episode"}
         # What only an info tells is computed with the rest.
-        always |= {"operator_moment"} & set(record.places)
-        names = [n for n in record.places if circuit.slot(n).id in read or n in always]
-        self.places = {name: i for i, name in enumerate(names)}
+        always |= {"operator_moment"} & set(state_layout.offsets)
+        names = [n for n in state_layout.offsets if step_graph.slot(n).id in read or n in always]
+        self.offsets = {name: i for i, name in enumerate(names)}
 
     @property
     def layout_values(self) -> list[Value]:
@@ -67,7 +70,7 @@ class ThreadMemory(Writer):
     @property
     def sums(self) -> list[str]:
         """Places of the sums of squared errors, one a phase."""
-        return [f"sum_{phase.name}" for phase in self.record.task.protocol.phases]
+        return [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
 
     def _write(self) -> None:
         self._table()
@@ -83,7 +86,7 @@ class ThreadMemory(Writer):
         )
 
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
-        return b.mul(self._spacing, integer(self.places[name]))
+        return b.mul(self._spacing, integer(self.offsets[name]))
 
     def _lanes(self, width: int) -> Lanes:
         return Lanes(width, self.real, FUSED)

@@ -25,7 +25,7 @@ from pma_gym.codegen.machine.control import (
 from pma_gym.codegen.machine.simd import Lanes
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import narrowed, widened
-from pma_gym.engine.cuda.reset_writer import BeginWriter
+from pma_gym.engine.cuda.reset_writer import CudaResetWriter
 from pma_gym.engine.graph.scoring import Sampling
 from pma_gym.integrator.integration import FUSED, memory
 
@@ -46,7 +46,7 @@ class Turns(Protocol):
         ...
 
 
-class ThreadWriter(BeginWriter):
+class ThreadWriter(CudaResetWriter):
     """Writes what a thread does; see `ThreadMemory`."""
 
     def step(
@@ -85,7 +85,7 @@ class ThreadWriter(BeginWriter):
     ) -> None:
         lanes, made = self._lanes(1), self.attempt
         cells = _Cells(b, self.element)
-        kept = {name: self.circuit.slot(name) for name in self.record.states}
+        kept = {name: self.step_graph.slot(name) for name in self.state_layout.states}
         kept["size"] = made.size
         job, attempts = memory(b, INTEGER), memory(b, INDEX)
         self._clock = memory(b, DOUBLE)
@@ -101,16 +101,16 @@ class ThreadWriter(BeginWriter):
                     cells.put_vector(name, self._number(b, records, name))
                 for name, value in kept.items():
                     cells.put(value, self._number(b, records, name))
-                period = self.record.options.period
+                period = self.state_layout.options.period
                 cells.put(made.left, ir.Constant(self.element, period))
                 count = b.uitofp(self._count(b, self._cell(b, records, "count", 0)), DOUBLE)
                 time = b.fmul(count, ir.Constant(DOUBLE, period))
                 cells.put_vector("clock", narrowed(b, time, self.element))
                 b.store(time, self._clock)
                 known = self._fixed(b, lanes, tables, 0)
-                for name in self.record.held:
-                    if name in self.places:
-                        known[self.circuit.slot(name).id] = self._number(b, records, name)
+                for name in self.state_layout.held:
+                    if name in self.offsets:
+                        known[self.step_graph.slot(name).id] = self._number(b, records, name)
                 found = lanes.emit(b, self.layout.held, known)
                 for value in self.layout.held:
                     cells.put(value, found[value.id])

@@ -11,10 +11,10 @@ from pma_gym.codegen.graph import Value
 from pma_gym.codegen.random import normals, philox
 from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.graph.exercise_step import Exercised, held_volts
+from pma_gym.engine.graph.exercise_step import ExerciseStep, held_volts
 from pma_gym.engine.graph.scoring import position_of
 from pma_gym.engine.graph.step_inputs import StepInputs
-from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, heard_position
+from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
 from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.integrator.system import at_rest
@@ -31,46 +31,46 @@ PRESSURE_TOLERANCE = 1.0
 exact to its last bits only."""
 
 
-class Circuit(StepInputs):
+class ControlStepGraph(StepInputs):
     """Traced parts of a control step; see `StepInputs` for arguments and attributes."""
 
     @cached_property
-    def exercised(self) -> Exercised | None:
+    def exercise_step(self) -> ExerciseStep | None:
         """What an exercise adds."""
-        return Exercised(self) if self.record.task.exercise else None
+        return ExerciseStep(self) if self.state_layout.task.exercise else None
 
     @property
     def prescribed(self) -> Prescribed | None:
         """What a measured moment is compared with, in an exercise that prescribes one."""
-        return self.exercised.prescribed if self.exercised else None
+        return self.exercise_step.prescribed if self.exercise_step else None
 
     def command(self) -> dict[str, Value]:
-        """From an action to what the station hears: new numbers by name."""
-        record, options = self.record, self.record.options
+        """From an action to the commands that reach the station: new numbers by name."""
+        state_layout, options = self.state_layout, self.state_layout.options
         held = []
-        for i in range(record.actions):
+        for i in range(state_layout.actions):
             asked = self.action(i)
             held.append(where(asked < -1.0, -1.0, where(asked > 1.0, 1.0, asked)))
         found: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
         volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
         if options.action_delay:
-            heard = [self.slot(f"wire_0_{i}") for i in range(record.actions)]
+            received = [self.slot(f"wire_0_{i}") for i in range(state_layout.actions)]
             line = [
-                [self.slot(f"wire_{k}_{i}") for i in range(record.actions)]
+                [self.slot(f"wire_{k}_{i}") for i in range(state_layout.actions)]
                 for k in range(1, options.action_delay)
             ]
             for k, values in enumerate([*line, volts]):
                 found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
         else:
-            heard = volts
-        if self.exercised:
-            regulator, guarded = self.exercised.keep_safe(heard[0])
-            found |= self.exercised.operate() | guarded
-        elif record.task.actuator == "regulator":
-            found["motor_voltage"], regulator = self.slot("rest_motor"), heard[0]
+            received = volts
+        if self.exercise_step:
+            regulator, filtered = self.exercise_step.keep_safe(received[0])
+            found |= self.exercise_step.operate() | filtered
+        elif state_layout.task.actuator == "regulator":
+            found["motor_voltage"], regulator = self.slot("rest_motor"), received[0]
         else:
-            found["motor_voltage"] = heard[0]
-            regulator = heard[1] if options.regulator_action else self.slot("rest_regulator")
+            found["motor_voltage"] = received[0]
+            regulator = received[1] if options.regulator_action else self.slot("rest_regulator")
         found["regulator_voltage"] = self._disturbed(regulator)
         change = self.graph.constant(0.0)
         for i, value in enumerate(held):
@@ -80,7 +80,7 @@ class Circuit(StepInputs):
         jump = abs(found["motor_voltage"] - self.slot("motor_voltage"))
         other = abs(found["regulator_voltage"] - self.slot("regulator_voltage"))
         jump = where(other > jump, other, jump)
-        if any(name.startswith("pulse_") for name in self.record.events):
+        if any(name.startswith("pulse_") for name in self.state_layout.events):
             found[OPERATOR] = self._pulse()
             pulled = abs(found[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
             jump = where(pulled > jump, pulled, jump)
@@ -89,7 +89,7 @@ class Circuit(StepInputs):
 
     def _disturbed(self, regulator: Value) -> Value:
         """Regulator voltage that the station hears of one that is commanded (V)."""
-        jumps = [name for name in self.record.events if name.startswith("jump_step_")]
+        jumps = [name for name in self.state_layout.events if name.startswith("jump_step_")]
         if not jumps:
             return regulator
         now, volts = to_real(self.slot("count")), regulator
@@ -101,7 +101,7 @@ class Circuit(StepInputs):
     def _pulse(self) -> Value:
         """Force of the operator in the step that begins (N)."""
         now, force = to_real(self.slot("count")), self.graph.constant(0.0)
-        for name in self.record.events:
+        for name in self.state_layout.events:
             if name.startswith("pulse_step_"):
                 ended = self.slot(name.replace("_step", "_end"))
                 during = (now >= self.slot(name)) & (now < ended)
@@ -118,10 +118,10 @@ class Circuit(StepInputs):
         """What the four sensors say (SI), by random numbers of a stream."""
         eq, truth = self.equations, self.truth()
         lagged = [
-            eq[f"lag_{name}"] if f"lag_{name}" in self.record.states else truth[output]
+            eq[f"lag_{name}"] if f"lag_{name}" in self.state_layout.states else truth[output]
             for name, (output, _) in sensors.SENSORS.items()
         ]
-        if not self.record.options.noise:
+        if not self.state_layout.options.noise:
             return lagged
         words = philox(
             (count, self.slot("episode") * 4 + stream, self.graph.constant(0, "integer"), 0),
@@ -143,7 +143,7 @@ class Circuit(StepInputs):
             count: control steps since the trial began, an integer.
             first: at the trial's beginning, which has no readings before.
         """
-        record, truth = self.record, self.truth()
+        state_layout, truth = self.state_layout, self.truth()
         contraction, rotation, load, pressure = self.read(NOISE, count)
         reading = {
             "extension": self.slot("tare_contraction") - contraction,
@@ -152,20 +152,20 @@ class Circuit(StepInputs):
             "pressure": pressure,
         }
         found: dict[str, Value] = {f"true_{name}": value for name, value in truth.items()}
-        for k in range(record.readings):
+        for k in range(state_layout.readings):
             for part in PARTS:
                 before = reading[part] if k == 0 or first else self.slot(f"{part}_{k - 1}")
                 found[f"{part}_{k}"] = before
         ended = broken(self.equations.parameters["limits"], truth)
         found["ended"] = self.graph.value(ended)
         found["count"] = count
-        if self.exercised:
-            found |= self.exercised.score(found, first)
+        if self.exercise_step:
+            found |= self.exercise_step.score(found, first)
         found |= self._info(found, to_real(count))
         return found
 
     def _info(self, found: Mapping[str, Value], count: Value) -> dict[str, Value]:
-        record, task = self.record, self.record.task
+        state_layout, task = self.state_layout, self.state_layout.task
         unit, quantity = task.protocol.unit, task.protocol.quantity
         factor, position = 1.0 / SI_FACTORS[unit], self.position(found)
         valid = self.equations.parameters["validity"]
@@ -173,15 +173,15 @@ class Circuit(StepInputs):
         high = where(valid.highest < task.highest_pressure, valid.highest, task.highest_pressure)
         pressure = found["true_pressure"]
         inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
-        heard = heard_position(
+        measured = measured_position(
             quantity,
-            lambda part: found[f"{part}_{record.options.observation_delay}"],
+            lambda part: found[f"{part}_{state_layout.options.observation_delay}"],
             self.prescribed,
         )
         values = [
-            count * record.options.period,
+            count * state_layout.options.period,
             position * factor,
-            heard * factor,
+            measured * factor,
             self.reference(0) * factor,
             (position - self.reference(0)) * factor,
             self.slot("motor_voltage"),
@@ -190,18 +190,18 @@ class Circuit(StepInputs):
             found["true_load"],
             where(inside, 0.0, 1.0),
         ]
-        if self.exercised:
-            values += self.exercised.info(found)
-        return dict(zip(record.info, values, strict=True))
+        if self.exercise_step:
+            values += self.exercise_step.info(found)
+        return dict(zip(state_layout.info, values, strict=True))
 
     def position(self, found: Mapping[str, Value]) -> Value:
         """True position that the task asks for (m or rad)."""
         outputs = {name: found[f"true_{name}"] for name in TRUTH}
-        return position_of(self.equations, self.record.task, outputs)
+        return position_of(self.equations, self.state_layout.task, outputs)
 
     def first_score(self, found: Mapping[str, Value]) -> dict[str, Value]:
         """The score's numbers once the first sample, that of the beginning, is taken."""
-        phase = self.record.task.protocol.phases[0]
+        phase = self.state_layout.task.protocol.phases[0]
         error = self.position(found) - float(phase.reference(0.0))
         return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
 
@@ -210,7 +210,7 @@ class Circuit(StepInputs):
 
         It stays there for a user's function, which Python calls (`FunctionRewards`).
         """
-        task, options = self.record.task, self.record.options
+        task, options = self.state_layout.task, self.state_layout.options
         if callable(options.reward):
             return self.slot("reward")
         rule = REWARDS[options.reward]
@@ -226,7 +226,7 @@ class Circuit(StepInputs):
         entries = table.entries(
             lambda part, k: found[f"{part}_{k}"],
             self.reference,
-            [self.slot(f"action_{i}") for i in range(self.record.actions)],
+            [self.slot(f"action_{i}") for i in range(self.state_layout.actions)],
             self.prescribed,
         )
         return [where(e < -BOUND, -BOUND, where(e > BOUND, BOUND, e)) for e in entries]

@@ -8,10 +8,10 @@ from pma_gym.codegen.graph import Value
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
-from pma_gym.engine.state_layout import GUARDED, NOISE, plan_of_places
-from pma_gym.tasks import PACE, Human, Mind, Plan, unsafe
-from pma_gym.tasks.guard import MOMENT_FILTER_S, SPEED_FILTER_S, let_through
-from pma_gym.tasks.human import FORESIGHT_S, moved, unsteady
+from pma_gym.engine.state_layout import FILTER_STATE, NOISE, profile_at_offsets
+from pma_gym.tasks import PACE, Human, MomentProfile, OperatorState, unsafe
+from pma_gym.tasks.human import FORESIGHT_S, operator_step, unsteady
+from pma_gym.tasks.safety_filter import MOMENT_FILTER_S, SPEED_FILTER_S, filtered_pressure
 from pma_gym.units import SI_FACTORS
 
 
@@ -20,7 +20,7 @@ def held_volts(volts: Value) -> Value:
     return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
 
 
-class Exercised:
+class ExerciseStep:
     """The operator of an exercise, its safety layer and its score.
 
     Args:
@@ -28,11 +28,11 @@ class Exercised:
     """
 
     def __init__(self, inputs: StepInputs) -> None:
-        self.inputs, self.record = inputs, inputs.record
-        exercise = self.record.task.exercise
+        self.inputs, self.state_layout = inputs, inputs.state_layout
+        exercise = self.state_layout.task.exercise
         assert exercise is not None
         self.exercise = exercise
-        self.period = self.record.options.period
+        self.period = self.state_layout.options.period
 
     # -- what the rig's computer knows -------------------------------------------------------------
 
@@ -42,9 +42,9 @@ class Exercised:
         return Human(*(self.inputs.slot(f"human_{name}") for name in Human._fields))  # type: ignore[arg-type]
 
     @property
-    def plan(self) -> Plan:
+    def plan(self) -> MomentProfile:
         """Moment that the exercise takes over the angle, as he knows it, as inputs."""
-        return plan_of_places(self.inputs.slot, self.exercise)
+        return profile_at_offsets(self.inputs.slot, self.exercise)
 
     @property
     def prescribed(self) -> Prescribed | None:
@@ -65,9 +65,9 @@ class Exercised:
         zero = self.inputs.graph.constant(0, "integer")
         key = slot("key_0"), slot("key_1")
         normal = unsteady(count, slot("episode") * 4 + NOISE, key, zero)
-        moment, mind = moved(
+        moment, mind = operator_step(
             human,
-            Mind(*(slot(f"mind_{name}") for name in Mind._fields)),
+            OperatorState(*(slot(f"mind_{name}") for name in OperatorState._fields)),
             human.effort * self.plan.at(intended),
             intended - angle,
             angle + FORESIGHT_S * slot("spin"),
@@ -95,19 +95,19 @@ class Exercised:
 
     def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
         """Regulator voltage of one that is asked for, and what the safety layer remembers."""
-        if not self.record.options.safety:
+        if not self.state_layout.options.safety:
             return volts, {}
         # It stands at the rig: delays lie between the agent and it.
         slot = self.inputs.slot
-        heard = slot("extension_0")
+        extension = slot("extension_0")
         radius = slot("told_radius")
-        rate = (heard - slot("guard_extension")) / (self.period * radius)
+        rate = (extension - slot("guard_extension")) / (self.period * radius)
         speed = self._filtered("guard_speed", rate, SPEED_FILTER_S)
         moment = radius * slot("load_0")
         slow = self._filtered("guard_moment", moment, MOMENT_FILTER_S)
         gain, offset = slot("told_line_gain"), slot("told_line_offset")
         before = slot("guard_pressure")
-        pressure = let_through(
+        pressure = filtered_pressure(
             gain * volts + offset,
             before,
             moment,
@@ -116,11 +116,11 @@ class Exercised:
             slot("rotation_0"),
             self.exercise.safe_moment,
             self.exercise.safe_speed,
-            self.exercise.guard,
+            self.exercise.safety_filter,
         )
         there = before + slot("told_lag_share") * (pressure - before)
-        new = (there, heard, speed, slow)
-        found: dict[str, Value] = dict(zip(GUARDED, new, strict=True))
+        new = (there, extension, speed, slow)
+        found: dict[str, Value] = dict(zip(FILTER_STATE, new, strict=True))
         return held_volts((pressure - offset) / gain), found
 
     def _filtered(self, name: str, value: Value, time_constant: float) -> Value:

@@ -7,11 +7,11 @@ from pma_gym.codegen.derivative import derivatives
 from pma_gym.codegen.graph import CHANGING, HELD, Value
 from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.observation import Prescribed
-from pma_gym.engine.state_layout import START, plan_of_places
+from pma_gym.engine.state_layout import START, profile_at_offsets
 from pma_gym.integrator.equations import Equations
 from pma_gym.integrator.step_attempt import Attempt
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.tasks import Plan, Task
+from pma_gym.tasks import MomentProfile, Task
 
 SAMPLE_PERIOD = 1.0 / SAMPLE_RATE_HZ
 """Time between two samples (s), whatever the control rate."""
@@ -24,30 +24,30 @@ class Course:
     Attributes:
         start: position at its beginning (m or rad).
         speed: its rate there.
-        bend: the rate's rate there.
+        acceleration: the rate's rate there.
         end: position at its end.
         end_speed: its rate there.
     """
 
     start: Value
     speed: Value
-    bend: Value
+    acceleration: Value
     end: Value
     end_speed: Value
 
     @property
     def values(self) -> list[Value]:
         """All of them."""
-        return [self.start, self.speed, self.bend, self.end, self.end_speed]
+        return [self.start, self.speed, self.acceleration, self.end, self.end_speed]
 
 
 def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
     """How the task's position moves during an attempt."""
     position = position_of(eq, task, eq.outputs)
     speed = _rate(eq, position)
-    bend = _rate(eq, speed)
+    acceleration = _rate(eq, speed)
     begin = {**attempt.frozen, **attempt.here}
-    start = substitute([position, speed, bend], begin)
+    start = substitute([position, speed, acceleration], begin)
     end = substitute([position, speed], {**attempt.frozen, **attempt.moved})
     return Course(*start, *end)
 
@@ -67,10 +67,10 @@ def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Valu
     return outputs["rotation"]
 
 
-def held_plan(eq: Equations, task: Task) -> Plan:
+def held_plan(eq: Equations, task: Task) -> MomentProfile:
     """The moment that an exercise prescribes over the angle, as inputs that a step holds."""
     assert task.exercise is not None
-    return plan_of_places(lambda name: eq.graph.input(name, HELD), task.exercise)
+    return profile_at_offsets(lambda name: eq.graph.input(name, HELD), task.exercise)
 
 
 def _rate(eq: Equations, value: Value) -> Value:
@@ -121,7 +121,7 @@ def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Samp
     when = sample * SAMPLE_PERIOD - clock - done
     share = when * (1.0 / length)
     due = attempt_due(graph.input("taken", CHANGING, "truth"), share)
-    b, d = c.speed * length, 0.5 * c.bend * (length * length)
+    b, d = c.speed * length, 0.5 * c.acceleration * (length * length)
     # p(s) = start + b s + d s^2 + e s^3 + f s^4 with p(1) = end and p'(1) = end_speed * length.
     rest = c.end - c.start - b - d
     slope = c.end_speed * length - b - 2.0 * d
@@ -140,7 +140,7 @@ def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Samp
     return Sampling(due, position, following, sums, when, done, moved)
 
 
-COURSE = ("start", "speed", "bend", "end", "end_speed")
+COURSE = ("start", "speed", "acceleration", "end", "end_speed")
 """Names of a course's values."""
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from pma_gym.codegen.graph import CHANGING, HELD, Graph, Value
-from pma_gym.engine.state_layout import START, Record
+from pma_gym.engine.state_layout import START, StateLayout
 from pma_gym.integrator.equations import COMMANDS, ZERO, Equations
 
 
@@ -12,11 +12,11 @@ class StepInputs:
     """Inputs of a control step by name.
 
     Attributes:
-        record: places of the numbers.
+        state_layout: places of the numbers.
         equations: the plant's equations, whose graph all of it is in.
     """
 
-    record: Record
+    state_layout: StateLayout
     equations: Equations
 
     @property
@@ -26,11 +26,11 @@ class StepInputs:
 
     def slot(self, name: str) -> Value:
         """A number of the record, as an input; states and commands are the plant's own."""
-        if name in self.record.states or name in (*COMMANDS, ZERO):
+        if name in self.state_layout.states or name in (*COMMANDS, ZERO):
             return self.equations[name]
-        if name == START or name in self.record.prescribed:
+        if name == START or name in self.state_layout.prescribed:
             return self.graph.input(name, HELD)
-        return self.graph.input(f"record.{name}", CHANGING, self.record.kind(name))
+        return self.graph.input(f"record.{name}", CHANGING, self.state_layout.kind(name))
 
     def action(self, i: int) -> Value:
         """An entry of the action, as an input."""

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.engine_memory import EngineMemory
-from pma_gym.engine.options import Options, Pressure, motor_at_rest, rig_model, told_model
+from pma_gym.engine.options import Options, Pressure, motor_at_rest, nominal_model, rig_model
 from pma_gym.engine.reset.operators import check_prescription, operators, wound_back
 from pma_gym.engine.reset.reset_state import (
     Settled,
@@ -45,24 +45,24 @@ class Episodes(EngineMemory):
         pressures: Sequence[Pressure] | None,
     ) -> None:
         """Check the pressures that are asked for, then compile."""
-        self.task, self.told = task, told_model(task, load_model(options.model))
+        self.task, self.nominal_model = task, nominal_model(task, load_model(options.model))
         # The very same model where nothing is added: its plant is known by that.
-        rig = rig_model(task, replace(options, model=self.told))
+        rig = rig_model(task, replace(options, model=self.nominal_model))
         nominal = Plant(rig, options.tolerance)
-        self.rest_motor = motor_at_rest(self.told, task)
+        self.rest_motor = motor_at_rest(self.nominal_model, task)
         # Never written to: what follows from them is kept.
         usual = [options.pressure_kpa] * count if pressures is None else pressures
         self.wanted = tuple(usual)
         self._possible: set[str] = set()
         self._check_prescription(self.wanted)
-        super().__init__(task, options, self.told, nominal, count, single)
+        super().__init__(task, options, self.nominal_model, nominal, count, single)
         self._rest = NoLoadEquilibria(self.nominal)
         self._settling = self._slack_range()
         self._usual = self._ranges.copy() if self._settles(self.wanted) else None
-        self._beginning = self._arguments.copy()
+        self._reset_arguments = self._arguments.copy()
         # Of steps, which have theirs elsewhere.
-        self._beginning[ARGUMENTS.index("attempts")] = 0
-        self._begin_address = self._beginning.ctypes.data
+        self._reset_arguments[ARGUMENTS.index("attempts")] = 0
+        self._reset_address = self._reset_arguments.ctypes.data
 
     def seed(self, indices: NDArray[np.int64], seeds: Sequence[int | None]) -> None:
         """Begin the random numbers of environments anew; None keeps an environment's own."""
@@ -72,7 +72,7 @@ class Episodes(EngineMemory):
                 self._episodes[index] = -1
                 block, lane = divmod(index, self.width)
                 for name, number in zip(_DRAWN_BY, (*self._keys[index], -1), strict=True):
-                    self.integers[block, self.record.places[name], lane] = number
+                    self.integers[block, self.state_layout.offsets[name], lane] = number
 
     def is_seeded(self, index: int) -> bool:
         """Whether an environment has random numbers to go on with."""
@@ -113,8 +113,8 @@ class Episodes(EngineMemory):
 
     def _begin(self, count: int, settles: bool) -> None:
         """Have compiled code begin the episodes of the first `count` indices."""
-        self._beginning[LAST], self._beginning[SETTLES] = count, settles
-        self.kernel.begin(self._begin_address, None)
+        self._reset_arguments[LAST], self._reset_arguments[SETTLES] = count, settles
+        self.kernel.begin(self._reset_address, None)
 
     def _settles(self, asked: Sequence[Pressure]) -> bool:
         """Write ranges of pressures for compiled beginnings; whether they find a rest in all."""
@@ -157,7 +157,7 @@ class Episodes(EngineMemory):
         if self.task.exercise is None:
             return
         new = {repr(one): one for one in wanted if repr(one) not in self._possible}
-        check_prescription(self.task, self.told, new.values())
+        check_prescription(self.task, self.nominal_model, new.values())
         self._possible |= set(new)
 
     def _drawn_models(self, indices: NDArray[np.int64]) -> NDArray[np.float64] | None:
@@ -206,7 +206,7 @@ class Episodes(EngineMemory):
         states, zero = settled_under_load(self.nominal, *held)
         if self.task.exercise:
             radii = np.array([model.parameters["rotor"].radius for model in models])
-            wound_back(self.record.states, states, zero, radii)
+            wound_back(self.state_layout.states, states, zero, radii)
         return states, zero
 
     def _fill(
@@ -216,39 +216,39 @@ class Episodes(EngineMemory):
         zero: NDArray[np.float64],
         regulator: NDArray[np.float64],
     ) -> None:
-        places, size = self.record.places, self.record.size
+        offsets, size = self.state_layout.offsets, self.state_layout.size
         rows = np.zeros((len(indices), size))
         wholes = rows.view(np.int64)
 
         def put(name: str, values: ArrayLike) -> None:
-            rows[:, places[name]] = values
+            rows[:, offsets[name]] = values
 
-        rows[:, : len(self.record.states)] = states
+        rows[:, : len(self.state_layout.states)] = states
         put("size", FIRST_S)
         put("zero_contraction", zero)
         put("regulator_voltage", regulator)
         put("rest_regulator", regulator)
         for i in range(2):
-            wholes[:, places[f"key_{i}"]] = self._keys[indices, i]
-        wholes[:, places["episode"]] = self._episodes[indices]
+            wholes[:, offsets[f"key_{i}"]] = self._keys[indices, i]
+        wholes[:, offsets["episode"]] = self._episodes[indices]
         held = np.maximum(np.minimum(0.2 * regulator - 1.0, 1.0), -1.0)
         volts: list[ArrayLike] = [0.0, regulator]
         actions: list[ArrayLike] = [-1.0, held]
         if self.task.actuator == "regulator":
             for name in ("motor_voltage", "rest_motor"):
                 put(name, self.rest_motor)
-            put(START, states[:, self.record.states.index("contraction")])
+            put(START, states[:, self.state_layout.states.index("contraction")])
             volts, actions = volts[1:], actions[1:]
-        for i in range(self.record.actions):
+        for i in range(self.state_layout.actions):
             put(f"action_{i}", actions[i])
             for k in range(self.options.action_delay):
                 put(f"wire_{k}_{i}", volts[i])
-        if self.record.events:
+        if self.state_layout.events:
             self._put_events(indices, put)
         if self.task.exercise:
             drawn_by = self._keys[indices], self._episodes[indices], self.pressures[indices]
-            told = operators(self.task, self.options, self.told, *drawn_by, regulator)
-            for name, values in told.items():
+            numbers = operators(self.task, self.options, self.nominal_model, *drawn_by, regulator)
+            for name, values in numbers.items():
                 put(name, values)
         block, lane = np.divmod(indices, self.width)
         self.records[block, :, lane] = rows
@@ -258,7 +258,7 @@ class Episodes(EngineMemory):
     ) -> None:
         """Draw what will disturb episodes: the control steps it comes with, and its sizes."""
         events = self._events(indices)
-        gain = self.told.parameters["regulator_line"].gain
+        gain = self.nominal_model.parameters["regulator_line"].gain
         rate = self.options.control_rate_hz
         for what, times, sizes in (
             ("jump", events.step_times, events.step_sizes / gain),
@@ -284,6 +284,6 @@ class Episodes(EngineMemory):
     def park(self, indices: NDArray[np.int64]) -> None:
         """Put stations that broke a limit at rest until they are reset."""
         block, lane = np.divmod(indices, self.width)
-        for name in (*self.record.states, "motor_voltage", "rest_motor", "size"):
-            if name in self.record.places:
-                self.records[block, self.record.places[name], lane] = 0.0
+        for name in (*self.state_layout.states, "motor_voltage", "rest_motor", "size"):
+            if name in self.state_layout.offsets:
+                self.records[block, self.state_layout.offsets[name], lane] = 0.0

@@ -21,7 +21,7 @@ from pma_gym.plant.exercise_device.prescription import (
     follow_from,
 )
 from pma_gym.plant.model import Model
-from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, Plan, Task, plan_of
+from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, MomentProfile, Task, moment_profile
 
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
 """Where a prescription is compared with what the device can give (rad)."""
@@ -101,7 +101,7 @@ def _starts(task: Task, wanted: Iterable[Pressure]) -> set[float]:
     return found
 
 
-def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> list[Plan]:
+def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> list[MomentProfile]:
     """Moment over the angle that operators expect.
 
     The prescribed one; where the speed is prescribed what the nominal device gives at rest at the
@@ -116,7 +116,7 @@ def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> l
         return [exercise.prescription] * len(pressures)
     angles = np.array(PLAN_ANGLES)
     given = resistive_moment(model, own_device(model), pressures[:, None], angles)
-    return [plan_of(PLAN_ANGLES, row.tolist()) for row in given.moment]
+    return [moment_profile(PLAN_ANGLES, row.tolist()) for row in given.moment]
 
 
 def operators(
@@ -128,7 +128,7 @@ def operators(
     pressures: NDArray[np.float64],
     regulator: NDArray[np.float64],
 ) -> Numbers:
-    """Numbers of the operators of episodes, and of what the rig's computer is told.
+    """Numbers of the operators of episodes, and of what the rig's computer knows.
 
     Args:
         task: an exercise.
@@ -151,7 +151,7 @@ def operators(
         rows = np.array([getattr(plan, what) for plan in known]).reshape(len(known), -1)
         found |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
     drive, line, lag = (model.parameters[n] for n in ("drive", "regulator_line", "regulator_lag"))
-    told = {
+    common = {
         "told_radius": model.parameters["rotor"].radius,
         "told_drive_gain": drive.gain,
         "told_drive_offset": drive.offset,
@@ -162,7 +162,7 @@ def operators(
         "mind_freshness": 1.0,
         "operator_moment": exercise.start_moment,
     }
-    found |= {name: np.full(len(known), value) for name, value in told.items()}
+    found |= {name: np.full(len(known), value) for name, value in common.items()}
     if options.safety:
         found["guard_moment"] = np.full(len(known), exercise.start_moment)
         found["guard_pressure"] = line.gain * regulator + line.offset

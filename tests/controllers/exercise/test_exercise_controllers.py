@@ -15,7 +15,7 @@ def rmse(name, task, seed, **options):
     controller.reset(env.reference, env.station)
     ended, info = False, {}
     while not ended:
-        *_, over, done, info = env.step(env.action(controller.act(env.reading, env.time)))
+        *_, over, done, info = env.step(env.action(controller.act(env.measurement, env.time)))
         ended = over or done
     assert info["ended_by"] == ""
     return np.sqrt([env._engine.numbers(f"sum_{p.name}")[0] for p in env.task.protocol.phases])

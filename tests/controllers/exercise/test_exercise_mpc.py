@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from controllers import CONTROLLERS, ExerciseMPC
-from controllers.exercise.joint_prediction import Horizon, Joint, foreseen
-from controllers.exercise.leg_observer import Agitation, LegObserver, PressureObserver, leg_of
+from controllers.exercise.joint_prediction import Horizon, Joint, predicted
+from controllers.exercise.leg_observer import LegObserver, PressureObserver, ProcessNoise, leg_of
 from controllers.exercise.resistance import AWAY_PA
-from pma_gym.envs import PMAEnv, Reading
+from pma_gym.envs import Measurement, PMAEnv
 
 
 def rmse(name, task, seed, **options):
@@ -17,7 +17,7 @@ def rmse(name, task, seed, **options):
     controller.reset(env.reference, env.station)
     ended, info = False, {}
     while not ended:
-        voltage = controller.act(env.reading, env.time)
+        voltage = controller.act(env.measurement, env.time)
         assert 0.0 <= voltage <= 10.0
         *_, terminated, truncated, info = env.step(env.action(voltage))
         ended = terminated or truncated
@@ -64,31 +64,31 @@ def test_a_task_that_is_no_exercise_is_refused():
 
 
 def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(exercised):
-    observer = LegObserver(exercised, Agitation())
+    observer = LegObserver(exercised, ProcessNoise())
     radius = exercised.model.parameters["rotor"].radius
     load, moment = 250.0, 250.0 * radius
     wound = 0.4 * radius - load / exercised.model.parameters["cable"].stiffness
     for i in range(1000):
-        observer.see(Reading(exercised.period * i, wound, 0.4, load, exercised.pressure))
+        observer.update(Measurement(exercised.period * i, wound, 0.4, load, exercised.pressure))
     np.testing.assert_allclose(observer.state, [0.4, 0.0, moment, 0.0, 0.0], atol=1e-3)
 
 
 def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercised):
-    observer, (inertia, damping) = LegObserver(exercised, Agitation()), leg_of(exercised)
+    observer, (inertia, damping) = LegObserver(exercised, ProcessNoise()), leg_of(exercised)
     radius = exercised.model.parameters["rotor"].radius
     speed, moment = 0.3, damping * 0.3
     for i in range(1000):
         angle = speed * exercised.period * (i + 1)
-        observer.see(Reading(0.0, radius * angle, angle, 0.0, exercised.pressure))
+        observer.update(Measurement(0.0, radius * angle, angle, 0.0, exercised.pressure))
     assert inertia > 0.45
     np.testing.assert_allclose(observer.state[1:3], [speed, moment], rtol=1e-3)
 
 
 def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(exercised):
     for off, found in ((-5e3, -5e3), (-200e3, -AWAY_PA)):
-        observer = PressureObserver(exercised, Agitation())
+        observer = PressureObserver(exercised, ProcessNoise())
         for _ in range(500):
-            observer.see(300e3 + off, 300e3)
+            observer.update(300e3 + off, 300e3)
         assert observer.offset == pytest.approx(found, abs=1.0)
 
 
@@ -96,13 +96,13 @@ def test_what_is_foreseen_is_what_the_equations_give():
     joint = Joint(0.45, 1.0, 0.055, 0.3, 2.5, stiffness=9.0, muscle=0.7)
     horizon = Horizon(0.01, 2, 10, 0)
     outputs = np.eye(6)[:1]
-    state, drift, command = foreseen(joint, outputs, horizon)
+    state, drift, command = predicted(joint, outputs, horizon)
     # A push held for good comes to rest where the two stiffnesses bear it.
     long = Horizon(0.01, 10, 60, 0)
-    rest = foreseen(joint, outputs, long)[1][0, -1].sum()
+    rest = predicted(joint, outputs, long)[1][0, -1].sum()
     assert rest == pytest.approx(1.0 / (joint.stiffness + joint.operator), rel=1e-3)
     # A pressure's moment acts against it, and no less in the end.
-    held = foreseen(joint, outputs, long)[2][0, -1].sum()
+    held = predicted(joint, outputs, long)[2][0, -1].sum()
     assert held == pytest.approx(-rest, rel=1e-3)
     assert state.shape == (1, 10, 6) and drift.shape == command.shape == (1, 10, 20)
     assert np.all(drift[0, 0, 2:] == 0.0)

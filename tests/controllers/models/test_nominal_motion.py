@@ -10,7 +10,7 @@ import pytest
 from controllers.models.local_model import SENSORS, step_response
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.operating_range import rest_voltages
-from pma_gym.envs import PMAEnv, Station
+from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.linear import linearize
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -18,7 +18,9 @@ from pma_gym.tasks import EVERY_TASK
 
 
 def station_of(task="displacement", pressure_kpa=300.0, model="station", rate=100.0, **delays):
-    return Station(load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays)
+    return StationInfo(
+        load_model(model), EVERY_TASK[task], 1e3 * pressure_kpa, 1.0 / rate, **delays
+    )
 
 
 def motion_of(*args, **kwargs):
@@ -26,7 +28,7 @@ def motion_of(*args, **kwargs):
     return nominal_motion(where.task.protocol.at, where)
 
 
-def full_response(where: Station, position: float, steps: int) -> np.ndarray:
+def full_response(where: StationInfo, position: float, steps: int) -> np.ndarray:
     """Measured position after 1, 2... periods of 1 V, with all states of the plant."""
     plant, quantity = Plant(where.model), where.task.protocol.quantity
     rest = plant.settle(0.0, pressure=where.pressure).zero_contraction
@@ -102,10 +104,10 @@ def test_the_nominal_station_reads_what_is_foreseen():
         env.reset(seed=0)
         motion = nominal_motion(env.reference, env.station)
         for _ in range(200):
-            said = env.station.position(env.reading)
-            assert said == pytest.approx(motion.foreseen(env.time), abs=2e-6)
-            turned = motion.foreseen_rotation(env.time)
-            assert env.reading.rotation == pytest.approx(turned, abs=1e-4)
+            said = env.station.position(env.measurement)
+            assert said == pytest.approx(motion.predicted(env.time), abs=2e-6)
+            turned = motion.predicted_rotation(env.time)
+            assert env.measurement.rotation == pytest.approx(turned, abs=1e-4)
             env.step(env.action(motion.command(env.time)))
 
 
@@ -133,7 +135,7 @@ def test_another_reference_is_followed_although_the_task_has_its_own():
     where = station_of("displacement", 300)
     slow = nominal_motion(lambda time: 2e-3 * time, where)
     assert slow.planned(2.5) == pytest.approx(5e-3, abs=1e-12)
-    assert slow.foreseen(4.0) == pytest.approx(8e-3, abs=2e-5)
+    assert slow.predicted(4.0) == pytest.approx(8e-3, abs=2e-5)
 
 
 @pytest.mark.parametrize("task", ["displacement_steps", "rotation_steps"])

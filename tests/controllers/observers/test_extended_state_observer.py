@@ -1,4 +1,5 @@
-"""Lags and dead time against exact responses; the observer against the plant that it assumes."""
+"""LagDeadTimeModel and dead time against exact responses; the observer against the plant that it
+assumes."""
 
 import math
 from dataclasses import replace
@@ -7,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from controllers.models.lag_model import Lags, lags_of
+from controllers.models.lag_model import LagDeadTimeModel, lag_dead_time_model
 from controllers.models.local_model import LocalModel
 from controllers.models.nominal_motion import nominal_motion
-from controllers.observers.extended_state_observer import LagObserver, place_of, placed
+from controllers.observers.extended_state_observer import ExtendedStateObserver, place_of, placed
 from pma_gym.tasks import ISOTONIC
 
 PERIOD = 0.01
@@ -29,7 +30,7 @@ def sampled(gain, constants, period=PERIOD):
 
 
 def test_one_lag_is_found_exactly():
-    lags = lags_of(sampled(8e-3, [0.05]), PERIOD, 1)
+    lags = lag_dead_time_model(sampled(8e-3, [0.05]), PERIOD, 1)
     assert lags.gain == 8e-3
     assert lags.constants == pytest.approx([0.05], rel=1e-9)
     # The mean of a held response is off by T^2 / 12 tau of the lag's own.
@@ -38,19 +39,19 @@ def test_one_lag_is_found_exactly():
 
 def test_small_lags_are_dead_time():
     small = [0.004, 0.002]
-    lags = lags_of(sampled(8e-3, [*small, 0.05]), PERIOD, 1)
+    lags = lag_dead_time_model(sampled(8e-3, [*small, 0.05]), PERIOD, 1)
     assert lags.constants == pytest.approx([0.05], rel=1e-6)
     assert lags.dead_time == pytest.approx(sum(small), abs=3e-4)
 
 
 def test_two_lags_are_found():
-    lags = lags_of(sampled(8e-3, [0.045, 0.06]), PERIOD, 2)
+    lags = lag_dead_time_model(sampled(8e-3, [0.045, 0.06]), PERIOD, 2)
     assert lags.constants == pytest.approx([0.06, 0.045], rel=1e-6)
 
 
 @pytest.mark.parametrize("constants", [(0.05,), (0.06, 0.045)])
 def test_poles_are_placed(constants):
-    place = place_of(Lags(8e-3, constants, 0.004), PERIOD, 0.02, pole=0.6)
+    place = place_of(LagDeadTimeModel(8e-3, constants, 0.004), PERIOD, 0.02, pole=0.6)
     n = len(constants)
     kept = np.eye(n + 2) - np.outer(place.correction, np.eye(n + 2)[0])
     # Poles of one place are ill-conditioned: rounding moves four of them by its fourth root.
@@ -83,12 +84,12 @@ def simulated(lags, late, voltages, disturbance):
 @pytest.mark.parametrize("constants", [(0.05,), (0.06, 0.045)])
 def test_observer_foresees_a_plant_of_its_own_kind(constants, station, reading):
     """Dead time 3.7 ms, commands 20 ms late, together 2.37 periods; d begins at 0.2 V."""
-    lags, delay, slope = Lags(8e-3, constants, 0.0037), 0.02, 0.3
+    lags, delay, slope = LagDeadTimeModel(8e-3, constants, 0.0037), 0.02, 0.3
     late = round((lags.dead_time + delay) / PERIOD * PARTS)
     voltages = np.random.default_rng(0).normal(0.0, 0.1, 60)
     # x is driven as soon as a voltage is sent and seen `late` parts later, or the other way round.
     truth = simulated(lags, 0, voltages, (0.2, slope))
-    observer = LagObserver(nominal_motion(lambda time: 0.0, station()), 1.0)
+    observer = ExtendedStateObserver(nominal_motion(lambda time: 0.0, station()), 1.0)
     observer.places = [place_of(lags, PERIOD, delay, pole=0.5)] * len(observer.places)
     observer._estimate = np.zeros(len(constants) + 2)
     observer._sent = np.zeros(observer.places[0].since + 1)
@@ -96,16 +97,16 @@ def test_observer_foresees_a_plant_of_its_own_kind(constants, station, reading):
     observer._loose = -math.inf
     for k, voltage in enumerate(voltages):
         heard = truth[k * PARTS - late][0] if k * PARTS >= late else 0.0
-        foreseen = observer.see(reading(extension=heard), k * PERIOD)
+        predicted = observer.update(reading(extension=heard), k * PERIOD)
         observer.send(voltage)
-    assert foreseen == pytest.approx(truth[(len(voltages) - 1) * PARTS], rel=1e-4, abs=1e-7)
-    assert foreseen[-2] == pytest.approx(0.2 + slope * (len(voltages) - 1) * PERIOD, rel=1e-5)
+    assert predicted == pytest.approx(truth[(len(voltages) - 1) * PARTS], rel=1e-4, abs=1e-7)
+    assert predicted[-2] == pytest.approx(0.2 + slope * (len(voltages) - 1) * PERIOD, rel=1e-5)
 
 
 def test_regulator_has_two_lags(station):
     task = ISOTONIC["isotonic"]
     given = replace(station(pressure_kpa=250.0), task=task)
-    observer = LagObserver(nominal_motion(task.protocol.at, given), 0.5)
+    observer = ExtendedStateObserver(nominal_motion(task.protocol.at, given), 0.5)
     assert observer.order == 2
     regulator, muscle = observer.places[0].lags.constants
     # tau_P 0.0554 s, its mean with venting 0.0586 s; B / K of the muscle about 0.05 s.

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from controllers.models.voltage import nominal_offset
-from controllers.policies.action_mapping import Form
-from controllers.policies.adapter import Pilot
-from controllers.policies.observation_spec import View
-from pma_gym.envs import PMAEnv, Reading, Station
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
+from pma_gym.envs import Measurement, PMAEnv, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import named_task
 
@@ -27,32 +27,32 @@ def test_the_environments_view_is_the_environments_observation(case):
     task, options = OBSERVED[case]
     env = PMAEnv(task, **RATE, **options)
     observation, _ = env.reset(seed=2)
-    view = View("environment", options.get("preview", 0), options.get("history", 0))
-    pilot = Pilot(view, Form("increment", 0.5))
+    view = ObservationSpec("environment", options.get("preview", 0), options.get("history", 0))
+    pilot = PolicyAdapter(view, ActionMapping("increment", 0.5))
     pilot.reset(env.reference, env.station)
     # A regulator's first action is where it rests, as the environment says.
-    np.testing.assert_array_equal(pilot.see(env.reading, env.time), observation)
+    np.testing.assert_array_equal(pilot.update(env.measurement, env.time), observation)
     ended = False
     actions = iter(np.random.default_rng(2).uniform(-1.0, 1.2, 1000))
     while not ended:
         volts = pilot.volts(next(actions))
         observation, _, terminated, truncated, _ = env.step(env.action(volts))
         ended = terminated or truncated
-        np.testing.assert_array_equal(pilot.see(env.reading, env.time), observation)
+        np.testing.assert_array_equal(pilot.update(env.measurement, env.time), observation)
 
 
 # -- tracking, by hand -----------------------------------------------------------------------------
 
 
 def station_of(task="displacement", late=(0.0, 0.0)):
-    return Station(load_model("station"), named_task(task), 300e3, 0.1, *late)
+    return StationInfo(load_model("station"), named_task(task), 300e3, 0.1, *late)
 
 
 def seen(pilot, station):
     """Entries of the pilot's next view by name, for a reading at a time."""
 
     def by_name(reading, time):
-        entries = pilot.see(reading, time).tolist()
+        entries = pilot.update(reading, time).tolist()
         names = [name for name, _ in pilot.view.rows(station, pilot.form.base)]
         assert len(names) == len(entries)
         return dict(zip(names, entries, strict=True))
@@ -69,10 +69,10 @@ def test_every_tracking_entry_says_what_the_table_says():
     station = station_of()
     drive, radius = (station.model.parameters[name] for name in ("drive", "rotor"))
     radius = radius.radius
-    pilot = Pilot(View("tracking", 2, 1), Form("increment", 0.5))
+    pilot = PolicyAdapter(ObservationSpec("tracking", 2, 1), ActionMapping("increment", 0.5))
     pilot.reset(line, station)
     see = seen(pilot, station)
-    first = see(Reading(0.0, 0.1e-3, 0.0, 20.0, 305e3), 0.0)
+    first = see(Measurement(0.0, 0.1e-3, 0.0, 20.0, 305e3), 0.0)
     fine = 0.25e-3
     assert first == pytest.approx(
         {
@@ -101,7 +101,7 @@ def test_every_tracking_entry_says_what_the_table_says():
         volts = pilot.volts(1.0)
     assert volts == pytest.approx(1.95)
     pulled = max(drive.gain * 1.95 + drive.offset, 0.0)
-    second = see(Reading(0.4, 0.3e-3, 0.2e-3 / radius, pulled - 10.0, 300e3), 0.4)
+    second = see(Measurement(0.4, 0.3e-3, 0.2e-3 / radius, pulled - 10.0, 300e3), 0.4)
     assert second["reference now"] == pytest.approx(0.4e-3 / 25e-3)
     assert second["reference less measured position"] == pytest.approx(0.1e-3 / fine, abs=1e-6)
     assert second["reference less position by the other sensor"] == pytest.approx(0.2e-3 / fine)
@@ -114,7 +114,7 @@ def test_every_tracking_entry_says_what_the_table_says():
 def test_late_loops_compare_what_belongs_together():
     station = station_of(late=(0.1, 0.2))
     drive = station.model.parameters["drive"]
-    pilot = Pilot(View("tracking", 0, 0), Form("direct", 5.0))
+    pilot = PolicyAdapter(ObservationSpec("tracking", 0, 0), ActionMapping("direct", 5.0))
     pilot.reset(line, station)
     see = seen(pilot, station)
     commanded = []
@@ -122,7 +122,7 @@ def test_late_loops_compare_what_belongs_together():
         taken = max(step - 2, 0)
         # Of a reading taken two steps ago, before which a command takes one to arrive.
         asked = drive.gain * commanded[step - 4] + drive.offset if step >= 4 else 0.0
-        now = see(Reading(0.1 * taken, 1e-4 * taken, 0.0, max(asked, 0.0), 300e3), 0.1 * step)
+        now = see(Measurement(0.1 * taken, 1e-4 * taken, 0.0, max(asked, 0.0), 300e3), 0.1 * step)
         assert now["reference less measured position"] == pytest.approx(0.0, abs=1e-6)
         assert now["reference now"] == pytest.approx(1e-4 * step / 25e-3)
         load = now["load less what the nominal drive is asked for"]
@@ -132,9 +132,9 @@ def test_late_loops_compare_what_belongs_together():
 
 def test_entries_are_held_to_five():
     station = station_of()
-    pilot = Pilot(View("tracking", 0, 0), Form("direct", 5.0))
+    pilot = PolicyAdapter(ObservationSpec("tracking", 0, 0), ActionMapping("direct", 5.0))
     pilot.reset(line, station)
-    entries = pilot.see(Reading(0.0, -1.0, 1.0, 1e4, 0.0), 0.0)
+    entries = pilot.update(Measurement(0.0, -1.0, 1.0, 1e4, 0.0), 0.0)
     assert entries.dtype == np.float32 and set(np.abs(entries[2:6])) == {5.0}
 
 
@@ -154,15 +154,15 @@ class Base:
 
 
 FORMS = {
-    "direct": (Form("direct", 5.0), [(-1.0, 0.0), (0.0, 5.0), (0.5, 7.5), (9.0, 10.0)]),
+    "direct": (ActionMapping("direct", 5.0), [(-1.0, 0.0), (0.0, 5.0), (0.5, 7.5), (9.0, 10.0)]),
     "increment": (
-        Form("increment", 2.0),
+        ActionMapping("increment", 2.0),
         # It does not wind up beyond the ends.
         [(-1.0, 0.0), (0.5, 1.0), (1.0, 3.0), (7.0, 5.0), (1.0, 7.0), (1.0, 9.0)]
         + [(1.0, 10.0), (1.0, 10.0), (-0.5, 9.0)],
     ),
     "residual": (
-        Form("residual", 3.0, "pid"),
+        ActionMapping("residual", 3.0, "pid"),
         [(0.0, 4.0), (1.0, 7.0), (-1.0, 1.0), (-5.0, 1.0), (0.5, 5.5)],
     ),
 }
@@ -171,28 +171,32 @@ FORMS = {
 @pytest.mark.parametrize("kind", FORMS)
 def test_actions_become_volts(kind):
     form, pairs = FORMS[kind]
-    pilot = Pilot(View("tracking", 0, 1), form, Base() if kind == "residual" else None)
+    pilot = PolicyAdapter(
+        ObservationSpec("tracking", 0, 1), form, Base() if kind == "residual" else None
+    )
     pilot.reset(line, station_of())
     for step, (action, volts) in enumerate(pairs):
-        pilot.see(Reading(0.1 * step, 0.0, 0.0, 0.0, 300e3), 0.1 * step)
+        pilot.update(Measurement(0.1 * step, 0.0, 0.0, 0.0, 300e3), 0.1 * step)
         assert pilot.volts(action) == pytest.approx(volts, abs=1e-12)
 
 
 def test_a_residuals_sum_is_held_to_the_range():
-    pilot = Pilot(View("tracking", 0, 0), Form("residual", 10.0, "pid"), Base())
+    pilot = PolicyAdapter(
+        ObservationSpec("tracking", 0, 0), ActionMapping("residual", 10.0, "pid"), Base()
+    )
     pilot.reset(line, station_of())
-    reading = Reading(0.0, 0.0, 0.0, 0.0, 300e3)
-    pilot.see(reading, 0.0)
+    reading = Measurement(0.0, 0.0, 0.0, 0.0, 300e3)
+    pilot.update(reading, 0.0)
     assert pilot.volts(1.0) == 10.0
-    assert pilot.see(reading, 0.1)[-1] == pytest.approx(-5.0)
+    assert pilot.update(reading, 0.1)[-1] == pytest.approx(-5.0)
     assert pilot.volts(-1.0) == 0.0
 
 
 def test_a_regulators_first_voltage_holds_the_pressure():
     station = station_of("isotonic")
-    pilot = Pilot(View("tracking", 0, 0), Form("increment", 0.5))
+    pilot = PolicyAdapter(ObservationSpec("tracking", 0, 0), ActionMapping("increment", 0.5))
     pilot.reset(line, station)
-    pilot.see(Reading(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)
+    pilot.update(Measurement(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)
     rest = nominal_offset(station)
     assert 1.0 < rest < 9.0 and pilot.volts(0.0) == pytest.approx(rest)
 
@@ -202,9 +206,9 @@ def test_a_regulators_first_voltage_holds_the_pressure():
 
 @pytest.mark.parametrize("action", [math.nan, math.inf, -math.inf])
 def test_an_action_that_is_no_number_is_refused_and_leaves_the_pilot(action):
-    pilot = Pilot(View("tracking", 0, 1), Form("increment", 0.5))
+    pilot = PolicyAdapter(ObservationSpec("tracking", 0, 1), ActionMapping("increment", 0.5))
     pilot.reset(line, station_of())
-    pilot.see(Reading(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)
+    pilot.update(Measurement(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)
     with pytest.raises(ValueError, match=rf"action must be a finite number, got {action}"):
         pilot.volts(action)
     assert pilot.volts(1.0) == pytest.approx(0.5)
@@ -213,9 +217,9 @@ def test_an_action_that_is_no_number_is_refused_and_leaves_the_pilot(action):
 @pytest.mark.parametrize("kind", ["tracking", "environment"])
 @pytest.mark.parametrize("part", ["extension", "rotation", "load", "pressure"])
 def test_a_reading_that_is_no_number_is_named(part, kind):
-    pilot = Pilot(View(kind, 0, 1), Form("increment", 0.5))
+    pilot = PolicyAdapter(ObservationSpec(kind, 0, 1), ActionMapping("increment", 0.5))
     pilot.reset(line, station_of())
-    bad = Reading(0.0, 0.0, 0.0, 0.0, 300e3)._replace(**{part: math.nan})
+    bad = Measurement(0.0, 0.0, 0.0, 0.0, 300e3)._replace(**{part: math.nan})
     with pytest.raises(ValueError, match=f"{part} is nan.*check the sensor"):
-        pilot.see(bad, 0.0)
-    assert np.isfinite(pilot.see(Reading(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)).all()
+        pilot.update(bad, 0.0)
+    assert np.isfinite(pilot.update(Measurement(0.0, 0.0, 0.0, 0.0, 300e3), 0.0)).all()

@@ -14,10 +14,10 @@ pytest.importorskip("safetensors")
 
 from safetensors.numpy import load, save
 
-from controllers.policies.action_mapping import Form
+from controllers.policies.action_mapping import ActionMapping
 from controllers.policies.document import KEYS
 from controllers.policies.network import Network
-from controllers.policies.observation_spec import View
+from controllers.policies.observation_spec import ObservationSpec
 from controllers.policies.policy_file import (
     PolicyError,
     load_policy_file,
@@ -54,9 +54,9 @@ def rewrite(pair, change, tensors=None):
 @pytest.mark.parametrize(
     ("view", "form"),
     [
-        (View("environment", 2, 3), Form("direct", 5.0)),
-        (View("tracking", 6, 6), Form("increment", 0.5)),
-        (View("tracking", 1, 0), Form("residual", 1.0, "pid")),
+        (ObservationSpec("environment", 2, 3), ActionMapping("direct", 5.0)),
+        (ObservationSpec("tracking", 6, 6), ActionMapping("increment", 0.5)),
+        (ObservationSpec("tracking", 1, 0), ActionMapping("residual", 1.0, "pid")),
     ],
 )
 def test_what_is_written_comes_back(view, form, scaled, station, tmp_path):

@@ -3,11 +3,11 @@
 import pytest
 
 from controllers.models.voltage import nominal_offset
-from controllers.policies.action_mapping import Form
-from controllers.policies.adapter import Pilot
-from controllers.policies.observation_spec import View
-from controllers.policies.scales import heard_rows
-from pma_gym.envs import Reading, Station
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.adapter import PolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
+from controllers.policies.scales import delayed_rows
+from pma_gym.envs import Measurement, StationInfo
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import TASKS, named_task
 from pma_gym.units import SI_FACTORS
@@ -17,12 +17,12 @@ DEG = SI_FACTORS["deg"]
 
 def seen(task, reading, time):
     """Entries of a pilot's first view by name."""
-    station = Station(load_model("station"), named_task(task), 400e3, 0.01)
-    view = View("tracking", 1, 0)
-    pilot = Pilot(view, Form("increment", 0.5))
+    station = StationInfo(load_model("station"), named_task(task), 400e3, 0.01)
+    view = ObservationSpec("tracking", 1, 0)
+    pilot = PolicyAdapter(view, ActionMapping("increment", 0.5))
     pilot.reset(station.task.protocol.at, station)
     names = [name for name, _ in view.rows(station)]
-    entries = pilot.see(reading, time).tolist()
+    entries = pilot.update(reading, time).tolist()
     # The regulator rests where it holds the trial's pressure.
     assert pilot.volts(0.0) == pytest.approx(nominal_offset(station))
     return dict(zip(names, entries, strict=True))
@@ -30,7 +30,7 @@ def seen(task, reading, time):
 
 def test_an_exercise_of_one_speed_sees_both_angles_and_the_load():
     radius = load_model("station").parameters["rotor"].radius
-    reading = Reading(1.0, 18.9 * DEG * radius, 14.4 * DEG, 300.0, 350e3)
+    reading = Measurement(1.0, 18.9 * DEG * radius, 14.4 * DEG, 300.0, 350e3)
     found = seen("isokinetic_exercise", reading, 1.0)
     assert found["reference now"] == pytest.approx(0.2)
     # 18 deg/s for 10 ms is 0.18 deg.
@@ -44,7 +44,7 @@ def test_an_exercise_of_one_speed_sees_both_angles_and_the_load():
 @pytest.mark.parametrize("angle, prescribed", [(0.0, 4.0), (15.0, 6.0), (60.0, 9.0), (100.0, 7.5)])
 def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
     radius = load_model("station").parameters["rotor"].radius
-    reading = Reading(0.0, 0.0, angle * DEG, (prescribed + 0.72) / radius, 400e3)
+    reading = Measurement(0.0, 0.0, angle * DEG, (prescribed + 0.72) / radius, 400e3)
     found = seen("profile_exercise", reading, 0.0)
     # 4 % of the greatest moment, 9 N m, is 0.36 N m.
     assert found["prescribed less measured moment"] == pytest.approx(-2.0, abs=1e-5)
@@ -52,10 +52,10 @@ def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
 
 
 def test_units_stand_beside_the_names():
-    units = dict(heard_rows(named_task("isokinetic_exercise")))
+    units = dict(delayed_rows(named_task("isokinetic_exercise")))
     assert units["reference less measured position"] == "3.6 deg"
-    assert dict(heard_rows(TASKS["rotation"]))["reference less measured position"] == "0.9 deg"
+    assert dict(delayed_rows(TASKS["rotation"]))["reference less measured position"] == "0.9 deg"
     assert (
-        dict(heard_rows(named_task("isotonic_exercise")))["prescribed less measured moment"]
+        dict(delayed_rows(named_task("isotonic_exercise")))["prescribed less measured moment"]
         == "0.32 N m"
     )

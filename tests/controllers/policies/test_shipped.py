@@ -15,7 +15,7 @@ def driven(environment, controller, seed=7):
     controller.reset(environment.reference, environment.station)
     ended = False
     while not ended:
-        volts = controller.act(environment.reading, environment.time)
+        volts = controller.act(environment.measurement, environment.time)
         *_, terminated, truncated, info = environment.step(environment.action(volts))
         ended = terminated or truncated
     assert truncated

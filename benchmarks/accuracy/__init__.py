@@ -1,0 +1,1 @@
+"""How exact the simulation is: against scipy, and in limits that the equations approach."""

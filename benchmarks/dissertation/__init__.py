@@ -1,0 +1,1 @@
+"""The dissertation's figures, profiles and feed-forward voltages, recomputed."""

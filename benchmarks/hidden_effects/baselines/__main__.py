@@ -1,0 +1,73 @@
+"""`python -m benchmarks.hidden_effects.baselines`: diagnose drawn cases with every baseline."""
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from pma_gym.cli.options import StrictTyper
+from pma_gym.terminal import safe_streams
+
+# Each process computes on its own core.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+app = StrictTyper(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+
+Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+TRAINING_SEED = 7001
+"""Of the cases that the forest learns from; no set that is judged has it."""
+
+
+@app.command()
+def run(
+    cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
+    ways: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
+    jobs: Jobs = 1,
+    seed: Annotated[int, typer.Option(help="Of the ways' own chance.")] = 0,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Figures to a file.")] = None,
+) -> None:
+    """Ask the ways about every case that they have not answered, and print one table."""
+    import json
+
+    from benchmarks.hidden_effects.baselines import forest
+    from benchmarks.hidden_effects.baselines.answers import ask_all
+    from benchmarks.hidden_effects.baselines.comparison import compared, table
+    from benchmarks.hidden_effects.baselines.registry import WAYS
+    from pma_gym.files import replace_file
+
+    chosen = [name for name in ways.split(",") if name] or list(WAYS)
+    for name in chosen:
+        if name not in WAYS:
+            raise typer.BadParameter(f"{name!r} is none of {', '.join(WAYS)}", param_hint="--ways")
+    left_out = {name: WAYS[name].absence for name in chosen if WAYS[name].absence}
+    chosen = [name for name in chosen if name not in left_out]
+    if "random_forest" in chosen:
+        try:
+            forest.check_unseen(cases, forest.TABLE)
+        except (FileNotFoundError, ValueError) as error:
+            raise typer.BadParameter(str(error), param_hint="--cases") from None
+    ask_all(cases, chosen, jobs, seed)
+    document = compared(cases, chosen)
+    if json_file is not None:
+        text = json.dumps({"ways": document, "left_out": left_out}, indent=1) + "\n"
+        replace_file(json_file, text.encode())
+    typer.echo(table(document, left_out))
+
+
+@app.command()
+def train(
+    cases: Annotated[int, typer.Option(min=1, help="How many.")] = 150,
+    seed: Annotated[int, typer.Option(help="Of the cases.")] = TRAINING_SEED,
+    out: Annotated[Path | None, typer.Option(help="The table; the shipped one if none.")] = None,
+    jobs: Jobs = 1,
+) -> None:
+    """Add signatures of cases to the table that the forest is grown from."""
+    from benchmarks.hidden_effects.baselines import forest
+
+    forest.train(cases, seed, out or forest.TABLE, jobs)
+
+
+if __name__ == "__main__":
+    with safe_streams():
+        app()

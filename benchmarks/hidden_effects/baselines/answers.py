@@ -1,0 +1,97 @@
+"""Drawn cases through every way; an answer that is there is kept, so that a run goes on."""
+
+import json
+import sys
+import time
+import warnings
+from collections.abc import Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from benchmarks.hidden_effects.baselines.registry import WAYS
+from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.files import replace_file
+
+
+@dataclass(frozen=True)
+class Question:
+    """One case for one way.
+
+    Attributes:
+        way: name of the way.
+        case: folder of the case's trials.
+        file: where the answer goes.
+    """
+
+    way: str
+    case: Path
+    file: Path
+
+
+def open_questions(folder: Path, ways: Sequence[str]) -> tuple[list[Question], int]:
+    """What has no answer yet in a folder that `draw` wrote, and how many questions there are."""
+    cases = sorted((folder / "cases").glob("case_*"))
+    every = [Question(way, case, answer_file(folder, way, case.name))
+             for case in cases for way in ways]  # fmt: skip
+    return [each for each in every if not each.file.is_file()], len(every)
+
+
+def answer_file(folder: Path, way: str, case: str) -> Path:
+    """Where a way's answer about a case is kept."""
+    return folder / "answers" / way / f"{case}.json"
+
+
+def ask_all(folder: Path, ways: Sequence[str], jobs: int, seed: int = 0) -> None:
+    """Ask every way about every case that it has not answered; answers go to folder/answers/WAY.
+
+    Args:
+        folder: what `draw` wrote.
+        ways: names of ways that are installed.
+        jobs: processes.
+        seed: of the ways' own chance.
+    """
+    missing, count = open_questions(folder, ways)
+    print(f"{count - len(missing)} of {count} answers are there already", file=sys.stderr)
+    for way in ways:
+        (folder / "answers" / way).mkdir(parents=True, exist_ok=True)
+    begun = time.monotonic()
+    if jobs == 1:
+        for done, question in enumerate(missing, 1):
+            _tell(done, len(missing), ask(question, seed), begun)
+        return
+    with ProcessPoolExecutor(jobs) as pool:
+        futures: list[Future[str]] = [pool.submit(ask, each, seed) for each in missing]
+        try:
+            for done, future in enumerate(as_completed(futures), 1):
+                _tell(done, len(missing), future.result(), begun)
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+
+
+def ask(question: Question, seed: int) -> str:
+    """Ask, keep the answer with the seconds that it took, and say what came."""
+    begun = time.perf_counter()
+    found: dict[str, Any]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            found = dict(WAYS[question.way].ask(read_dataset(question.case), seed, 1))
+    except Exception as error:
+        # A way that fails has no answer, and that counts.
+        found = {"error": f"{type(error).__name__}: {error}"}
+    found["seconds"] = round(time.perf_counter() - begun, 3)
+    replace_file(question.file, (json.dumps(found, indent=1) + "\n").encode())
+    return f"{question.case.name} {question.way}: {_said(found)}"
+
+
+def _said(found: dict[str, Any]) -> str:
+    names = "+".join(each["name"] for each in found.get("effects", ()))
+    return names or found.get("verdict") or found["error"]
+
+
+def _tell(done: int, count: int, words: str, begun: float) -> None:
+    took = time.monotonic() - begun
+    print(f"{done}/{count}  {words}  ({took:.0f} s)", file=sys.stderr, flush=True)

@@ -1,0 +1,113 @@
+"""Plain BIC stepwise: effects are added while Schwarz's criterion falls, and that is all.
+
+Residuals are taken for white noise of the variance that they have, which a wrong model's residuals
+are not: they resemble themselves for a second, and count as hundreds of independent readings.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.hidden_effects.baselines.preparation import (
+    Prepared,
+    answer,
+    estimate,
+    moved,
+    noise_of,
+    prepare,
+)
+from pma_gym.data.datasets.dataset import Dataset
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.screening.residuals import left_over
+from pma_gym.discovery.screening.score_test import Baseline, beginnings, look
+from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS, NEAR, TRIED
+
+Array = NDArray[np.float64]
+
+
+def bic(squares: Sequence[float], counts: Sequence[int], parameters: int) -> float:
+    """Schwarz's criterion of Gaussian residuals, the variance of each signal unknown.
+
+        BIC = sum of n log(RSS / n) over signals + k log(sum of n)
+
+    Args:
+        squares: sums of squared residuals RSS of each signal.
+        counts: how many residuals n each has; one without any does not count.
+        parameters: how many were fitted, k.
+    Source:
+        Schwarz 1978, Annals of Statistics 6, 461-464.
+    """
+    pairs = [(square, n) for square, n in zip(squares, counts, strict=True) if n]
+    fit = sum(n * np.log(square / n) for square, n in pairs)
+    return float(fit + parameters * np.log(sum(n for _, n in pairs)))
+
+
+def bic_stepwise(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
+    """Effects of the catalogue, added one by one while the criterion falls."""
+    ready = prepare(dataset, jobs)
+    bench = noise_of(ready.left, ready.bench)
+    best = bench.fit(ready.refitted.model) or ready.refitted
+    least = _bic_of(bench, best, (), bench.own.free)
+    chosen: tuple[Suspect, ...] = ()
+    while len(chosen) < MOST_EFFECTS:
+        found = _tried(bench, best, chosen, ready, seed)
+        added, fit, value = min(found, key=lambda each: each[2], default=(None, best, np.inf))
+        if added is None or value >= least:
+            break
+        chosen, best, least = (*chosen, added), fit, value
+    parameters = moved(bench, best)
+    effects = [
+        {
+            "name": each.name,
+            "parameters": {path.partition(".")[2]: estimate(best, path) for path in each.paths
+                           if path in best.paths},
+        }
+        for each in chosen
+    ]  # fmt: skip
+    if chosen:
+        return answer("effect", effects, parameters, bic=least)
+    return answer("parameters" if _off(bench, best, least) else "agrees", (), parameters, bic=least)
+
+
+def _tried(
+    bench: Bench, best: Fitted, chosen: tuple[Suspect, ...], ready: Prepared, seed: int
+) -> list[tuple[Suspect, Fitted, float]]:
+    """The suspects that look best beside a fit, each fitted, with its criterion."""
+    baseline = Baseline.at(bench.evidence(best.model, chosen), best.values, best.steps)
+    plain = bench.given.replace({path: best.estimate(path)[0] for path in bench.own.free})
+    taken = {each.name for each in chosen}
+    rest = [each for each in ready.catalogue if each.name not in taken]
+    looks = look(baseline, rest, seed, lambda each: bench.probed(plain, each))
+    looks.sort(key=lambda each: -each.gain)
+    found = []
+    worth = [each for each in looks if each.starts and each.gain > NEAR * looks[0].gain]
+    for each in worth[:TRIED]:
+        begun = beginnings(baseline, bench.probed(plain, each.suspect), each)[0]
+        extra = (*chosen, each.suspect)
+        fit = bench.fit(best.model, extra, {each.suspect.name: begun})
+        if fit is not None:
+            found.append((each.suspect, fit, _bic_of(bench, fit, extra, fit.paths)))
+    return found
+
+
+def _bic_of(
+    bench: Bench, fit: Fitted, extra: Sequence[Suspect], fitted: Sequence[str]
+) -> float:  # fmt: skip
+    evidence = bench.evidence(fit.model, extra)
+    readings = evidence.readings(fit.values)
+    if readings is None:
+        return float("inf")
+    left = left_over(evidence, readings)
+    known = [np.concatenate([part[c][np.isfinite(part[c])] for part in left]) for c in range(4)]
+    return bic([float(each @ each) for each in known], [len(each) for each in known], len(fitted))
+
+
+def _off(bench: Bench, fit: Fitted, value: float) -> bool:
+    """Whether refitted parameters, which count, are better than those that were given."""
+    given = replace(fit, model=bench.given, values=values(bench.given, bench.own.free))
+    return value < _bic_of(bench, given, (), ())

@@ -1,0 +1,1 @@
+"""Diagnosing cases and comparing each answer with the truth."""

@@ -1,0 +1,99 @@
+"""What is kept of a case: the truth, the essentials of the answer, how long it took."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from benchmarks.files import write_text
+from benchmarks.hidden_effects.generation.files import case_name
+from benchmarks.runner.damaged_results import say_damaged
+from pma_gym.document_shape import check_shape, shape_of
+from pma_gym.documents import read_json
+
+CANDIDATES = 6
+"""How many of the likeliest candidates are kept."""
+
+ESSENTIALS = ("verdict", "sentence", "effects", "gap", "not_identifiable", "blind", "warnings")
+"""What is kept whole of a `diagnosis.json`."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """A case that was drawn and judged.
+
+    Attributes:
+        number: of the case in its set.
+        truth: what was hidden.
+        answer: essentials of the diagnosis; None where it gave none.
+        message: why it gave none.
+        rounds: what came of experiments that followed, by who chose them.
+        seconds: to draw it, to read and to diagnose it.
+        code: fingerprint of the code that made it.
+        most_rounds: how many experiments could follow.
+    """
+
+    number: int
+    truth: dict[str, Any]
+    answer: dict[str, Any] | None
+    message: str = ""
+    rounds: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
+    seconds: dict[str, float] = field(default_factory=dict)
+    code: str = ""
+    most_rounds: int = 0
+
+
+_SHAPE = shape_of(Record)
+
+
+def essentials(document: Mapping[str, Any]) -> dict[str, Any]:
+    """What is kept of a `diagnosis.json`: parameters that moved, the likeliest candidates."""
+    moved = {path: each for path, each in document["parameters"].items() if each["significant"]}
+    return {name: document[name] for name in ESSENTIALS} | {
+        "parameters": moved,
+        "candidates": document["candidates"][:CANDIDATES],
+        "next_experiment": document["next_experiment"],
+    }
+
+
+def write(record: Record, folder: Path) -> None:
+    """Keep a record in a folder; its file appears whole or not at all."""
+    text = json.dumps(asdict(record), indent=1, allow_nan=False) + "\n"
+    write_text(path_of(folder, record.number), text)
+
+
+def read(folder: Path, count: int | None = None) -> list[Record]:
+    """Records of a folder, cases 1 to `count`, all if not given, by number."""
+    if count is None:
+        paths = sorted((folder / "cases").glob("case_*.json"))
+    else:
+        paths = [path_of(folder, number) for number in range(1, count + 1)]
+    found, damaged = list[Record](), list[str]()
+    for path in paths:
+        if not path.is_file():
+            continue
+        try:
+            entry = read_json(path, "journal_mib", own=True)
+            check_shape(entry, _SHAPE)
+            if path != path_of(folder, entry["number"]):
+                raise ValueError(f"it is of case {entry['number']}")
+            found.append(Record(**entry))
+        except (ValueError, TypeError) as error:
+            why = f"{error}".replace(f"{path} ", "").removesuffix("; write it anew")
+            damaged.append(f"{path.name}: {why}")
+    say_lost(folder, damaged)
+    return found
+
+
+def say_lost(folder: Path, damaged: Sequence[str]) -> None:
+    """Say once which records of a folder are damaged, if any are."""
+    if damaged:
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        then = "those cases are computed anew, the others stay"
+        say_damaged(folder / "cases", f"{damaged[0]}{more}", then)
+
+
+def path_of(folder: Path, number: int) -> Path:
+    """File of a case's record."""
+    return folder / "cases" / f"{case_name(number)}.json"

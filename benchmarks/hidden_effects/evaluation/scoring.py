@@ -1,0 +1,290 @@
+"""Counts over cases: rates with Wilson's interval and their targets, gaps, sizes, confusions."""
+
+import json
+import math
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hidden_effects.evaluation.records import Record
+from benchmarks.hidden_effects.evaluation.tables import table
+from benchmarks.hidden_effects.evaluation.targets import (
+    COVERAGE,
+    GAP_BLOCKS,
+    GAP_MEDIAN,
+    GAP_TENTH,
+    RATES,
+    SIZE_ERROR,
+    Target,
+)
+from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
+
+Z = 1.959964
+"""Of a 95 % interval."""
+
+
+SIZES = (0.0, 0.25, 0.4, 0.7, 1.0, 1.5, 2.5, 100.0)
+"""Edges of the ranges of r that rates are counted in."""
+
+LEAST_ROUNDS = 2
+"""Rounds that a mean counts to, at least: a way that ended before did not settle later."""
+
+
+def score(folder: Path) -> str:
+    """Tables of what `draw` and `judge` left in a folder; as JSON in `folder/score.json`."""
+    document = count(read(folder))
+    (folder / "score.json").write_text(json.dumps(document, indent=1) + "\n", "utf-8")
+    return table(document)
+
+
+def read(folder: Path) -> list[Outcome]:
+    """Outcomes of all cases that `draw` wrote to a folder."""
+    outcomes = []
+    for case in sorted((folder / "cases").glob("case_*")):
+        answer = folder / "answers" / case.name
+        truth = json.loads((folder / "truth" / f"{case.name}.json").read_text("utf-8"))
+        if not (answer / "diagnosis.json").is_file():
+            outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
+            continue
+        outcome = compare(truth, json.loads((answer / "diagnosis.json").read_text("utf-8")))
+        if (answer / "seconds.txt").is_file():
+            outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
+        outcomes.append(outcome)
+    return outcomes
+
+
+def outcome_of(record: Record) -> Outcome:
+    """The outcome of a case that the job kept."""
+    if record.answer is None:
+        outcome = unanswered(record.truth, record.message)
+    else:
+        outcome = compare(record.truth, record.answer)
+    outcome.number = record.number
+    outcome.rounds = {
+        way: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
+        for way, rounds in record.rounds.items()
+    }
+    outcome.seconds = record.seconds.get("diagnose")
+    return outcome
+
+
+def wilson(hits: int, n: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a rate.
+
+    >>> [round(end, 3) for end in wilson(0, 400)]
+    [0.0, 0.01]
+    """
+    if n == 0:
+        return 0.0, 1.0
+    share, square = hits / n, Z * Z / n
+    middle = (share + 0.5 * square) / (1.0 + square)
+    half = Z / (1.0 + square) * math.sqrt(share * (1.0 - share) / n + square / (4.0 * n))
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def rate(hits: Iterable[bool | None], target: Target | None = None) -> dict[str, Any]:
+    """How many of those that count hit, and whether that meets a target; None does not count."""
+    counted = [hit for hit in hits if hit is not None]
+    low, high = wilson(sum(counted), len(counted))
+    share = sum(counted) / len(counted) if counted else None
+    figure = {"rate": share, "low": low, "high": high, "hits": sum(counted), "n": len(counted)}
+    return figure | _beside(share, target)
+
+
+def count(outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    """All figures by block."""
+    names = dict.fromkeys(outcome.block for outcome in outcomes)
+    return {"blocks": {name: _block(name, outcomes) for name in names}}
+
+
+def _block(name: str, outcomes: Sequence[Outcome]) -> dict[str, Any]:
+    some = [outcome for outcome in outcomes if outcome.block == name]
+    rates = RATES[name]
+    return {
+        "n": len(some),
+        "rates": {each.name: rate(map(each.hit, some), each.target) for each in rates},
+        "verdicts": dict(Counter(outcome.verdict for outcome in some).most_common()),
+        "confusion": _confusion(some),
+        "by_effect": _by_effect(some),
+        "by_size": _by_size(some),
+        "gap_closed": _gap_closed(name, some),
+        "sizes": _sizes(some),
+        "seconds": _seconds(some),
+        "by_kind": _by_kind(some),
+        "rounds": _rounds(some),
+        "by_parameter_off": _by_parameter_off(some),
+        "misses": [_miss(outcome) for outcome in some if _missed(outcome)],
+        "unanswered": [_miss(outcome) for outcome in some if not outcome.answered],
+    }
+
+
+def _beside(value: float | None, target: Target | None) -> dict[str, Any]:
+    """A target and whether it is met; nothing where there is none."""
+    if target is None:
+        return {}
+    return {"target": target.words(), "met": None if value is None else target.met(value)}
+
+
+def _amount(value: float | None, target: Target | None) -> dict[str, Any]:
+    return {"value": value} | _beside(value, target)
+
+
+def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
+    """How often each hidden thing was said to be what, verdicts that name nothing among it."""
+    found: dict[str, Counter[str]] = {}
+    for outcome in some:
+        found.setdefault(outcome.hidden, Counter())[outcome.said] += 1
+    return {name: dict(said.most_common()) for name, said in sorted(found.items())}
+
+
+def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
+    """How often effects alone were named, named or their group, and detected, by ranges of r.
+
+    Those that come in one size are left out.
+    """
+    alone = [o for o in some if len(o.truth) == 1 and o.ratio is not None and o.sized]
+    rows = []
+    for low, high in pairwise(SIZES):
+        those = [each for each in alone if low <= (each.ratio or 0.0) < high]
+        if those:
+            counted = {
+                "named": rate(each.right for each in those),
+                "named or its group": rate(each.near for each in those),
+                "detected": rate(each.detected for each in those),
+            }
+            rows.append({"low": low, "high": high, **counted})
+    return rows
+
+
+def _by_effect(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How often each hidden effect was named, and named or its group."""
+    names = sorted({name for outcome in some for name in outcome.truth})
+    return {
+        name: {
+            "named": rate(name in o.named for o in some if name in o.truth),
+            "named or its group": rate(o.near or name in o.named for o in some if name in o.truth),
+            "detected": rate(o.detected for o in some if name in o.truth),
+        }
+        for name in names
+    }
+
+
+def _gap_closed(name: str, some: Sequence[Outcome]) -> dict[str, Any]:
+    closed = [share for outcome in some for share in outcome.closed]
+    wanted = name in GAP_BLOCKS
+    middle = float(np.median(closed)) if closed else None
+    tenth = float(np.percentile(closed, 10)) if closed else None
+    return {
+        "median": _amount(middle, GAP_MEDIAN if wanted else None),
+        "tenth_percentile": _amount(tenth, GAP_TENTH if wanted else None),
+        "n": len(closed),
+    }
+
+
+def _seconds(some: Sequence[Outcome]) -> dict[str, Any]:
+    seconds = [outcome.seconds for outcome in some if outcome.seconds is not None]
+    return {
+        "median": float(np.median(seconds)) if seconds else None,
+        "most": max(seconds, default=None),
+        "sum": sum(seconds),
+    }
+
+
+def _sizes(some: Sequence[Outcome]) -> dict[str, Any]:
+    """Errors and intervals of the sizes of those hidden effects that were named."""
+    errors: dict[str, list[float]] = {}
+    covered: dict[str, list[bool]] = {}
+    for outcome in some:
+        for path, error in outcome.size_errors.items():
+            errors.setdefault(path, []).append(error)
+            covered.setdefault(path, []).append(outcome.covered[path])
+    every = [error for each in errors.values() for error in each]
+    inside = [held for each in covered.values() for held in each]
+    return {
+        "median_error": _amount(float(np.median(every)) if every else None, SIZE_ERROR),
+        "covered": rate(inside, COVERAGE),
+        "by_parameter": {
+            path: {"median_error": float(np.median(each)), "covered": rate(covered[path])}
+            for path, each in sorted(errors.items())
+        },
+    }
+
+
+def _by_kind(some: Sequence[Outcome]) -> dict[str, Any]:
+    """What was said of each kind of data that excite too little, and how often `undecidable`."""
+    kinds = sorted({outcome.kind for outcome in some if outcome.kind})
+    return {
+        kind: rate(o.verdict == "undecidable" for o in some if o.kind == kind)
+        | {"verdicts": dict(Counter(o.verdict for o in some if o.kind == kind).most_common())}
+        for kind in kinds
+    }
+
+
+def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How far experiments that followed settled the cases in which one was asked for."""
+    asked = [outcome for outcome in some if outcome.rounds]
+    most = max([LEAST_ROUNDS, *(len(r) for o in asked for r in o.rounds.values())])
+    figures: dict[str, Any] = {"asked": rate(bool(outcome.rounds) for outcome in some)}
+    for way in sorted({way for outcome in asked for way in outcome.rounds}):
+        needed = [outcome.rounds_of(way, most) for outcome in asked]
+        figures[way] = {
+            "settled": {k: rate(n <= k for n in needed) for k in range(1, most + 1)},
+            "wrong": rate(any(each["wrong"] for each in o.rounds[way]) for o in asked),
+            "mean_rounds": float(np.mean(needed)),
+        }
+    if asked:
+        pairs = [(o.rounds_of("proposed", most), o.rounds_of("random", most)) for o in asked]
+        figures["faster"] = rate(mine < other for mine, other in pairs)
+        figures["slower"] = rate(mine > other for mine, other in pairs)
+    return figures
+
+
+def _by_parameter_off(some: Sequence[Outcome]) -> dict[str, Any]:
+    """How often each base parameter that was off was named, and what was where it was not."""
+    names = sorted({name for outcome in some for name in outcome.off})
+    found: dict[str, Any] = {}
+    for name in names:
+        those = [outcome for outcome in some if name in outcome.off]
+        without = [outcome for outcome in those if name in outcome.missing]
+        instead = Counter(path for outcome in without for path in outcome.beyond)
+        found[name] = {
+            "named": rate(name not in outcome.missing for outcome in those),
+            "instead": dict(instead.most_common()),
+            "nothing_instead": sum(not outcome.beyond for outcome in without),
+        }
+    return found
+
+
+def _missed(outcome: Outcome) -> bool:
+    """Whether a case is one that the block's target speaks against."""
+    if not outcome.answered:
+        return True
+    if outcome.block in ("single", "faint", "pair"):
+        return not outcome.right
+    if outcome.block in ("unknown", "undecidable"):
+        return outcome.verdict != outcome.block
+    if outcome.block == "parameters":
+        return outcome.detected or outcome.parameters is False
+    return outcome.detected
+
+
+def _said(outcome: Outcome) -> str:
+    """What was said; of parameters, which were named, and which that were off were not."""
+    if not outcome.off or outcome.named:
+        return outcome.said
+    named = f"{outcome.said}: {', '.join(outcome.moved)}" if outcome.moved else outcome.said
+    return f"{named}; without {', '.join(outcome.missing)}" if outcome.missing else named
+
+
+def _miss(outcome: Outcome) -> dict[str, Any]:
+    return {
+        "number": outcome.number,
+        "hidden": " ".join([outcome.hidden, *outcome.off]) + (outcome.kind and f", {outcome.kind}"),
+        "r": outcome.ratio,
+        "said": _said(outcome),
+        "sentence": outcome.sentence,
+    }

@@ -1,0 +1,214 @@
+"""`python -m benchmarks hidden-effects-report`: several blocks' figures as one document."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from benchmarks.hidden_effects.evaluation.tables import instead, listed, percent
+from benchmarks.hidden_effects.job import SCORE, JobError, merged
+from pma_gym.document_shape import ListOf, ShapeError, Whole, check_shape
+from pma_gym.documents import read_json
+from pma_gym.pages.document import Block, Heading, Paragraph, TextTable, to_html, to_markdown
+
+MISSES = 40
+"""How many misses of a block are listed; the rest are in its JSON."""
+
+
+_SCORE = {"seed": object, "code": {"*": Whole()}, "blocks": {"*": dict}, "failures": ListOf(str)}
+"""Shape of the figures that the job writes."""
+
+
+def read_scores(places: Sequence[Path]) -> dict[str, Any]:
+    """Figures of folders that the job filled, or of its JSON files, as one document.
+
+    Raises:
+        JobError: nothing to read, no figures in it, or two sets of one block.
+    """
+    documents = []
+    for place in places:
+        path = place / SCORE if place.is_dir() else place
+        if not path.is_file():
+            raise JobError(
+                f"{path}: there is no such file; name a folder in which `python -m benchmarks "
+                "hidden-effects` ended, or its --json file"
+            )
+        try:
+            document = read_json(path, "journal_mib", own=True)
+        except ValueError as error:
+            raise JobError(
+                f"{path} is no JSON file ({error}); name one that the job wrote"
+            ) from None
+        try:
+            check_shape(document, _SCORE)
+        except ShapeError as error:
+            raise JobError(
+                f"{path} holds no figures of `python -m benchmarks hidden-effects` ({error}); run "
+                "it again, or name another"
+            ) from None
+        documents.append(document)
+    names = [name for document in documents for name in document["blocks"]]
+    for name in names:
+        if names.count(name) > 1:
+            raise JobError(f"block {name} is in {names.count(name)} of the files; name it once")
+    return merged(documents)
+
+
+def report(document: dict[str, Any], suffix: str = ".md") -> str:
+    """A score as a page: Markdown, or HTML for the suffix `.html`; as it is for `.json`."""
+    if suffix == ".json":
+        return json.dumps(document, indent=1) + "\n"
+    blocks = report_blocks(document)
+    return to_html(blocks, {}) if suffix == ".html" else to_markdown(blocks, {}, "")
+
+
+def report_blocks(document: dict[str, Any]) -> list[Block]:
+    """A score as parts of a page: all targets in one table, then each block's own."""
+    figures = document["blocks"]
+    blocks: list[Block] = [
+        Heading("Hidden effects", 1),
+        Paragraph(f"Seed {document['seed']}; code {listed(document['code'])} cases."),
+        TextTable(
+            "Rates with 95 % Wilson intervals",
+            ["block", "figure", "measured", "target", "verdict"],
+            [row for name, each in figures.items() for row in _rates(name, each)],
+            2,
+        ),
+    ]
+    for name, each in figures.items():
+        blocks += [Heading(f"Block {name}"), *_own(each)]
+    return blocks
+
+
+def _rates(name: str, figures: dict[str, Any]) -> list[list[str]]:
+    rows = [
+        [name, words, percent(figure), *_verdict(figure)]
+        for words, figure in figures["rates"].items()
+    ]
+    gap, sizes = figures["gap_closed"], figures["sizes"]
+    for key, words in (("median", "median"), ("tenth_percentile", "tenth percentile")):
+        if gap[key]["value"] is not None:
+            value = f"{gap[key]['value']:.3f}, n {gap['n']}"
+            rows.append(
+                [name, f"gap closed on held-out trials, {words}", value, *_verdict(gap[key])]
+            )
+    error = sizes["median_error"]
+    if error["value"] is not None:
+        value = f"{100 * error['value']:.1f} %, n {sizes['covered']['n']}"
+        rows.append([name, "fitted size, median error", value, *_verdict(error)])
+        covered = sizes["covered"]
+        rows.append([name, "95 % intervals cover", percent(covered), *_verdict(covered)])
+    return rows
+
+
+def _verdict(figure: dict[str, Any]) -> list[str]:
+    if "target" not in figure:
+        return ["", ""]
+    return [figure["target"], {True: "met", False: "missed", None: "open"}[figure["met"]]]
+
+
+def _own(figures: dict[str, Any]) -> list[Block]:
+    seconds = figures["seconds"]
+    words = f"{figures['n']} cases; verdicts: {listed(figures['verdicts'])}."
+    if seconds["median"] is not None:
+        words += f" A diagnosis took {seconds['median']:.1f} s (median), {seconds['most']:.1f} s"
+        words += " at most."
+    blocks: list[Block] = [Paragraph(words), _confusion(figures["confusion"])]
+    if figures["by_effect"]:
+        blocks.append(_by_effect(figures["by_effect"]))
+    if len(figures["by_size"]) > 1:
+        blocks.append(_by_size(figures["by_size"]))
+    if figures["sizes"]["by_parameter"]:
+        blocks.append(_sizes(figures["sizes"]["by_parameter"]))
+    if figures["by_kind"]:
+        blocks.append(_by_kind(figures["by_kind"]))
+    if figures["by_parameter_off"]:
+        blocks.append(_by_parameter_off(figures["by_parameter_off"]))
+    if "proposed" in figures["rounds"]:
+        blocks.append(_rounds(figures["rounds"]))
+    if figures["misses"]:
+        blocks.append(_misses(figures["misses"]))
+    return blocks
+
+
+def _confusion(confusion: dict[str, dict[str, int]]) -> TextTable:
+    rows = [
+        [hidden, str(sum(said.values())), str(said.get(hidden, 0)), listed(_without(said, hidden))]
+        for hidden, said in confusion.items()
+    ]
+    header = ["hidden", "cases", "named so", "said otherwise"]
+    return TextTable("What was hidden, and what was said", header, rows)
+
+
+def _without(said: dict[str, int], name: str) -> dict[str, int]:
+    return {each: n for each, n in said.items() if each != name}
+
+
+def _by_effect(effects: dict[str, Any]) -> TextTable:
+    kinds = ["named", "named or its group", "detected"]
+    rows = [
+        [name, *(percent(figures[kind]) for kind in kinds)] for name, figures in effects.items()
+    ]
+    return TextTable("By effect", ["hidden", *kinds], rows)
+
+
+def _by_size(ranges: list[dict[str, Any]]) -> TextTable:
+    kinds = ["named", "named or its group", "detected"]
+    rows = [
+        [f"{each['low']:g} to {each['high']:g}", *(percent(each[kind]) for kind in kinds)]
+        for each in ranges
+    ]
+    return TextTable("By size r of what is hidden", ["r", *kinds], rows)
+
+
+def _sizes(parameters: dict[str, Any]) -> TextTable:
+    rows = [
+        [name, f"{100 * each['median_error']:.1f} %", percent(each["covered"])]
+        for name, each in parameters.items()
+    ]
+    return TextTable("Fitted sizes", ["parameter", "median error", "intervals cover"], rows)
+
+
+def _by_kind(kinds: dict[str, Any]) -> TextTable:
+    rows = [[kind, percent(each), listed(each["verdicts"])] for kind, each in kinds.items()]
+    return TextTable("By kind of data", ["data", "undecidable", "verdicts"], rows)
+
+
+def _by_parameter_off(parameters: dict[str, Any]) -> TextTable:
+    rows = [[name, percent(each["named"]), instead(each)] for name, each in parameters.items()]
+    header = ["off by a tenth", "named", "named where it was not, and was right"]
+    return TextTable("By parameter", header, rows)
+
+
+def _rounds(rounds: dict[str, Any]) -> TextTable:
+    counted = list(rounds["proposed"]["settled"])
+    rows = [
+        [
+            way,
+            *(percent(rounds[way]["settled"][k]) for k in counted),
+            f"{rounds[way]['mean_rounds']:.2f}",
+            percent(rounds[way]["wrong"]),
+        ]
+        for way in ("proposed", "random")
+    ]
+    header = [
+        "experiment",
+        *(f"settled within {k}" for k in counted),
+        "mean rounds",
+        "named wrongly",
+    ]
+    return TextTable(f"Rounds; asked for in {percent(rounds['asked'])}", header, rows)
+
+
+def _misses(misses: list[dict[str, Any]]) -> TextTable:
+    rows = [
+        [
+            str(miss["number"]),
+            miss["hidden"],
+            "" if miss["r"] is None else f"{miss['r']:.2f}",
+            miss["said"],
+        ]
+        for miss in misses[:MISSES]
+    ]
+    title = f"Misses, {len(rows)} of {len(misses)}"
+    return TextTable(title, ["case", "hidden", "r", "said"], rows, 4)

@@ -1,0 +1,270 @@
+"""One answer against its truth."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, get_args
+
+from benchmarks.hidden_effects.generation.effects import ALL
+from benchmarks.hidden_effects.generation.expected_parameters import expected
+from benchmarks.hidden_effects.generation.groups import group
+from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
+from pma_gym.discovery.diagnosis import Verdict
+
+STRUCTURAL = ("effect", "unknown")
+"""Verdicts that claim more than parameters."""
+
+VERDICTS = (*get_args(Verdict), "no answer")
+"""What is said where nothing is named."""
+
+PATHS: dict[str, tuple[str, ...]] = {
+    "force_slope": ("contractile_force.slope",),
+    "force_intercept": ("contractile_force.intercept",),
+    "stiffness_low": ("stiffness.",),
+    "damping_contracting": ("damping.contracting",),
+    "damping_relaxing": ("damping.relaxing", "damping.high"),
+    "drive_gain": ("drive.gain",),
+    "radius": ("rotor.radius",),
+    "inertia": ("rotor.inertia",),
+    "mass": ("slide.mass",),
+    "cable_stiffness": ("cable.stiffness",),
+    "regulator_time": ("regulator_lag.time_constant",),
+}
+"""How the paths begin under which a diagnosis names a base parameter that is off."""
+
+VISIBLE = 0.2
+"""A signal's gap counts where it is larger than the floor by this share."""
+
+LEAST_RATIO = {"faint": 0.3}
+"""r that a block promises of its effects, at least; 0.5 in the others."""
+
+NEAR_RATIO = 0.95
+"""Share of it that is near enough."""
+
+
+@dataclass
+class Outcome:
+    """What came of one case.
+
+    Attributes:
+        block: of the case.
+        truth: hidden effects.
+        verdict: of the diagnosis.
+        named: effects that it names.
+        right: exactly what was hidden, no more.
+        near: what it names first is the truth or of its group (`groups`).
+        beside: as near, where it also counts to say that the truth or one of its group may be
+            meant instead: the first two that `confused_with` lists.
+        wrong: it names an effect, and not so.
+        detected: it says that structure is missing.
+        hits: how many hidden effects it names.
+        spurious: whether it names more effects than there are.
+        parameters: whether each base parameter that was off is named, None without such.
+        parameters_told: the same, where it also counts to say that the data do not tell it.
+        parameters_tellable: whether the data tell each at all, by the generator's own ruler.
+        parameters_spurious: whether one is named that was right, None outside such a block.
+        closed: shares of the gap closed on held-out trials.
+        size_errors: by `effect.parameter`, relative error of a fitted size.
+        covered: by `effect.parameter`, whether the interval holds the truth.
+        seconds: how long the diagnosis took.
+        number: of the case in its set.
+        ratio: the smallest r of what is hidden, None where nothing is.
+        strong: whether each hidden effect is as large as its block promises.
+        answered: whether there was an answer; without one it hits nothing and claims nothing.
+        off: base parameters that were off by a tenth, where nothing else is hidden.
+        moved: paths of base parameters that are named as off, in such a block.
+        sentence: the answer as a person would say it, or what was raised instead.
+        kind: of data that excite too little; empty elsewhere.
+        rounds: what came of experiments that followed, by who chose them.
+    """
+
+    block: str
+    truth: tuple[str, ...]
+    verdict: str
+    named: tuple[str, ...]
+    right: bool
+    near: bool
+    beside: bool
+    wrong: bool
+    detected: bool
+    hits: int
+    spurious: bool
+    parameters: bool | None = None
+    parameters_told: bool | None = None
+    parameters_tellable: bool | None = None
+    parameters_spurious: bool | None = None
+    closed: list[float] = field(default_factory=list)
+    size_errors: dict[str, float] = field(default_factory=dict)
+    covered: dict[str, bool] = field(default_factory=dict)
+    seconds: float | None = None
+    number: int = 0
+    ratio: float | None = None
+    strong: bool = True
+    answered: bool = True
+    off: tuple[str, ...] = ()
+    moved: tuple[str, ...] = ()
+    kind: str = ""
+    rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
+    sentence: str = ""
+
+    @property
+    def hidden(self) -> str:
+        """What was hidden, in words."""
+        if self.truth:
+            return " + ".join(sorted(self.truth))
+        return "parameters alone" if self.off else "nothing"
+
+    @property
+    def said(self) -> str:
+        """What was named, or the verdict that names nothing."""
+        return " + ".join(sorted(self.named)) or self.verdict
+
+    @property
+    def sized(self) -> bool:
+        """Whether what is hidden could have been of any size."""
+        return all(name not in ALL or ALL[name].sized for name in self.truth)
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """Paths of base parameters that are named and were right."""
+        known = tuple(start for name in self.off for start in PATHS[name])
+        return tuple(path for path in self.moved if not path.startswith(known))
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """Base parameters that were off and are not named."""
+        return tuple(name for name in self.off if not _begun(self.moved, PATHS[name]))
+
+    def settled_by(self, way: str, most: int) -> bool:
+        """Whether the truth or its group was named within so many rounds of a way, or at once."""
+        if self.verdict == "effect" and self.near:
+            return True
+        return any(each["settled"] for each in self.rounds.get(way, ())[:most])
+
+    def rounds_of(self, way: str, most: int) -> int:
+        """In which round the truth or its group was named; one more than most if in none."""
+        return next((k for k in range(most + 1) if self.settled_by(way, k)), most + 1)
+
+
+def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
+    """The outcome of a case from its truth and its `diagnosis.json`."""
+    hidden = tuple(effect["name"] for effect in truth["effects"])
+    verdict = answer["verdict"]
+    effects = answer["effects"] if verdict == "effect" else []
+    named = tuple(effect["name"] for effect in effects)
+    near = any(of_group([effect["name"]], hidden) for effect in effects[:1])
+    beside = any(
+        of_group([effect["name"], *effect["confused_with"][:2]], hidden) for effect in effects[:1]
+    )
+    right = bool(hidden) and sorted(named) == sorted(hidden)
+    outcome = _of(
+        truth,
+        verdict=verdict,
+        named=named,
+        right=right,
+        near=right or near,
+        beside=right or beside,
+        wrong=verdict == "effect" and not (right or near),
+        detected=verdict in STRUCTURAL,
+        hits=len(set(named) & set(hidden)),
+        spurious=len(named) > len(hidden),
+        sentence=answer.get("sentence", ""),
+    )
+    _parameters(outcome, truth, answer)
+    for gap in answer["gap"].values():
+        if gap["held_out"] and gap["before"] > (1.0 + VISIBLE) * gap["floor"]:
+            outcome.closed.append(gap["closed"])
+    _sizes(outcome, truth, effects)
+    return outcome
+
+
+def unanswered(truth: Mapping[str, Any], message: str) -> Outcome:
+    """The outcome of a case whose diagnosis raised an error: no hit, and no claim."""
+    off = truth["block"] == "parameters" and bool(_off(truth))
+    return _of(
+        truth,
+        verdict="no answer",
+        named=(),
+        right=False,
+        near=False,
+        beside=False,
+        wrong=False,
+        detected=False,
+        hits=0,
+        spurious=False,
+        parameters=False if off else None,
+        parameters_told=False if off else None,
+        answered=False,
+        sentence=message,
+    )
+
+
+def _of(truth: Mapping[str, Any], **said: Any) -> Outcome:  # noqa: ANN401
+    """An outcome with what the truth alone tells."""
+    block, ratios = truth["block"], [e["r"] for e in truth["effects"] if "r" in e]
+    least = NEAR_RATIO * LEAST_RATIO.get(block, 0.5)
+    odds = list((truth.get("log_odds") or {}).values())
+    return Outcome(
+        block=block,
+        truth=tuple(effect["name"] for effect in truth["effects"]),
+        number=truth.get("number", 0),
+        ratio=min(ratios, default=None),
+        parameters_tellable=min(odds) > UNTOLD if odds else None,
+        off=tuple(_off(truth)) if block == "parameters" else (),
+        kind=truth.get("kind", ""),
+        strong=all(ratio >= least for ratio in ratios),
+        **said,
+    )
+
+
+def of_group(named: Sequence[str], hidden: Sequence[str]) -> bool:
+    """Whether one of some names is of the group of one that is hidden."""
+    return any(name in group(truth) for truth in hidden for name in named)
+
+
+def judged(said: str, hidden: Sequence[str]) -> dict[str, bool]:
+    """Whether what was said, as `Outcome.said` has it, settles what is hidden, or is wrong.
+
+    It settles where it names the truth or its group and nothing else; it is wrong where it names
+    something and does not settle.
+    """
+    settled = all(of_group([name], hidden) for name in said.split(" + "))
+    return {"settled": settled, "wrong": not settled and said not in VERDICTS}
+
+
+def _off(truth: Mapping[str, Any]) -> list[str]:
+    """Base parameters that were off by a tenth at least."""
+    off = [n for n, factor in truth["base_factors"].items() if abs(factor - 1.0) >= 0.0999]
+    return [name for name in off if name in PATHS]
+
+
+def _begun(paths: Sequence[str], starts: tuple[str, ...]) -> bool:
+    """Whether one of some paths begins in one of some ways."""
+    return any(path.startswith(starts) for path in paths)
+
+
+def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> None:
+    """Whether every base parameter that was off is named, or said not to be told."""
+    off = _off(truth)
+    if truth["block"] != "parameters" or not off:
+        return
+    moved = [path for path, each in answer["parameters"].items() if each["significant"]]
+    told = [*moved, *answer.get("not_identifiable", {})]
+    outcome.moved = tuple(moved)
+    outcome.parameters = not outcome.missing
+    outcome.parameters_told = all(_begun(told, PATHS[name]) for name in off)
+    outcome.parameters_spurious = bool(outcome.beyond)
+
+
+def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:
+    found = {effect["name"]: effect["parameters"] for effect in effects}
+    for effect in truth["effects"]:
+        for name, value in expected(effect["name"], effect["parameters"]).items():
+            estimates = found.get(effect["name"], {})
+            estimate = estimates.get(name) or estimates.get(f"cable.{name}")
+            if estimate is None or value == 0.0:
+                continue
+            path = f"{effect['name']}.{name}"
+            outcome.size_errors[path] = abs(estimate["value"] / value - 1.0)
+            low, high = estimate["low"], estimate["high"]
+            above = low is None or low <= value
+            outcome.covered[path] = above and (high is None or value <= high)

@@ -1,0 +1,1 @@
+"""Drawing cases: effects, excitation, rigs, and whether data can tell the truth at all."""

@@ -1,0 +1,184 @@
+"""A suite's leaderboard: all that its page is made from, read from what a run left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from benchmarks.bounds.cache import Bounds
+from benchmarks.comparison.command_lines import run_command
+from benchmarks.report.errors import Errors, Measure, Record, measures, pooled_measure, task_of
+from benchmarks.report.margins import Condition, conditions, is_linear
+from benchmarks.report.standings import Standings
+from benchmarks.report.verdicts import Verdict, bounds_needed, verdicts
+from benchmarks.runner.provenance import check_run, finished_rows, read_run
+from benchmarks.suites.frozen import Entry, FrozenSuite
+from benchmarks.suites.reproduction import SuiteError
+from controllers import CONTROLLERS
+from pma_gym.envs import StationInfo
+from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
+
+LOOP_TASKS = (*TASKS, *ISOTONIC)
+"""Tasks whose loops are shown, the motor's and the regulator's. Unseen references have those of the
+dissertation's tasks; in an exercise the operator is part of the loop."""
+
+
+@dataclass(frozen=True)
+class Leaderboard:
+    """All that a suite's page is made from.
+
+    Attributes:
+        record: the suite and its rows.
+        info: what the run was made with; empty if that is not known.
+        bounds: achievable bounds on the suite's model; computed here, and not kept, if None.
+    """
+
+    record: Record
+    info: Mapping[str, Any]
+    bounds: Bounds | None = None
+
+    @property
+    def suite(self) -> FrozenSuite:
+        """The suite."""
+        return self.record.suite
+
+    @cached_property
+    def labels(self) -> dict[str, str]:
+        """What people call the controllers, by name, in the suite's order."""
+        titles = {name: entry["title"] for name, entry in self.info.get("contenders", {}).items()}
+        entries = (entry.contender for entry in self.record.entries)
+        return {each.name: each.title or titles.get(each.name, each.name) for each in entries}
+
+    @cached_property
+    def standings(self) -> dict[str, Standings]:
+        """Standings by measure: each kind of task, each way, and all tasks if there are several."""
+        tasks = self.suite.tasks
+        wanted = measures(tasks)
+        if len(wanted) > 1:
+            wanted.append(pooled_measure(tasks))
+        return {measure.name: self.standings_of(measure) for measure in wanted}
+
+    @cached_property
+    def by_task(self) -> dict[str, Standings]:
+        """Standings in every single task, phase III left out, where measures hold several."""
+        if all(len(each.tasks) == 1 for each in measures(self.suite.tasks)):
+            return {}
+        single = [Measure(t, (t,), task_of(t).protocol.unit) for t in self.suite.tasks]
+        found = {measure.name: self.standings_of(measure) for measure in single}
+        return {name: each for name, each in found.items() if each.errors.values.size}
+
+    def standings_of(self, measure: Measure) -> Standings:
+        """Standings in a measure."""
+        errors = self.record.errors(measure)
+        return Standings(errors, self._failed(errors))
+
+    def _failed(self, errors: Errors) -> tuple[int, ...]:
+        rows = self.record.rows
+        return tuple(
+            sum(bool(rows[name, episode]["failure"]) for episode in errors.episodes)
+            for name in errors.names
+        )
+
+    def whole(self, standings: Standings) -> bool:
+        """Whether a measure's standings rest on all of its cases."""
+        tasks = standings.errors.measure.tasks
+        wanted = sum(episode.task in tasks for episode in self.suite.episodes)
+        return len(standings.errors.episodes) == wanted and bool(standings.errors.names)
+
+    @cached_property
+    def verdicts(self) -> list[Verdict]:
+        """The suite's targets; only what all cases have been run for has a figure."""
+        known = self._whole_standings
+        units = {name: each.errors.measure.unit for name, each in self.standings.items()}
+        return verdicts(self.suite.targets, known, self.labels, units, self._bound)
+
+    def start_bounds(self) -> None:
+        """Let other processes compute the bounds that the targets need."""
+        if self.bounds is not None:
+            self.bounds.start(bounds_needed(self.suite.targets, self._whole_standings))
+
+    @cached_property
+    def _whole_standings(self) -> dict[str, Standings]:
+        return {name: each for name, each in self.standings.items() if self.whole(each)}
+
+    @cached_property
+    def _bound(self) -> Bounds:
+        return self.bounds or Bounds(self.suite.model)
+
+    @property
+    def missing(self) -> list[Entry]:
+        """Controllers of the suite without a single row."""
+        return [entry for entry in self.record.entries if not self.record.done(entry)[0]]
+
+    @property
+    def incomplete(self) -> list[tuple[Entry, int, int]]:
+        """Controllers with some of their rows, how many, and of how many."""
+        counts = [(entry, *self.record.done(entry)) for entry in self.record.entries]
+        return [(entry, done, wanted) for entry, done, wanted in counts if 0 < done < wanted]
+
+    @cached_property
+    def obstacles(self) -> dict[tuple[str, float], str]:
+        """Why the nominal actuator cannot follow, by task and pressure (kPa), where it cannot."""
+        trials = dict.fromkeys((e.task, e.pressure_kpa) for e in self.suite.episodes)
+        model = self.suite.nominal
+        known = {(t, kpa): infeasibility_reason(task_of(t), model, 1e3 * kpa) for t, kpa in trials}
+        return {trial: why for trial, why in known.items() if why is not None}
+
+    @cached_property
+    def loops(self) -> dict[str, list[Condition]]:
+        """Loops of the linear controllers, by task, at its lowest, middle and highest pressure."""
+        found = {}
+        for task in self.suite.tasks:
+            names = [e.contender.name for e in self.record.entries if e.does(task)]
+            own = [CONTROLLERS[name]() for name in names if name in CONTROLLERS]
+            if task in LOOP_TASKS and any(map(is_linear, own)):
+                found[task] = conditions(own, self._told(task))
+        return found
+
+    def _told(self, task: str) -> list[StationInfo]:
+        """What controllers are told at three pressures of a task."""
+        suite, environment = self.suite, self.suite.environment
+        kpa = sorted({e.pressure_kpa for e in suite.episodes if e.task == task})
+        delays = [environment.get(f"{name}_delay_s", 0.0) for name in ("action", "observation")]
+        return [
+            StationInfo(
+                suite.nominal, task_of(task), 1e3 * each, 1.0 / suite.control_rate_hz, *delays
+            )
+            for each in dict.fromkeys((kpa[0], kpa[len(kpa) // 2], kpa[-1]))
+        ]
+
+
+def read_leaderboard(suite: FrozenSuite, folder: Path, bounds: Bounds | None = None) -> Leaderboard:
+    """The leaderboard of the results in a folder.
+
+    Args:
+        suite: the suite.
+        folder: of the results.
+        bounds: achievable bounds on the suite's model.
+    Raises:
+        SuiteError: there are none, or they are of another suite or version.
+    """
+    info, rows = read_run(folder), finished_rows(folder)
+    if not rows:
+        raise SuiteError(
+            f"{folder} has no results of suite {suite.name}; make some: "
+            f"{run_command(suite, folder)}"
+        )
+    ran = info.get("suite", {})
+    if (ran.get("name"), ran.get("digest")) != (suite.name, suite.digest):
+        raise SuiteError(
+            f"{folder} has results of suite {ran.get('name')} version {ran.get('version')} with "
+            f"other numbers than {suite.source} version {suite.version} has now; run it again: "
+            f"{run_command(suite, folder)}"
+        )
+    check_run(folder, info, suite.source)
+    return Leaderboard(Record.of(suite, rows), info, bounds)
+
+
+def keep_bounds(suite: FrozenSuite, folder: Path) -> None:
+    """Compute the achievable bounds that the targets need, and keep them for the page."""
+    with Bounds(suite.model, folder) as bounds:
+        leaderboard = read_leaderboard(suite, folder, bounds)
+        leaderboard.start_bounds()
+        _ = leaderboard.verdicts

@@ -1,0 +1,261 @@
+"""The leaderboard's page: what stands on it, in which order, with which words."""
+
+from benchmarks.report.errors import PERCENT, is_bound, task_of
+from benchmarks.report.leaderboard import Leaderboard
+from benchmarks.report.loop_plots import loop_plot, loop_title, margin_table
+from benchmarks.report.plot_style import styles_of
+from benchmarks.report.plots import distribution_plot, improvement_plot, pressure_plot, profile_plot
+from benchmarks.report.standings import Standings
+from benchmarks.report.tables import (
+    capital,
+    exercise_table,
+    failure_table,
+    obstacle_table,
+    spending_table,
+    standings_table,
+    tasks_table,
+    verdict_table,
+)
+from benchmarks.report.tracking_cost import spending
+from benchmarks.runner.fingerprint import code_digest
+from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
+
+_RANKS = (
+    "A rank is claimed only where all pairs, taken together with 95 % confidence, leave no other: "
+    "1–3 means that these controllers cannot be told apart. Intervals come from 2000 resamples of "
+    "what was drawn at random, stations or noise, the same for all controllers. “Over the best” "
+    "compares two controllers on the same stations and so resolves far finer differences than "
+    "their two intervals. A failed case counts as an error of the whole range. `docs/scores.md` "
+    "defines every figure."
+)
+
+
+def page_blocks(leaderboard: Leaderboard) -> list[Block]:
+    """The whole page."""
+    blocks = _opening(leaderboard)
+    if leaderboard.verdicts:
+        blocks += [Heading("Targets"), verdict_table(leaderboard.verdicts)]
+    blocks += _ranking_blocks(leaderboard)
+    blocks += _obstacle_blocks(leaderboard)
+    blocks += _picture_blocks(leaderboard)
+    blocks += _exercise_blocks(leaderboard)
+    blocks += _spending_blocks(leaderboard)
+    blocks += _loop_blocks(leaderboard)
+    if leaderboard.record.failures():
+        table = failure_table(leaderboard.record, leaderboard.labels)
+        blocks += [Heading("Failed cases"), table]
+    return blocks + _origin_blocks(leaderboard)
+
+
+def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Every plot of the scores that there are figures for, as PNG by name."""
+    styles = styles_of(leaderboard.labels)
+    pictures: dict[str, bytes] = {}
+    single = _shown(leaderboard, pooled=False)
+    if single:
+        pictures["distributions"] = distribution_plot(single, styles)
+        pictures["profiles"] = profile_plot(single, styles)
+        pictures["pressures"] = pressure_plot(single, styles)
+    headline = _headline(leaderboard)
+    if headline is not None and len(headline.errors.names) > 1:
+        pictures["improvement"] = improvement_plot(headline, styles)
+    return pictures
+
+
+def loop_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
+    """Plots of the linear controllers' loops, as PNG by name."""
+    styles = styles_of(leaderboard.labels)
+    return {f"loops_{task}": loop_plot(found, styles) for task, found in leaderboard.loops.items()}
+
+
+def _opening(leaderboard: Leaderboard) -> list[Block]:
+    suite = leaderboard.suite
+    environment = ", ".join(
+        f"`{name}` {value}" for name, value in suite.environment.items() if value not in ("", None)
+    )
+    text = (
+        f"{suite.title}. Suite `{suite.name}`, version {suite.version}: {len(suite.stations)} "
+        f"station{'s' if len(suite.stations) > 1 else ''}, {len(suite.episodes)} episodes of "
+        f"{', '.join(suite.tasks)}; {environment}. Controllers are told model `{suite.model}`. "
+        "Every trial is scored on the true motion at 384 Hz."
+    )
+    blocks: list[Block] = [Heading(f"Leaderboard: {suite.name}", 1), Paragraph(text)]
+    notes = _notes(leaderboard)
+    return blocks + [Paragraph(note) for note in notes]
+
+
+def _notes(leaderboard: Leaderboard) -> list[str]:
+    """What the reader must know before the first figure: what is missing."""
+    labels, notes = leaderboard.labels, []
+    if leaderboard.missing:
+        names = ", ".join(labels[entry.contender.name] for entry in leaderboard.missing)
+        notes.append(f"**Not run: {names}.**")
+    if leaderboard.incomplete:
+        counts = ", ".join(
+            f"{labels[entry.contender.name]} ({done} of {wanted} cases)"
+            for entry, done, wanted in leaderboard.incomplete
+        )
+        notes.append(
+            f"**The journal is incomplete: {counts}.** Measures whose cases a controller has not "
+            "all run are shown without it; where nobody has, only the cases that all have."
+        )
+    bounds = [labels[name] for name in labels if is_bound(name)]
+    if bounds:
+        notes.append(
+            f"{', '.join(bounds)} may see the true station and its state: no rival, but the bound "
+            "that the others are measured by."
+        )
+    return notes
+
+
+def _shown(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
+    """Standings with somebody in them, with or without that of all tasks together."""
+    found = [each for each in leaderboard.standings.values() if each.errors.values.size]
+    return found if pooled else [each for each in found if each.errors.measure.unit != PERCENT]
+
+
+def _headline(leaderboard: Leaderboard) -> Standings | None:
+    """The measure that all controllers are compared in: all tasks, or the only one."""
+    found = _shown(leaderboard, pooled=True)
+    return found[-1] if found else None
+
+
+def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
+    labels = leaderboard.labels
+    shown = _shown(leaderboard, pooled=True)
+    # What pools all tasks stands first.
+    shown.sort(key=lambda each: each.errors.measure.unit != PERCENT)
+    blocks: list[Block] = [Heading("Ranking"), Paragraph(_RANKS)]
+    blocks += [standings_table(each, labels) for each in shown]
+    if leaderboard.by_task:
+        blocks.append(tasks_table(leaderboard.by_task, labels))
+    headline = _headline(leaderboard)
+    if headline is not None and len(headline.errors.names) > 1:
+        blocks += [
+            Heading("Who beats whom", 3),
+            Paragraph(
+                "In how many of the cases the row's controller has the smaller error than the "
+                "column's, on the same station with the same noise: its probability of "
+                "improvement. `pairs.csv` has the intervals, and the same for every measure."
+            ),
+            Picture(
+                "improvement",
+                "Probability of improvement; bold where the row's interquartile mean is surely "
+                "the smaller, all pairs considered at once.",
+            ),
+        ]
+    return blocks
+
+
+def _obstacle_blocks(leaderboard: Leaderboard) -> list[Block]:
+    if not leaderboard.obstacles:
+        return []
+    text = (
+        "By the nominal balance of forces the actuator cannot follow these references all the way, "
+        "whoever drives; the oracle's error is the bound that can be reached."
+    )
+    return [
+        Heading("References that cannot be followed", 3),
+        Paragraph(text),
+        obstacle_table(leaderboard.obstacles, _shown(leaderboard, pooled=False)),
+    ]
+
+
+def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
+    return [
+        Heading("How the errors are spread"),
+        Picture("distributions", "All cases of every controller, on a logarithmic scale."),
+        Picture(
+            "profiles",
+            "Performance profiles: share of the cases with an error up to that on the axis; the "
+            "higher and further left, the better. Bands: 95 %, of each point by itself.",
+        ),
+        Picture("pressures", "Median error by pressure, on a logarithmic scale."),
+    ]
+
+
+def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
+    text = (
+        "Medians over the cases that did not fail; “saturated” and “clipped” are means. A command "
+        "below 0 V or above 10 V is clipped to there. Effort is the standard "
+        "deviation of the voltage, variation its total variation a second. Soft limits are the "
+        "reach of table I3; 100 % of the way beyond them the episode ends. Real-time factor: how "
+        "often the 99th percentile of the computing time fits into a control period."
+    )
+    blocks: list[Block] = [Heading("What it costs"), Paragraph(text)]
+    for each in _shown(leaderboard, pooled=False):
+        measure = each.errors.measure
+        if not (measure.returning or measure.alone):
+            names = [row.name for row in each.rows]
+            rows = spending(leaderboard.record, measure, names)
+            name = measure.tasks[0].replace("_", " ")
+            title = f"{capital(name)}: whole trials"
+            if len(measure.tasks) > 1:
+                title = f"{capital(measure.name)}: whole trials"
+            blocks.append(spending_table(rows, title, measure.unit, leaderboard.labels))
+    return blocks
+
+
+def _exercise_blocks(leaderboard: Leaderboard) -> list[Block]:
+    """What exercises came to beside their errors."""
+    blocks: list[Block] = []
+    for each in _shown(leaderboard, pooled=False):
+        measure = each.errors.measure
+        exercises = [task for task in measure.tasks if task_of(task).exercise]
+        if exercises and not measure.alone:
+            names = [row.name for row in each.rows]
+            title = f"{capital(measure.name)}: the joint and the operator's work"
+            table = exercise_table(leaderboard.record, exercises, names, title, leaderboard.labels)
+            blocks.append(table)
+    text = (
+        "Medians over the cases that did not fail, at the ends of the control steps. The angle is "
+        "compared with the dissertation's line, whatever is prescribed. Work is what the joint "
+        "does on the device, returned what the device does on it."
+    )
+    return [Heading("Moment, speed, power"), Paragraph(text), *blocks] if blocks else []
+
+
+def _loop_blocks(leaderboard: Leaderboard) -> list[Block]:
+    if not leaderboard.loops:
+        return []
+    text = (
+        "Every linear controller's loop with the nominal plant, linearised near rest, sampled with "
+        "its sensor and delays. Without voltage limits, feed-forward, hysteresis and dry friction. "
+        "The step of the reference is through the feedback alone."
+    )
+    blocks: list[Block] = [Heading("For the engineer: loops and margins"), Paragraph(text)]
+    for task, found in leaderboard.loops.items():
+        caption = (
+            f"{loop_title(found)}: Bode plot of the loop in the middle of the stroke, response to "
+            "a step of the reference and to a step of the load; unstable loops have no step."
+        )
+        blocks += [margin_table(found, leaderboard.labels), Picture(f"loops_{task}", caption)]
+    return blocks
+
+
+def _origin_blocks(leaderboard: Leaderboard) -> list[Block]:
+    """How the run can be made again."""
+    info = leaderboard.info
+    git = info["git"]
+    state = {True: "with changes that are not committed", False: "clean", None: ""}[git["dirty"]]
+    same = "that of now" if info["code"] == code_digest() else "changed since"
+    rows = [
+        ["Commit", f"{git['commit']} {state}".strip()],
+        ["Code", f"digest {info['code']}, {same}"],
+        ["Versions", ", ".join(f"{name} {text}" for name, text in info["versions"].items())],
+        ["Machine", f"{info['platform']}, {info['processors']} processors"],
+        ["Suite", f"version {leaderboard.suite.version}, digest {leaderboard.suite.digest}"],
+    ]
+    runs: dict[tuple[str, str], list[str]] = {}
+    for name, entry in info["contenders"].items():
+        runs.setdefault((entry["started"], entry["command"]), []).append(name)
+    for (started, command), names in runs.items():
+        rows.append([f"Begun {started}", f"`{command}`: {', '.join(names)}"])
+    return [
+        Heading("How it was made"),
+        TextTable("Origin", ["", ""], rows, words=2),
+        Paragraph(
+            "`leaderboard.csv` and `pairs.csv` beside this page hold every figure with all its "
+            "digits, `journal.jsonl` every case."
+        ),
+    ]

@@ -1,0 +1,170 @@
+"""How controllers stand in a measure: means with their intervals, ranks, pairs."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import permutations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.report.errors import Errors, is_bound
+from benchmarks.report.pairwise import Rank, Ranking, improvement, ranking, ratio
+from benchmarks.report.statistics import (
+    Draws,
+    Interval,
+    Statistic,
+    interquartile_mean,
+    median,
+    positive_interval,
+    replicated,
+    worst_tenth,
+)
+
+
+class Standing(NamedTuple):
+    """A controller in a measure; all errors in the measure's unit.
+
+    Attributes:
+        name: of the controller.
+        mean: interquartile mean.
+        median: the middle case.
+        worst: mean of the worst tenth of the cases (CVaR 10 %).
+        percent: interquartile mean of the error in percent of its task's range.
+        rank: places that it may hold; None for a bound.
+        to_best: its interquartile mean over that of the best rival.
+        to_bound: over that of the bound; None if no bound ran.
+        failures: how many of its cases failed.
+    """
+
+    name: str
+    mean: Interval
+    median: Interval
+    worst: Interval
+    percent: float
+    rank: Rank | None
+    to_best: Interval | None
+    to_bound: Interval | None
+    failures: int
+
+
+class Pair(NamedTuple):
+    """Two controllers in a measure.
+
+    Attributes:
+        first: name of the one.
+        second: name of the other.
+        improvement: probability that the first one's error is the smaller.
+        ratio: interquartile mean of the first over that of the second.
+        separated: whether the first is better beyond doubt, all pairs considered at once.
+    """
+
+    first: str
+    second: str
+    improvement: Interval
+    ratio: Interval
+    separated: bool
+
+
+@dataclass(frozen=True)
+class Standings:
+    """All controllers in a measure.
+
+    Attributes:
+        errors: the errors that it is made from.
+        failed: how many cases of each controller failed.
+    """
+
+    errors: Errors
+    failed: tuple[int, ...]
+
+    @property
+    def draws(self) -> Draws:
+        """The resamples, the same for every figure and controller."""
+        return self.errors.draws
+
+    @cached_property
+    def means(self) -> NDArray[np.float64]:
+        """Interquartile mean of every controller, shape (controllers,)."""
+        return np.asarray(interquartile_mean(self.errors.values))
+
+    @cached_property
+    def _resampled(self) -> NDArray[np.float64]:
+        return replicated(self.errors.values, self.draws, interquartile_mean)
+
+    @cached_property
+    def rivals(self) -> list[int]:
+        """Numbers of the controllers that are no bounds."""
+        return [at for at, name in enumerate(self.errors.names) if not is_bound(name)]
+
+    @cached_property
+    def ranking(self) -> Ranking:
+        """Ranks of the rivals, in their order."""
+        return ranking(self.means[self.rivals], self._resampled[self.rivals], self.draws)
+
+    @property
+    def best(self) -> int | None:
+        """Number of the rival with the least interquartile mean; None if there is no rival."""
+        return min(self.rivals, key=lambda at: self.means[at], default=None)
+
+    @property
+    def bound(self) -> int | None:
+        """Number of the lowest bound; None if none ran."""
+        bounds = set(range(len(self.errors.names))) - set(self.rivals)
+        return min(bounds, key=lambda at: (self.means[at], at), default=None)
+
+    def ratio(self, first: int, second: int) -> Interval:
+        """Interquartile mean of one controller over another's, paired."""
+        estimates = float(self.means[first]), float(self.means[second])
+        return ratio(estimates, (self._resampled[first], self._resampled[second]), self.draws)
+
+    def _interval(self, at: int, statistic: Statistic) -> Interval:
+        values = self.errors.values[at : at + 1]
+        if statistic is interquartile_mean:
+            drawn = self._resampled[at]
+        else:
+            drawn = replicated(values, self.draws, statistic)[0]
+        return positive_interval(float(statistic(values)[0]), drawn, self.draws)
+
+    @cached_property
+    def rows(self) -> list[Standing]:
+        """Rivals from the least interquartile mean to the largest, then the bounds."""
+        order = sorted(
+            range(len(self.errors.names)),
+            key=lambda at: (at not in self.rivals, self.means[at], at),
+        )
+        return [self._standing(at) for at in order]
+
+    def _standing(self, at: int) -> Standing:
+        measure, best, bound = self.errors.measure, self.best, self.bound
+        scales = np.array([measure.percent(e.task) for e in self.errors.episodes])
+        ranks = dict(zip(self.rivals, self.ranking.ranks, strict=True))
+        return Standing(
+            name=self.errors.names[at],
+            mean=self._interval(at, interquartile_mean),
+            median=self._interval(at, median),
+            worst=self._interval(at, worst_tenth),
+            percent=float(interquartile_mean(self.errors.values[at] * scales)),
+            rank=ranks.get(at),
+            to_best=None if best is None else self.ratio(at, best),
+            to_bound=None if bound is None else self.ratio(at, bound),
+            failures=self.failed[at],
+        )
+
+    @cached_property
+    def pairs(self) -> list[Pair]:
+        """Every controller against every other, rivals and bounds."""
+        places = {at: place for place, at in enumerate(self.rivals)}
+        found = []
+        for first, second in permutations(range(len(self.errors.names)), 2):
+            both = first in places and second in places
+            found.append(
+                Pair(
+                    self.errors.names[first],
+                    self.errors.names[second],
+                    improvement(self.errors.values[first], self.errors.values[second], self.draws),
+                    self.ratio(first, second),
+                    both and bool(self.ranking.separated[places[first], places[second]]),
+                )
+            )
+        return found

@@ -1,0 +1,1 @@
+"""The dissertation's trials: scores, replay, targets and report."""

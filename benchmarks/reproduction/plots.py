@@ -1,0 +1,120 @@
+"""The report's plots of trials: reference and response, error, voltage, actual against ideal."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from benchmarks.report.plot_style import MEASURED, REFERENCE, Style, controller_styles
+from benchmarks.reproduction.results import Results
+from benchmarks.reproduction.score import UNITS, measured_score
+from pma_gym.data.protocol import PROTOCOLS, Protocol
+from pma_gym.data.trial import Trial
+from pma_gym.metrics import phase_times
+from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.units import SI_FACTORS
+
+_ENLARGED = {"displacement": 0.4, "rotation": 1.6}
+"""Half the height of the enlarged error (mm, deg): four times what feedback is to reach."""
+
+_LABELS = {"displacement": "extension", "rotation": "rotation"}
+
+
+def tracking_plot(results: Results, task: str) -> bytes:
+    """Response, error and motor voltage over time at a low, a middle and a high pressure."""
+    pressures = _pictured(results, task)
+    styles = controller_styles(results.suite)
+    unit = UNITS[task]
+    with picture(11.0, 10.5) as figure:
+        axes: Any = figure.subplots(4, len(pressures), sharex=True, sharey="row", squeeze=False)
+        for column, pressure in enumerate(pressures):
+            panels = axes[:, column]
+            panels[0].set_title(f"{pressure:g} kPa")
+            _draw_measured(panels, task, pressure)
+            for name, trial in results.trials(task, pressure).items():
+                _draw_trial(panels, trial, PROTOCOLS[task], styles[name])
+            panels[-1].set_xlabel("time (s)")
+        axes[0, 0].set_ylabel(f"{_LABELS[task]} ({unit})")
+        axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
+        axes[2, 0].set_ylabel(f"actual − ideal ({unit}),\nenlarged")
+        axes[2, 0].set_ylim(-_ENLARGED[task], _ENLARGED[task])
+        axes[3, 0].set_ylabel("motor voltage (V)")
+        axes[3, 0].set_ylim(0.0, None)
+        figure.align_ylabels()
+        legend_below(figure, _handles(styles), 3)
+        return png(figure)
+
+
+def actual_against_ideal_plot(results: Results, task: str) -> bytes:
+    """Actual position over the ideal one, as figures 32 and 36 have it."""
+    pressures = _pictured(results, task)
+    styles = controller_styles(results.suite)
+    unit = UNITS[task]
+    protocol = PROTOCOLS[task]
+    span = protocol.span / SI_FACTORS[unit]
+    with picture(11.0, 4.6) as figure:
+        axes: Any = figure.subplots(1, len(pressures), sharex=True, sharey=True, squeeze=False)
+        for axis, pressure in zip(axes[0], pressures, strict=True):
+            axis.set_title(f"{pressure:g} kPa")
+            axis.plot([0.0, span], [0.0, span], zorder=4, **REFERENCE)
+            for time, line in _measured_lines(task, pressure):
+                axis.plot(protocol.reference(time) / SI_FACTORS[unit], line, zorder=1, **MEASURED)
+            for name, trial in results.trials(task, pressure).items():
+                position = trial.truth[protocol.quantity] / SI_FACTORS[unit]
+                ideal = protocol.reference(trial.time) / SI_FACTORS[unit]
+                axis.plot(ideal, position, color=styles[name].color, zorder=2)
+            axis.set_xlabel(f"ideal {_LABELS[task]} ({unit})")
+        axes[0, 0].set_ylabel(f"actual {_LABELS[task]} ({unit})")
+        legend_below(figure, _handles(styles), 3)
+        return png(figure)
+
+
+def _pictured(results: Results, task: str) -> list[float]:
+    """The pressures that are drawn and have a trial."""
+    return [p for p in results.suite.pictured_kpa[task] if results.trials(task, p)]
+
+
+def _draw_trial(panels: Sequence[Axes], trial: Trial, protocol: Protocol, style: Style) -> None:
+    response, error, enlarged, voltage = panels
+    unit, color = SI_FACTORS[protocol.unit], style.color
+    actual = trial.truth[protocol.quantity] / unit
+    difference = actual - protocol.reference(trial.time) / unit
+    response.plot(trial.time, actual, color=color)
+    error.plot(trial.time, difference, color=color)
+    enlarged.plot(trial.time, difference, color=color, linewidth=0.9)
+    voltage.plot(trial.time, trial.commands["motor_voltage"], color=color, linewidth=0.9)
+
+
+def _draw_measured(panels: Sequence[Axes], task: str, pressure: float) -> None:
+    """The reference, and the lines of tables 21 and 27-29, which are all that is printed."""
+    protocol, unit = PROTOCOLS[task], SI_FACTORS[UNITS[task]]
+    grid = np.linspace(0.0, protocol.duration, 301)
+    panels[0].plot(grid, protocol.reference(grid) / unit, zorder=4, **REFERENCE)
+    for panel in panels[1:3]:
+        panel.axhline(0.0, zorder=4, **REFERENCE)
+    for time, line in _measured_lines(task, pressure):
+        panels[0].plot(time, line, zorder=1, **MEASURED)
+        panels[1].plot(time, line - protocol.reference(time) / unit, zorder=1, **MEASURED)
+
+
+def _measured_lines(
+    task: str, pressure: float
+) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Times (s) and positions (unit) of the regression line of each phase."""
+    lines = []
+    own = phase_times()[:1921:8]
+    for phase in PROTOCOLS[task].phases:
+        score = measured_score(task, phase.name, pressure)
+        lines.append((phase.start + own, score.intercept + score.slope * own))
+    return lines
+
+
+def _handles(styles: dict[str, Style]) -> list[Line2D]:
+    return [
+        Line2D([], [], label="Ideal", **REFERENCE),
+        Line2D([], [], label="Measured (regression lines)", **MEASURED),
+        *(Line2D([], [], color=style.color, label=style.label) for style in styles.values()),
+    ]

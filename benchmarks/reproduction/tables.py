@@ -1,0 +1,132 @@
+"""Tables in the layout of the dissertation's 21, 22 and 27-30, its columns beside ours."""
+
+from collections.abc import Callable, Iterable, Sequence
+from statistics import fmean
+
+from benchmarks.reproduction.replay import QUANTITIES, ReplayError, summarise
+from benchmarks.reproduction.results import Results
+from benchmarks.reproduction.score import UNITS, PhaseScore, measured_score
+from benchmarks.reproduction.targets import Check
+from benchmarks.suites.reproduction import MEASURED
+from pma_gym.pages.document import TextTable
+
+RULE = [""]
+MISSING = "failed"
+
+REGRESSION_TABLES = {"displacement": "21", "I": "27", "II": "28", "III": "29"}
+"""Printed tables of slope and intercept, by phase."""
+
+Figures = Callable[[float], PhaseScore | None]
+
+
+def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Figures]:
+    """Who stands in a table, measured first, and the figures of each by pressure."""
+    found: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
+    for controller in results.suite.controllers:
+        if not results.suite.does(controller, model):
+            continue
+        name = controller.name
+        found[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)
+    return found
+
+
+def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:
+    """Table 22, or a third of table 30: RMSE and percent of the range, by pressure."""
+    unit = UNITS[task]
+    who = columns(results, model, task, phase)
+    pressures = results.suite.pressures_kpa[task]
+    bounded = phase == "III" and model == results.suite.models[0] and bool(results.bounds)
+    header = ["Pressure (kPa)"]
+    header += [f"{name} | {part}" for name in who for part in (unit, "%")]
+    rows = [
+        [f"{p:g}", *(text for figures in who.values() for text in _rmse_cells(figures(p)))]
+        for p in pressures
+    ]
+    mean = ["mean"]
+    for figures in who.values():
+        scores = [figures(p) for p in pressures]
+        mean += [_mean(s.rmse if s else None for s in scores)]
+        mean += [_mean((s.percent_of_range if s else None for s in scores), 2)]
+    if bounded:
+        header.append(f"Achievable bound | {unit}")
+        bounds = [results.bounds.get(p) for p in pressures]
+        rows = [[*row, _number(b, 3)] for row, b in zip(rows, bounds, strict=True)]
+        mean.append(_mean(bounds))
+    number, part = ("22", "") if task == "displacement" else ("30", f", phase {phase}")
+    title = f"Table {number}{part}: RMSE against the ideal, and in percent of the range"
+    return TextTable(title, header, [*rows, RULE, mean])
+
+
+def regression_table(results: Results, model: str, task: str, phase: str) -> TextTable:
+    """Table 21 or 27-29: intercept and slope with their standard errors, by pressure."""
+    unit = UNITS[task]
+    who = columns(results, model, task, phase)
+    rows: list[list[str]] = []
+    for pressure in results.suite.pressures_kpa[task]:
+        scores = [figures(pressure) for figures in who.values()]
+        rows.append([f"{pressure:g}", f"intercept ({unit})", *map(_intercept, scores)])
+        rows.append(["", f"slope ({unit}/s)", *map(_slope, scores)])
+    part = "" if task == "displacement" else f", phase {phase}"
+    title = f"Table {REGRESSION_TABLES[phase]}{part}: line through the trial (standard error)"
+    return TextTable(title, ["Pressure (kPa)", "Term", *who], rows, words=2)
+
+
+def replay_table(errors: Sequence[ReplayError]) -> TextTable:
+    """Signed errors of the replay in one phase, trial by trial, and their means."""
+    unit = UNITS[errors[0].task]
+    means = summarise(errors)
+    header = ["Pressure (kPa)", f"slope ({unit}/s)"]
+    header += [f"{name} ({unit})" for name in ("intercept", "mean position", "RMSE")]
+    rows = [
+        [f"{error.pressure_kpa:g}", *(f"{getattr(error, name):+.3f}" for name in QUANTITIES)]
+        for error in errors
+    ]
+    signed = ["mean", *(f"{means.signed[name]:+.3f}" for name in QUANTITIES)]
+    absolute = ["mean absolute", *(f"{means.absolute[name]:.3f}" for name in QUANTITIES)]
+    phase = errors[0].phase
+    part = "Displacement" if phase == "displacement" else f"Rotation, phase {phase}"
+    title = f"{part}: simulated less measured"
+    return TextTable(title, header, [*rows, RULE, signed, absolute])
+
+
+def target_table(checks: Iterable[Check], model: str) -> TextTable:
+    """Targets, what was got on a model, met or missed."""
+    rows = [
+        [
+            check.what,
+            f"{'<' if check.strict else '≤'} {check.limit:g} {check.unit}",
+            "—" if check.got is None else f"{check.got:.3g} {check.unit}",
+            check.verdict,
+        ]
+        for check in checks
+    ]
+    return TextTable(f"On `{model}`", ["What", "Target", "This run", "Verdict"], rows)
+
+
+def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:
+    if score is None:
+        return MISSING, ""
+    return _number(score.rmse, 3), _number(score.percent_of_range, 2)
+
+
+def _intercept(score: PhaseScore | None) -> str:
+    return MISSING if score is None else _with_error(score.intercept, score.intercept_std_error)
+
+
+def _slope(score: PhaseScore | None) -> str:
+    return MISSING if score is None else _with_error(score.slope, score.slope_std_error)
+
+
+def _with_error(estimate: float, error: float) -> str:
+    return f"{estimate:z.3f} ({error:.3f})"
+
+
+def _mean(values: Iterable[float | None], decimals: int = 3) -> str:
+    """The mean; nothing if one of the values is missing."""
+    known = list(values)
+    numbers = [value for value in known if value is not None]
+    return _number(fmean(numbers) if len(numbers) == len(known) else None, decimals)
+
+
+def _number(value: float | None, decimals: int) -> str:
+    return "" if value is None else f"{value:.{decimals}f}"

@@ -1,0 +1,1 @@
+"""Running cases: controllers, rollouts, processes, journals, and what a row was made with."""

@@ -1,0 +1,129 @@
+"""One case: a controller drives one episode of a suite, and a row says what came of it."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.figures import Episode as Measured
+from benchmarks.runner.figures import figures
+from benchmarks.runner.isolated_controller import Isolated, driver
+from benchmarks.runner.rollout import Rollout, rollout
+from benchmarks.suites.frozen import Entry, Episode, FrozenSuite, frozen_suite
+from pma_gym.engine.options import nominal_model
+from pma_gym.envs import PMAEnv
+from pma_gym.plant.model import Model
+
+Row = dict[str, Any]
+"""What the journal says of a case: who, what, why it failed, its figures."""
+
+
+EXERCISE_FIGURES = {
+    "pace_rmse_deg": "Angle, RMSE (deg)",
+    "peak_moment_nm": "Peak moment (N m)",
+    "peak_speed_deg_s": "Peak speed (deg/s)",
+    "peak_power_w": "Peak power (W)",
+    "work_j": "Work (J)",
+    "returned_j": "Returned (J)",
+}
+"""What a row of an exercise has beside its errors, `exercise_summaries` of the environments, and
+what tables call it."""
+
+BY_LIMIT = "by a physical limit"
+"""What a row's failure says where the rig's limits ended the episode."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A controller and an episode of a suite.
+
+    Attributes:
+        suite: name of the suite, or path of its file.
+        contender: who drives.
+        episode: what it drives.
+    """
+
+    suite: str
+    contender: Contender
+    episode: Episode
+
+    @property
+    def name(self) -> str:
+        """What tells it from the suite's others: `pid/17/rotation/300/0`."""
+        return f"{self.contender.name}/{self.episode.name}"
+
+
+def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
+    """What a suite's controllers have to do, episode by episode.
+
+    All controllers meet an episode before the next one begins, so that what is done when a run is
+    interrupted compares them all. Tasks that a controller cannot do by its rule are left out.
+    """
+    return [
+        Case(suite.source, entry.contender, episode)
+        for episode in suite.episodes
+        for entry in entries
+        if entry.does(episode.task)
+    ]
+
+
+def run_case(case: Case, model: Model | None = None) -> Row:
+    """Run a case; somebody's own controller in a process of its own.
+
+    Args:
+        case: the case.
+        model: the station's own; drawn anew if not given.
+    Returns:
+        Its row, without figures if a physical limit ended it early.
+    Raises:
+        Exception: whatever the controller or the environment raised.
+    """
+    suite, contender = frozen_suite(case.suite), case.contender
+    environment = PMAEnv(
+        task=case.episode.task,
+        model=model or suite.station(case.episode.station).model,
+        pressure_kpa=case.episode.pressure_kpa,
+        **suite.environment,
+    )
+    controller = driver(contender, environment.options.period)
+    told = nominal_model(environment.task, suite.nominal)
+    seed = suite.seed_of(case.episode)
+    done = rollout(environment, controller, seed, told, reveal=contender.is_bound)
+    if isinstance(controller, Isolated):
+        done = replace(done, act_seconds=np.array(controller.act_seconds))
+    share, farthest = done.clipped
+    clipped = {"clipped_share": share, "clipped_v": farthest}
+    if done.ended_by:
+        end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
+        return blank_row(case) | {"failure": end} | clipped
+    return blank_row(case) | _figures(done, environment) | clipped
+
+
+def _figures(done: Rollout, environment: PMAEnv) -> Row:
+    actuator = 1 if done.task.actuator == "regulator" else 0
+    measured = Measured(done.position, done.commands[:, actuator], done.truth, done.act_seconds)
+    limits = environment.plant.model.parameters["limits"]
+    found = figures(done.task, measured, done.period, limits).to_json()
+    if done.task.exercise is None:
+        return found
+    summary = environment.episode_summary()
+    return found | {"exercise": {name: summary[name] for name in EXERCISE_FIGURES}}
+
+
+def blank_row(case: Case) -> Row:
+    """A case's row without figures."""
+    suite, episode = frozen_suite(case.suite), case.episode
+    return {
+        "suite": suite.name,
+        "version": suite.version,
+        "controller": case.contender.name,
+        **episode._asdict(),
+        "seed": suite.seed_of(episode),
+        "failure": "",
+    }
+
+
+def failed_row(case: Case, error: BaseException) -> Row:
+    """The row of a case that raised."""
+    return blank_row(case) | {"failure": f"{type(error).__name__}: {error}"}

@@ -1,0 +1,276 @@
+"""Who is scored: a controller of the registry, a class in somebody's own file, or a policy."""
+
+import difflib
+import importlib.util
+import inspect
+import sys
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from types import ModuleType
+
+import controllers.controller
+from controllers import CONTROLLERS
+from controllers.controller import Controller
+from controllers.policies.policy_file import PolicyError, policy_pair
+from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
+
+PROTOCOL = Path(controllers.controller.__file__)
+"""File that says what a controller is."""
+
+POLICY_FILES = (".json", ".safetensors")
+"""Endings of a policy's two files."""
+
+
+class ControllerError(ValueError):
+    """A controller that cannot be scored; the message says why and how to mend it."""
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A controller by its name; made anew for every case, in the process that runs the case.
+
+    Attributes:
+        name: what the results call it; the class for one of one's own.
+        title: what the report calls it; for a class of one's own, its attribute `name`.
+        path: file of its class or of its policy, or folder of policies; empty for one of
+            `controllers.CONTROLLERS`.
+        algorithm: of the policies in a folder; else empty.
+    """
+
+    name: str
+    title: str = ""
+    path: str = ""
+    algorithm: str = ""
+
+    @property
+    def source(self) -> str:
+        """What names it on the command line."""
+        if self.is_policy:
+            return f"{self.path}:{self.algorithm}" if self.algorithm else self.path
+        return f"{self.path}:{self.name}" if self.path else self.name
+
+    @property
+    def is_policy(self) -> bool:
+        """Whether it is a policy from a file, or from a folder of them."""
+        return bool(self.algorithm) or self.path.endswith(POLICY_FILES)
+
+    @property
+    def is_bound(self) -> bool:
+        """Whether it is the project's own bound, which alone is shown the environment."""
+        return not self.path and hasattr(CONTROLLERS.get(self.name), "receive")
+
+    @property
+    def kinds(self) -> frozenset[str]:
+        """Kinds of task that it can do; all if empty."""
+        if self.algorithm:
+            files = shipped_policies(Path(self.path))
+            return frozenset(
+                path.stem.partition("-")[0]
+                for path in files
+                if path.stem.endswith(f"-{self.algorithm}")
+            )
+        if self.is_policy:
+            return frozenset((_loaded(self.path).file.task,))
+        return frozenset(getattr(CONTROLLERS.get(self.name), "kinds", ()) if not self.path else ())
+
+    @property
+    def label(self) -> str:
+        """Its title, or its name if it has none."""
+        return self.title or self.name
+
+    @property
+    def files(self) -> list[Path]:
+        """Files that its figures depend on, besides the project's code: its own, or a policy's."""
+        algorithm = self.algorithm or ("" if self.path else shipped_algorithm(self.name))
+        if algorithm:
+            folder = Path(self.path) if self.algorithm else POLICIES
+            names = [p for p in shipped_policies(folder) if p.stem.endswith(f"-{algorithm}")]
+            return [file for path in names for file in policy_pair(path)]
+        if not self.path:
+            return []
+        return list(policy_pair(self.path)) if self.is_policy else [Path(self.path)]
+
+    def make(self) -> Controller:
+        """A new controller.
+
+        Raises:
+            ControllerError: its file, class or methods are missing or do not work.
+        """
+        if not self.path and self.name not in CONTROLLERS:
+            near = difflib.get_close_matches(self.name, CONTROLLERS, 1)
+            hint = f"; did you mean {near[0]}?" if near else ""
+            raise ControllerError(
+                f"no controller {self.name!r}; there are {', '.join(CONTROLLERS)}, or give "
+                f"path/to/file.py:ClassName{hint}"
+            )
+        if self.algorithm:
+            return ShippedPolicy(self.algorithm, Path(self.path))
+        if self.is_policy:
+            return _loaded(self.path)
+        factory = _class_of(self) if self.path else CONTROLLERS[self.name]
+        try:
+            controller = factory()
+        except Exception as error:
+            where = raised_at(error, Path(self.path)) or "a controller must need no arguments"
+            raise ControllerError(
+                f"cannot make {self.source}: {factory.__name__}() raised "
+                f"{type(error).__name__}: {error}; {where}"
+            ) from error
+        _check_protocol(self, controller)
+        return controller
+
+
+def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contender]:
+    """Controllers from a list as the command line has it: `pid,path/to/mine.py:MyController`.
+
+    Args:
+        text: names, files with a class, policies, separated by commas.
+        known: controllers whose titles are kept.
+    Raises:
+        ControllerError: one that cannot be made; each is tried.
+    """
+    titled = {contender.name: contender for contender in known}
+    contenders = []
+    for item in (part.strip() for part in text.split(",")):
+        if not item:
+            raise ControllerError(f"an empty name in {text!r}; separate controllers by one comma")
+        path, colon, name = item.rpartition(":")
+        if item.endswith(".py") or (colon and not name):
+            raise ControllerError(f"{item} names no class; write {item.rstrip(':')}:ClassName")
+        contender = _policy(item) or (
+            Contender(name, path=path) if colon else titled.get(item, Contender(item))
+        )
+        made = contender.make()
+        if contender.path and not contender.title:
+            contender = replace(contender, title=_own_name(made))
+        contenders.append(contender)
+    return contenders
+
+
+def _loaded(path: str) -> Policy:
+    """A policy from its file.
+
+    Raises:
+        ControllerError: a file that cannot be used.
+    """
+    try:
+        return Policy(path)
+    except PolicyError as error:
+        raise ControllerError(str(error)) from error
+
+
+def shipped_algorithm(name: str) -> str:
+    """Algorithm of the shipped policies that a controller of the registry runs; else empty."""
+    return getattr(CONTROLLERS.get(name), "algorithm", "")
+
+
+def _policy(item: str) -> Contender | None:
+    """A policy's file, or a folder of policies with their algorithm (`folder:ppo`); else None.
+
+    Raises:
+        ControllerError: the folder has no policy of that algorithm.
+    """
+    if item.endswith(POLICY_FILES):
+        words, _ = policy_pair(item)
+        return Contender(words.stem, path=str(words))
+    path, colon, algorithm = item.rpartition(":")
+    if not colon or not Path(path).is_dir():
+        return None
+    folder = Path(path)
+    contender = Contender(f"{folder.name}-{algorithm}", path=path, algorithm=algorithm)
+    if not contender.kinds:
+        has = ", ".join(file.stem for file in shipped_policies(folder)) or "no policy at all"
+        raise ControllerError(f"{folder} has no policy of {algorithm!r}; it has {has}")
+    return replace(contender, title=f"{algorithm}, {folder.name}")
+
+
+def _own_name(controller: Controller) -> str:
+    """What a controller calls itself; nothing if it does not."""
+    name = getattr(controller, "name", "")
+    return name.strip() if isinstance(name, str) else ""
+
+
+def _class_of(contender: Contender) -> type:
+    """The contender's class, from its file."""
+    module = _module(Path(contender.path))
+    found = getattr(module, contender.name, None)
+    if isinstance(found, type):
+        return found
+    classes = [
+        name
+        for name, value in vars(module).items()
+        if isinstance(value, type) and value.__module__ == module.__name__
+    ]
+    has = f"it has {', '.join(classes)}" if classes else "it has no class"
+    raise ControllerError(f"{contender.path} has no class {contender.name!r}; {has}")
+
+
+def _module(path: Path) -> ModuleType:
+    """The file as a module of its own name; imported once in each process."""
+    if not path.is_file():
+        raise ControllerError(f"there is no file {path}; check the name and the folder")
+    name = f"contender_{path.resolve().as_posix()}"
+    if name in sys.modules:
+        return sys.modules[name]
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ControllerError(f"{path} is no Python file; its name must end in .py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        where = raised_at(error, path)
+        at = f" ({where})" if where else ""
+        raise ControllerError(
+            f"cannot import {path}: {type(error).__name__}: {error}{at}"
+        ) from error
+    return module
+
+
+def raised_at(error: BaseException, path: Path) -> str:
+    """Where in somebody's file an exception came from: the last frame of that file, in words.
+
+    Args:
+        error: as it was caught.
+        path: the file.
+    Returns:
+        `line 9 of mine.py`, and where that line's own calls raised it; empty if no frame is of it.
+    """
+    if not path.name:
+        return ""
+    frames = traceback.extract_tb(error.__traceback__)
+    own = [at for at, frame in enumerate(frames) if _same_file(frame.filename, path)]
+    if not own:
+        return ""
+    where, last = f"line {frames[own[-1]].lineno} of {path.name}", frames[-1]
+    # A helper beside the file is the author's too; a library's inside is not.
+    beside = Path(last.filename).resolve().parent == path.resolve().parent
+    if own[-1] < len(frames) - 1 and beside:
+        where += f", which calls line {last.lineno} of {Path(last.filename).name}"
+    return where
+
+
+def _same_file(name: str, path: Path) -> bool:
+    """Whether a frame's file is a path's, whatever links lead there."""
+    return Path(name).resolve() == path.resolve()
+
+
+def _check_protocol(contender: Contender, controller: object) -> None:
+    """Refuse an object that is no `controllers.controller.Controller`."""
+    for method, arguments in (("reset", "(reference, station)"), ("act", "(observation, time)")):
+        found = getattr(controller, method, None)
+        if not callable(found):
+            raise ControllerError(
+                f"{contender.source} has no method {method}{arguments}; a controller needs reset "
+                f"and act, see {PROTOCOL}"
+            )
+        try:
+            inspect.signature(found).bind(None, None)
+        except (TypeError, ValueError):
+            raise ControllerError(
+                f"{contender.source}: {method} must take {arguments}, see {PROTOCOL}"
+            ) from None

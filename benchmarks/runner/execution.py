@@ -1,0 +1,115 @@
+"""Runs what is missing of a suite, and keeps every case as it is done."""
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from benchmarks.runner.case import Case, Row, cases, failed_row, run_case
+from benchmarks.runner.fingerprint import key
+from benchmarks.runner.journal import JOURNAL, Journal, case_rows
+from benchmarks.runner.processes import run_all
+from benchmarks.runner.worker import ProcessDied
+from benchmarks.suites.frozen import Entry, Episode, FrozenSuite
+from pma_gym.envs import PMAEnv
+
+Identity = tuple[str, Episode]
+"""What tells a case from a suite's others: the controller's name and the episode."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is to be run, and what a journal has already.
+
+    Attributes:
+        suite: the suite.
+        keys: fingerprint of each controller's rows, by its name.
+        cases: every case of these controllers.
+        known: rows of those that are done.
+        outdated: rows of these controllers that were made with something else.
+    """
+
+    suite: FrozenSuite
+    keys: Mapping[str, str]
+    cases: tuple[Case, ...]
+    known: Mapping[Identity, Row]
+    outdated: int
+
+    @property
+    def missing(self) -> list[Case]:
+        """Cases that are not done."""
+        return [case for case in self.cases if identity(case) not in self.known]
+
+
+def identity(case: Case) -> Identity:
+    """What tells a case from its suite's others."""
+    return case.contender.name, case.episode
+
+
+def row_identity(row: Row) -> Identity:
+    """What tells a row from the others of its suite and key."""
+    return row["controller"], Episode(*(row[name] for name in Episode._fields))
+
+
+def plan(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Plan:
+    """What a folder's journal lacks of some controllers' cases.
+
+    A row counts only if its key is that of now. One whose process died counts as not run.
+    """
+    entries = tuple(entries)
+    keys = {entry.contender.name: key(suite, entry.contender) for entry in entries}
+    wanted = tuple(cases(suite, entries))
+    known, outdated = dict[Identity, Row](), 0
+    for row in case_rows(out / JOURNAL):
+        if row.get("controller") not in keys:
+            continue
+        if row.get("key") != keys[row["controller"]]:
+            outdated += 1
+        elif not row["failure"].startswith(ProcessDied.__name__):
+            known[row_identity(row)] = row
+    asked = {identity(case) for case in wanted}
+    known = {its: row for its, row in known.items() if its in asked}
+    return Plan(suite, keys, wanted, known, outdated)
+
+
+def execute(
+    plan: Plan, jobs: int, out: Path, on_done: Callable[[Row], None], wary: bool = False
+) -> bool:
+    """Run what a plan lacks; each row is in the folder's journal before `on_done` hears of it.
+
+    Args:
+        plan: what is to be run.
+        jobs: number of processes; 1 runs in this one.
+        out: folder of the journal.
+        on_done: called with each row.
+        wary: run every case in another process, and none twice, see `run_all`.
+    Returns:
+        Whether all of it was run; Ctrl-C ends the run at once, and what is done stays.
+    """
+    missing = plan.missing
+    with Journal(out / JOURNAL) as journal:
+
+        def keep(index: int, result: object) -> None:
+            case = missing[index]
+            row = failed_row(case, result) if isinstance(result, BaseException) else result
+            assert isinstance(row, dict)
+            row = {"key": plan.keys[case.contender.name]} | row
+            journal.append(row)
+            on_done(row)
+
+        return run_all([_work(case, plan.suite) for case in missing], jobs, keep, wary)
+
+
+def _work(case: Case, suite: FrozenSuite) -> partial[Row]:
+    """A case to be run in any process, which need not draw the station again."""
+    return partial(run_case, case, suite.station(case.episode.station).model)
+
+
+def compile_kernels(suite: FrozenSuite) -> None:
+    """Compile every kernel of a suite once, so that no process finds the cache empty."""
+    structures = {
+        tuple(suite.station(number).model.parameters): number for number in suite.stations
+    }
+    for number in structures.values():
+        for task in suite.tasks:
+            PMAEnv(task=task, model=suite.station(number).model, **suite.environment)

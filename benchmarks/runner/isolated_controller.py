@@ -1,0 +1,141 @@
+"""Somebody's own controller in a process of its own, where there is no environment.
+
+Within one process nothing can be hidden: `gc.get_objects()` and the frames that called a function
+lead to every object. So a class from a file runs in a process that receives the reference, the
+station and the readings as copies, and returns volts. That is no sandbox: the process has the
+user's rights, as any program that the user starts.
+"""
+
+import os
+import pickle
+import threading
+import time
+from collections.abc import Callable
+from functools import partial
+from multiprocessing import connection, parent_process
+from multiprocessing.util import Finalize
+from typing import Any
+
+from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.rollout import checked_volts
+from benchmarks.runner.user_controller import Guarded
+from benchmarks.runner.worker import Worker, deaf_to_interrupt
+from controllers.controller import Controller, Reference
+from pma_gym.envs import Measurement, StationInfo
+
+
+def driver(contender: Contender, period: float, keep_pace: bool = True) -> Controller:
+    """What drives a case: of a class from a file an `Isolated`, of other files a `Guarded`.
+
+    Args:
+        contender: whose controller is made.
+        period: of the control steps (s).
+        keep_pace: whether `act` must keep up with the clock.
+    Raises:
+        ControllerError: it cannot be made.
+    """
+    if not contender.path:
+        return contender.make()
+    kind = Guarded if contender.is_policy else Isolated
+    return kind(contender, period, keep_pace)
+
+
+class Isolated:
+    """A controller in another process, guarded there; a new one of its class for every case.
+
+    The process stays for this process's other cases of the same class.
+
+    Args:
+        contender: whose controller is made and watched.
+        period: of the control steps (s).
+        keep_pace: whether `act` must keep up with the clock.
+
+    Attributes:
+        name: what it calls itself.
+        repetitions: how many trials it runs, see `benchmarks.runner.rollout`.
+        act_seconds: computing time of every `act` of this trial (s), without the way there.
+
+    Raises:
+        ControllerError: the controller cannot be made.
+    """
+
+    def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
+        self._source = contender.source
+        self.act_seconds: list[float] = []
+        self.name, self.repetitions = self._ask(partial(_make, contender, period, keep_pace))
+
+    def reset(self, reference: Reference, station: StationInfo) -> None:
+        """Its `reset`."""
+        self.act_seconds.clear()
+        self._ask(partial(_reset, reference, station))
+
+    def act(self, measurement: Measurement, time: float) -> float:
+        """Its `act`."""
+        volts, seconds = self._ask(partial(_act, measurement, time))
+        self.act_seconds.append(seconds)
+        return volts
+
+    def _ask(self, work: Callable[[], object]) -> Any:  # noqa: ANN401
+        """What a call returns there.
+
+        Raises:
+            ControllerError: what was raised there, in words.
+            TookTooLong: it passed its limit; the process is ended.
+            ProcessDied: the process ended.
+        """
+        worker = _process_of(self._source)
+        try:
+            found = worker.ask(pickle.dumps(work))
+        except BaseException:
+            _processes.pop(self._source).end()
+            raise
+        if isinstance(found, BaseException):
+            raise found
+        return found
+
+
+_processes: dict[str, Worker] = {}
+"""Of this process's controllers, by source."""
+
+
+def _process_of(source: str) -> Worker:
+    if source not in _processes:
+        with deaf_to_interrupt():
+            worker = _processes[source] = Worker()
+        # Before this process waits for its children to end.
+        Finalize(None, worker.end, exitpriority=10)
+    return _processes[source]
+
+
+_controller: Guarded
+"""In a controller's process: the one of the present case."""
+
+
+def _make(contender: Contender, period: float, keep_pace: bool) -> tuple[str, int]:
+    global _controller
+    _end_with_parent()
+    _controller = Guarded(contender, period, keep_pace)
+    return _controller.name, int(getattr(_controller, "repetitions", 1))
+
+
+def _reset(reference: Reference, station: StationInfo) -> None:
+    _controller.reset(reference, station)
+
+
+def _act(measurement: Measurement, now: float) -> tuple[float, float]:
+    began = time.perf_counter()
+    answer = _controller.act(measurement, now)
+    return checked_volts(answer, now), time.perf_counter() - began
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that made it is gone, whatever the controller is at."""
+    parent = parent_process()
+    if parent is None or any(t.name == _end_with_parent.__name__ for t in threading.enumerate()):
+        return
+
+    def watch() -> None:
+        connection.wait([parent.sentinel])
+        os._exit(1)
+
+    threading.Thread(target=watch, name=_end_with_parent.__name__, daemon=True).start()

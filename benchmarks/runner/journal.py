@@ -1,0 +1,226 @@
+"""The journal of a run: one line a case, appended whole, so that a killed run loses nothing."""
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+
+from benchmarks.runner.case import Row
+from benchmarks.runner.damaged_results import say_damaged
+from benchmarks.suites.reproduction import SuiteError
+from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape
+from pma_gym.documents import parse_json
+from pma_gym.files import replace_file
+from pma_gym.limits import limit
+
+JOURNAL = "journal.jsonl"
+
+_ROW = {
+    "key?": Maybe(str),
+    "suite": str,
+    "version": Whole(),
+    "controller": str,
+    "station": Whole(),
+    "task": str,
+    "pressure_kpa": Real(),
+    "repeat": Whole(),
+    "seed": Whole(),
+    "failure": str,
+}
+"""Shape of a case's row."""
+
+_FIGURES = {
+    "unit": str,
+    "phases": {"*": {"rmse": Real(), "percent_of_range": Real(), "largest_error": Real()}},
+    **{
+        name: Real()
+        for name in (
+            "rmse",
+            "start_rmse",
+            "steady_rmse",
+            "effort_v",
+            "variation_v_per_s",
+            "saturation_share",
+            "violation",
+            "act_us",
+            "act_us_worst",
+        )
+    },
+    "exercise?": {"*": Maybe(Real())},
+}
+"""Shape of the figures of a case that has some."""
+
+SYNC_S = 2.0
+"""How much of the work a crash of the machine may cost (s); a killed process costs none."""
+
+
+class Journal:
+    """Appends rows to a file, each by one write.
+
+    Several processes may append to one file: the system puts every write at its end. A line that a
+    crash tore is closed before the next one, and `read_rows` passes over it.
+
+    Args:
+        path: the file; made with its folder if it is not there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        self._file = _opened(path)
+        size = os.fstat(self._file).st_size
+        if size and os.pread(self._file, 1, size - 1) != b"\n":
+            os.write(self._file, b"\n")
+        self._synced = time.monotonic()
+
+    def append(self, row: Row) -> None:
+        """Write a row; it is there even if this process is killed right after.
+
+        Raises:
+            OSError: it could not be written whole, as on a full disk.
+        """
+        line = (json.dumps(row, allow_nan=False) + "\n").encode()
+        written = os.write(self._file, line)
+        if written != len(line):
+            raise OSError(f"only {written} of {len(line)} bytes of a row could be written")
+        if time.monotonic() - self._synced > SYNC_S:
+            os.fsync(self._file)
+            self._synced = time.monotonic()
+
+    def close(self) -> None:
+        """Bring everything to the disk."""
+        os.fsync(self._file)
+        os.close(self._file)
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _opened(path: Path) -> int:
+    """The file, locked against being rewritten while it is appended to."""
+    while True:
+        file = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o644)
+        _lock(file, exclusive=False)
+        # Another process may have put a rewritten journal in its place meanwhile.
+        if path.exists() and os.path.samestat(os.fstat(file), path.stat()):
+            return file
+        os.close(file)
+
+
+def _lock(file: int, exclusive: bool) -> None:
+    """Lock a file until it is closed: appending processes share it, a rewriting one has it alone.
+
+    Raises:
+        BlockingIOError: wanted alone, and others append.
+    """
+    try:
+        import fcntl
+    except ImportError:  # Windows refuses to replace an open file.
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB if exclusive else fcntl.LOCK_SH)
+    except BlockingIOError:
+        raise
+    except OSError:
+        # Some network file systems have no locks.
+        return
+
+
+@dataclass
+class Lines:
+    """Lines of a journal that is rewritten, each with its end.
+
+    Attributes:
+        lines: as they were read; whoever rewrites puts others in their place.
+    """
+
+    lines: list[bytes]
+
+
+@contextmanager
+def rewriting(path: Path) -> Iterator[Lines]:
+    """The lines of a journal, to be changed inside; the file is then replaced as a whole.
+
+    Raises:
+        SuiteError: a run is appending to it.
+    """
+    file = os.open(path, os.O_RDONLY)
+    try:
+        try:
+            _lock(file, exclusive=True)
+        except BlockingIOError:
+            raise SuiteError(
+                f"a run is writing to {path}; wait until it is done, or end it, and try again"
+            ) from None
+        lines = Lines(path.read_bytes().splitlines(keepends=True))
+        yield lines
+        replace_file(path, b"".join(lines.lines))
+    finally:
+        os.close(file)
+
+
+def read_rows(path: Path) -> Iterator[Row]:
+    """The rows of a journal, in the order in which they came; none if there is no file.
+
+    What is no whole row, as a line that a crash tore, is passed over: its case counts as not run,
+    and one line on standard error says so.
+    """
+    damaged: list[str] = []
+    for number, line in _lines(path):
+        try:
+            row = parse_json(line, f"line {number}", own=True)
+        except ValueError as error:
+            damaged.append(str(error))
+            continue
+        if isinstance(row, dict):
+            yield row
+        elif line.strip():
+            damaged.append(f"line {number} is no row")
+    _say_damaged(path, damaged)
+
+
+def case_rows(path: Path) -> Iterator[Row]:
+    """As `read_rows`, those alone that are rows of cases, with figures or a reason for none."""
+    damaged: list[str] = []
+    for number, row in enumerate(read_rows(path), start=1):
+        try:
+            check_shape(row, _ROW)
+            if not row["failure"]:
+                check_shape(row, _FIGURES)
+        except ShapeError as error:
+            damaged.append(f"row {number}: {error}")
+            continue
+        yield row
+    _say_damaged(path, damaged)
+
+
+def _lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Lines of a file with their numbers; of one that is too long its beginning."""
+    if not path.is_file():
+        return
+    most, number = limit("document_kib") * 1024, 0
+    with path.open("rb") as file:
+        while line := file.readline(most):
+            number += 1
+            rest = line
+            while len(rest) == most and not rest.endswith(b"\n"):
+                rest = file.readline(most)
+            if line.strip():
+                yield number, line
+
+
+def _say_damaged(path: Path, damaged: list[str]) -> None:
+    if damaged:
+        more = f" and {len(damaged) - 1} more" if len(damaged) > 1 else ""
+        say_damaged(path, f"{damaged[0]}{more}", "those cases count as not run, the others stay")

@@ -1,0 +1,176 @@
+"""What a run was made with: written beside its scores, and read by those who show them."""
+
+import json
+import shlex
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from benchmarks.files import write_text
+from benchmarks.runner.case import Row
+from benchmarks.runner.damaged_results import say_damaged
+from benchmarks.runner.environment_info import environment_info
+from benchmarks.runner.execution import Plan, row_identity
+from benchmarks.runner.fingerprint import code_digest
+from benchmarks.runner.journal import JOURNAL, case_rows
+from benchmarks.suites.frozen import Entry, FrozenSuite
+from benchmarks.suites.reproduction import SuiteError
+from pma_gym.document_shape import ShapeError, Whole, check_shape
+from pma_gym.documents import read_json
+
+RUN, STATIONS = "run.json", "stations.json"
+SCHEMA = 1
+
+_KNOWN = {
+    "suite?": {"name?": str, "digest?": str, "version?": Whole()},
+    "contenders?": {"*": {"title": str, "source": str, "key": str}},
+    "code?": str,
+}
+"""Shape of what another run needs of a `run.json`."""
+
+_REPORTED = {
+    "suite": {"name": str, "digest": str, "version": Whole()},
+    "contenders": {"*": {"title": str, "source": str, "key": str, "command": str, "started": str}},
+    "code": str,
+    "git": dict,
+    "versions": {"*": str},
+    "platform": str,
+    "processors": Whole(),
+}
+"""Shape of what a report says of a run."""
+
+
+def check_folder(suite: FrozenSuite, out: Path) -> None:
+    """Refuse a folder that cannot take a suite's results.
+
+    Raises:
+        SuiteError: it is a file, or has another suite's results.
+    """
+    if out.exists() and not out.is_dir():
+        raise SuiteError(f"--out {out} is a file; name a folder for the results")
+    name = read_run(out).get("suite", {}).get("name")
+    if name not in (None, suite.name):
+        raise SuiteError(f"--out {out} has results of suite {name}; name another folder")
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def read_run(out: Path) -> dict[str, Any]:
+    """What is known of the last run into a folder; empty if there is none, or a damaged one."""
+    path = out / RUN
+    if not path.exists():
+        return {}
+    try:
+        document = read_json(path, "journal_mib", own=True)
+        check_shape(document, _KNOWN)
+    except ValueError as error:
+        say_damaged(path, str(error), "a run writes it anew; sound rows of the journal stay")
+        return {}
+    return document
+
+
+def check_run(out: Path, info: Mapping[str, Any], source: str) -> None:
+    """Refuse what is known of a run if it lacks what a report says.
+
+    Raises:
+        SuiteError: what is missing, and how it is written anew.
+    """
+    try:
+        check_shape(info, _REPORTED)
+    except ShapeError as error:
+        raise SuiteError(
+            f"{out / RUN} is damaged ({error}); a run writes it anew: python -m benchmarks run "
+            f"--suite {source}"
+        ) from None
+
+
+def finished_rows(out: Path) -> list[Row]:
+    """The rows of a folder that belong together: made with one code, one version of the suite.
+
+    They are those of the last run's controllers, and of earlier ones whose run had the same code;
+    of a case that ran twice the later row.
+    """
+    keys = {name: entry["key"] for name, entry in read_run(out).get("contenders", {}).items()}
+    found = {
+        row_identity(row): row
+        for row in case_rows(out / JOURNAL)
+        if row.get("key") is not None and keys.get(row.get("controller")) == row["key"]
+    }
+    return list(found.values())
+
+
+def run_info(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> dict[str, Any]:
+    """What a run was made with: its resolved configuration, versions, commit and command."""
+    suite = todo.suite
+    return {
+        "schema": SCHEMA,
+        "suite": {
+            "name": suite.name,
+            "title": suite.title,
+            "version": suite.version,
+            "source": suite.source,
+            "digest": suite.digest,
+            "seed": suite.seed,
+            "model": suite.model,
+            "environment": dict(suite.environment),
+            "stations": list(suite.stations),
+            "recipe": asdict(suite.recipe) if suite.recipe else None,
+            "episodes": [deal._asdict() for deal in suite.deals],
+        },
+        "contenders": _contenders(todo, entries, out),
+        "code": code_digest(),
+        "jobs": jobs,
+        **environment_info(),
+    }
+
+
+def _contenders(todo: Plan, entries: Sequence[Entry], out: Path) -> dict[str, dict[str, str]]:
+    """Title, source, key and command of those that are run, and of earlier ones of this code."""
+    before, now = read_run(out), (code_digest(), todo.suite.digest)
+    same = (before.get("code"), before.get("suite", {}).get("digest")) == now
+    kept = before.get("contenders", {}) if same else {}
+    command = {
+        "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
+        "started": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+    return kept | {
+        entry.contender.name: {
+            "title": entry.contender.label,
+            "source": entry.contender.source,
+            "key": todo.keys[entry.contender.name],
+            **command,
+        }
+        for entry in entries
+    }
+
+
+def _stations(suite: FrozenSuite) -> list[dict[str, Any]]:
+    """Every station of a suite, with every number."""
+    found = []
+    for number in suite.stations:
+        drawn = suite.station(number)
+        found.append(
+            {
+                "station": number,
+                "effects": drawn.present,
+                "refused_draws": drawn.refused,
+                "parameters": {name: drawn.model.at_the_door(name) for name in drawn.model.effects},
+            }
+        )
+    return found
+
+
+def write_run(out: Path, info: Mapping[str, Any], **more: object) -> None:
+    """Write what a run was made with."""
+    write_text(out / RUN, _text({**info, **more}))
+
+
+def write_stations(out: Path, suite: FrozenSuite) -> None:
+    """Write every station of a suite with all its numbers."""
+    write_text(out / STATIONS, _text(_stations(suite)))
+
+
+def _text(document: object) -> str:
+    return json.dumps(document, indent=1, allow_nan=False) + "\n"

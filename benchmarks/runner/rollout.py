@@ -1,0 +1,244 @@
+"""One case, run: a controller drives an environment, and what happened comes back."""
+
+import copy
+import math
+import numbers
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import gymnasium as gym
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.runner.controller_spec import ControllerError
+from controllers.controller import Controller
+from pma_gym.data.trial import Trial
+from pma_gym.engine.actions import HIGHEST_VOLTAGE
+from pma_gym.envs import ENVIRONMENTS, Measurement, PMAEnv
+from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
+
+# 5 s in steps of 0.01 s are 499.99999999999994 steps.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Rollout:
+    """What happened in an episode that a controller drove, to its end or to a physical limit.
+
+    Attributes:
+        task: the task.
+        period: of the control steps (s).
+        start: contraction that extension is counted from (m).
+        position: true position (m or rad) at k / 384 s.
+        asked: volts that the controller returned, before they are held to 0-10 V, shape (steps,).
+        commands: motor and regulator voltage (V) in force in every control step, shape (steps, 2).
+        readings: at the steps' beginnings and the end: extension, rotation, load, pressure (SI),
+            shape (steps + 1, 4).
+        truth: true contraction (m), load (N) and pressure (Pa) at the same instants.
+        act_seconds: computing time of every `act` (s), shape (steps,).
+        step_seconds: time spent inside the environment's steps (s).
+        ended_by: the physical limit that ended it early, in words, or "".
+    """
+
+    task: Task
+    period: float
+    start: float
+    position: NDArray[np.float64]
+    asked: NDArray[np.float64]
+    commands: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    truth: Mapping[str, NDArray[np.float64]]
+    act_seconds: NDArray[np.float64]
+    step_seconds: float
+    ended_by: str
+
+    @property
+    def steps(self) -> int:
+        """Control steps that it took."""
+        return len(self.commands)
+
+    @cached_property
+    def trial(self) -> Trial:
+        """It as a trial on the 384 Hz grid: the true position, commands in force, last readings."""
+        times = np.arange(self.position.size) / SAMPLE_RATE_HZ
+        step = np.floor(times / self.period + _ROUNDING).astype(int)
+        # The last grid point may fall on the end of the last step, where no further command came.
+        volts = self.commands[np.minimum(step, self.steps - 1)]
+        held = self.readings[step]
+        return Trial(
+            time=times,
+            commands={"motor_voltage": volts[:, 0], "regulator_voltage": volts[:, 1]},
+            measurements={
+                "contraction": self.start - held[:, 0],
+                "rotation": held[:, 1],
+                "load": held[:, 2],
+                "pressure": held[:, 3],
+            },
+            truth={self.task.protocol.quantity: self.position + self._zero},
+        )
+
+    @property
+    def clipped(self) -> tuple[float, float]:
+        """Share of the steps that asked for volts outside 0-10 V, and the farthest beyond (V)."""
+        beyond = np.maximum(self.asked - HIGHEST_VOLTAGE, -self.asked)
+        return float(np.mean(beyond > 0.0)), float(np.max(beyond, initial=0.0))
+
+    @property
+    def _zero(self) -> float:
+        """What the position is counted from, as trials count it (m or rad)."""
+        return self.start if self.task.protocol.quantity == "contraction" else 0.0
+
+
+def make_environment(
+    task: str, model: str, pressure_kpa: float, control_rate_hz: float = 100.0, noise: bool = True
+) -> PMAEnv:
+    """The registered environment of a task at one pressure, without wrappers."""
+    identifier = next(name for name, its in ENVIRONMENTS.items() if its == task)
+    environment = gym.make(
+        identifier,
+        model=model,
+        pressure_kpa=float(pressure_kpa),
+        control_rate_hz=control_rate_hz,
+        noise=noise,
+    ).unwrapped
+    assert isinstance(environment, PMAEnv)
+    return environment
+
+
+def rollout(
+    environment: PMAEnv,
+    controller: Controller,
+    seed: int,
+    nominal: Model | None = None,
+    reveal: bool = False,
+) -> Rollout:
+    """Let a controller drive one episode, or the last of its repetitions.
+
+    A controller with `repetitions` has driven so many episodes when this ends, all but the last to
+    practise: on the same station and reference, each with a noise of its own. It receives copies
+    of the reference, the station and the readings, and no environment.
+
+    Args:
+        environment: of one pressure.
+        controller: who drives; reset first.
+        seed: seed of the episode.
+        nominal: model that the controller receives, if the environment has another.
+        reveal: hand the environment to the controller's method `receive` before each reset; only
+            for the oracle, which is no rival but the bound that rivals are measured by.
+    Returns:
+        What happened, to the last scored sample or to where a physical limit ended it.
+    Raises:
+        ControllerError: the controller returned what is no voltage.
+        Exception: whatever the controller or the environment raised.
+    """
+    for practice in range(1, getattr(controller, "repetitions", 1)):
+        _begin(environment, controller, practice_seed(seed, practice), nominal, reveal)
+        _drive(environment, controller, _Log())
+    log = _Log()
+    _begin(environment, controller, seed, nominal, reveal)
+    _drive(environment, controller, log)
+    return log.rollout(environment)
+
+
+def practice_seed(seed: int, practice: int) -> int:
+    """Seed of an episode before the one that is scored."""
+    return int(np.random.SeedSequence([seed, practice]).generate_state(1)[0])
+
+
+class _Log:
+    """What is written down while an episode runs."""
+
+    def __init__(self) -> None:
+        self.asked: list[float] = []
+        self.commands: list[tuple[float, float]] = []
+        self.readings: list[Measurement] = []
+        self.truths: list[tuple[float, float, float]] = []
+        self.act_seconds: list[float] = []
+        self.step_seconds = 0.0
+        self.start = 0.0
+
+    def record(self, environment: PMAEnv) -> None:
+        """Write down where the station stands."""
+        truth = environment.truth
+        if not self.readings:
+            self.start = truth["contraction"] + truth["extension"]
+        self.readings.append(environment.measurement)
+        self.truths.append((truth["contraction"], truth["load"], truth["pressure"]))
+
+    def rollout(self, environment: PMAEnv) -> Rollout:
+        """All of it, at the episode's end."""
+        last = environment.task.protocol.phases[-1]
+        truths = np.array(self.truths).T
+        return Rollout(
+            task=environment.task,
+            period=environment.options.period,
+            start=self.start,
+            position=environment.trajectory()[: last.first + last.samples],
+            asked=np.array(self.asked),
+            commands=np.array(self.commands),
+            readings=np.array([reading[1:] for reading in self.readings]),
+            truth=dict(zip(("contraction", "load", "pressure"), truths, strict=True)),
+            act_seconds=np.array(self.act_seconds),
+            step_seconds=self.step_seconds,
+            ended_by=environment.ended_by,
+        )
+
+
+def _begin(
+    environment: PMAEnv, controller: Controller, seed: int, nominal: Model | None, reveal: bool
+) -> None:
+    """Reset the environment and the controller."""
+    environment.reset(seed=seed)
+    if reveal:
+        controller.receive(environment)  # type: ignore[attr-defined]
+    station = environment.station
+    if nominal is not None:
+        # A copy: whatever the controller does to it, the next case receives the same model.
+        station = replace(station, model=copy.copy(nominal))
+    controller.reset(environment.reference, station)
+
+
+def _drive(environment: PMAEnv, controller: Controller, log: _Log) -> None:
+    """Run an episode to its end."""
+    log.record(environment)
+    clock, ended = time.perf_counter, False
+    while not ended:
+        now, reading = environment.time, log.readings[-1]
+        asked = clock()
+        answer = controller.act(reading, now)
+        answered = clock()
+        volts = checked_volts(answer, now)
+        action = environment.action(volts)
+        given = clock()
+        _, _, terminated, truncated, _ = environment.step(action)
+        log.step_seconds += clock() - given
+        log.asked.append(volts)
+        log.act_seconds.append(answered - asked)
+        log.commands.append((environment.motor_voltage, environment.regulator_voltage))
+        log.record(environment)
+        ended = terminated or truncated
+
+
+def checked_volts(volts: object, now: float) -> float:
+    """A controller's answer as volts.
+
+    Raises:
+        ControllerError: it is no finite number; says what came and when.
+    """
+    if isinstance(volts, np.ndarray) and volts.size == 1:
+        volts = volts.item()
+    if isinstance(volts, bool) or not isinstance(volts, numbers.Real):
+        raise ControllerError(
+            f"act must return volts as a number, 0-10 V, at {now:.4g} s it returned {volts!r} "
+            f"({type(volts).__name__}); return float(volts)"
+        )
+    if not math.isfinite(volts):
+        raise ControllerError(
+            f"act must return finite volts, 0-10 V, at {now:.4g} s it returned {float(volts)}; "
+            "look for a division by zero or a root of a negative number there"
+        )
+    return float(volts)

@@ -1,0 +1,1 @@
+"""A speed run as a document, as tables and as ratios with targets."""

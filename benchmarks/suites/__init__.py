@@ -1,0 +1,1 @@
+"""Frozen suites: TOML files that pin every number, and their readers."""

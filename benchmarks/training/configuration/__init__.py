@@ -1,0 +1,1 @@
+"""Presets: reading and checking them."""

@@ -1,0 +1,127 @@
+"""The batched environment as a policy meets it: entries of its view in, its actions out."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode
+from numpy.typing import NDArray
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
+
+from benchmarks.training.reward import bounded
+from controllers.policies.action_mapping import HIGHEST_V, ActionMapping
+from controllers.policies.batch_adapter import BatchPolicyAdapter
+from controllers.policies.observation_spec import ObservationSpec
+from pma_gym.engine.observation import BOUND
+from pma_gym.envs import PMAVectorEnv, StationInfo
+from pma_gym.plant.model import load_model
+from pma_gym.sb3 import EngineVecEnv
+
+
+class PilotedVecEnv(EngineVecEnv):
+    """`PMAVectorEnv` behind a view and a form, for Stable-Baselines3.
+
+    Args:
+        count: how many environments.
+        task: name of the task.
+        view: what the policy sees; `tracking`.
+        form: what its action does.
+        told: name of the model that controllers are told.
+        staggered: cut each environment's first episode at a random length, so that a rollout has
+            all parts of a trial in it.
+        reward_scale: factor on the bounded rewards.
+        options: as `PMAVectorEnv`.
+
+    Attributes:
+        envs: the PMAVectorEnv.
+    """
+
+    def __init__(
+        self,
+        count: int,
+        task: str,
+        view: ObservationSpec,
+        form: ActionMapping,
+        told: str = "station",
+        staggered: bool = False,
+        reward_scale: float = 1.0,
+        **options: Any,
+    ) -> None:
+        """Make the environments and who pilots them."""
+        self.envs = PMAVectorEnv(count, task, autoreset_mode=AutoresetMode.DISABLED, **options)
+        chosen, model = self.envs.options, load_model(told)
+
+        def station(pressure: float) -> StationInfo:
+            late = chosen.action_delay * chosen.period, chosen.observation_delay * chosen.period
+            return StationInfo(model, self.envs.task, pressure, chosen.period, *late)
+
+        self.pilots = BatchPolicyAdapter(count, view, form, station)
+        self._staggered, self._scale = staggered, reward_scale
+        self._length = self.envs.task.steps(chosen.control_rate_hz)
+        self._left = np.zeros(count, np.int64)
+        self._nothing: list[dict[str, Any]] = [{} for _ in range(count)]
+        self._actions = np.zeros((count, 1), np.float32)
+        self._returns = np.zeros(count)
+        self._all = np.arange(count)
+        super().__init__(
+            count,
+            spaces.Box(-BOUND, BOUND, (self.pilots.entries,), np.float32),
+            spaces.Box(-1.0, 1.0, (1,), np.float32),
+        )
+
+    def reset(self) -> VecEnvObs:
+        """Begin an episode in every environment, with the seeds that `seed` was given."""
+        self.envs.reset(seed=self._seeds if self._seeds[0] is not None else None)
+        self._left[:] = np.iinfo(np.int64).max
+        if self._staggered:
+            generator = np.random.default_rng(self._seeds[0])
+            self._left[:] = generator.integers(1, self._length + 1, self.num_envs)
+        self._reset_seeds()
+        self._returns[:] = 0.0
+        self.pilots.begin(self._all, self.envs.pressures)
+        return self.pilots.update(self.envs.measurements(), self._all)
+
+    def step_async(self, actions: np.ndarray) -> None:
+        """Keep the actions of the next step."""
+        self._actions = actions
+
+    def step_wait(self) -> VecEnvStepReturn:
+        """Step; an environment whose episode ends returns the next one's first entries."""
+        volts = self.pilots.volts(self._actions[:, 0].astype(np.float64))
+        commands = volts[:, None] * (2.0 / HIGHEST_V) - 1.0
+        _, rewards, terminated, truncated, info = self.envs.step(commands)
+        self._returns += rewards
+        self._left -= 1
+        entries = self.pilots.update(self.envs.measurements())
+        learned = bounded(rewards, terminated, self._scale)
+        over = terminated | truncated | (self._left == 0)
+        infos = self._nothing.copy()
+        if over.any():
+            which = np.flatnonzero(over)
+            for i in which.tolist():
+                infos[i] = self._last(i, entries[i].copy(), info, bool(terminated[i]))
+            self._begin_again(which, over)
+            entries[which] = self.pilots.update(self.envs.measurements(), which)
+        return entries, learned.astype(np.float32), over, infos
+
+    def _last(
+        self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
+    ) -> dict[str, Any]:
+        """What is told of an environment whose episode ends; errors unless it was cut."""
+        name = f"rmse_by_phase_{self.envs.task.protocol.suffix}"
+        told: dict[str, Any] = {
+            "terminal_observation": entries,
+            "TimeLimit.truncated": not broken,
+            "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
+        }
+        if name in info and info[f"_{name}"][i]:
+            phases = info[name]
+            told[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
+        return told
+
+    def _begin_again(self, which: NDArray[np.int64], over: NDArray[np.bool_]) -> None:
+        self.envs.reset(options={"reset_mask": over})
+        self._returns[which] = 0.0
+        self._left[which] = np.iinfo(np.int64).max
+        self.pilots.begin(which, self.envs.pressures[which])

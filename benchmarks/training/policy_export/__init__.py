@@ -1,0 +1,1 @@
+"""Policy files and ONNX files from trained models."""

@@ -1,0 +1,1 @@
+"""The next experiment: safe excitations, and what trials of them would tell."""

@@ -1,0 +1,250 @@
+"""The experiment that would tell more: of a library of safe ones, what separates rivals fastest.
+
+Every rival simulates each protocol with the parameters that it was fitted with. How far two of them
+lie apart, whitened by the noise, is what the data of such a trial could tell; what the parameters
+of the wrong one could still absorb, given how well the trials so far determine them, is taken out
+to first order. Half of the chi-square that is left is the log-likelihood ratio to expect.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.diagnosis import NextExperiment
+from pma_gym.discovery.experiments.excitation import Protocol, library
+from pma_gym.discovery.experiments.predicted_trials import (
+    as_measured,
+    columns,
+    derivatives,
+    proposal,
+)
+from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.predictive_density import covariance_root, unabsorbed
+from pma_gym.discovery.screening.score_test import SHOWN_GAIN
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+Rival = tuple[Fitted, tuple[Suspect, ...]]
+
+ENOUGH = SHOWN_GAIN / 2.0
+"""Log odds that settle a question: five standard deviations. A shorter test that would leave it
+open is not preferred to one that settles it."""
+
+LEAST = 1.0
+"""Log odds below which no protocol tells two rivals apart at all."""
+
+DRAWS = 8
+"""Sizes and shapes of effects that the promise is tried on, beside the estimate."""
+
+PLAUSIBLE = (0.1, 2.0)
+"""Shares of an estimate that draws keep to: what the trials do not bound could be drawn absurd."""
+
+
+@dataclass(frozen=True)
+class Hope:
+    """What to expect of a protocol.
+
+    Attributes:
+        protocol: the protocol.
+        log_odds: of the pair of rivals that is hardest to tell.
+        pair: that pair, (true, wrong); (0, 1) where it does not matter.
+    """
+
+    protocol: Protocol
+    log_odds: float
+    pair: tuple[int, int] = (0, 1)
+
+    @property
+    def rank(self) -> tuple[bool, float]:
+        """What the choice goes by: whether it settles the question, then log odds a minute."""
+        return self.log_odds >= ENOUGH, self.log_odds / self.protocol.minutes
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Rivals, and what each may really be.
+
+    Attributes:
+        bench: the trials so far.
+        fits: of the rivals.
+        models: theirs, as a new trial would see them.
+        draws: parameters of each, shape (1 + k, p): its estimate, then what it may be as well.
+    """
+
+    bench: Bench
+    fits: tuple[Fitted, ...]
+    models: tuple[Model, ...]
+    draws: tuple[Array, ...]
+
+    @classmethod
+    def of(cls, bench: Bench, rivals: Sequence[Rival], seed: int) -> "Contest":
+        """Of fitted rivals.
+
+        Data that leave a question open seldom tell how large the effect is, and a promise on the
+        estimate alone would be broken where that is too large. So the sizes and shapes of effects
+        are drawn from what the fit knows of them. The model's own parameters are not: what they
+        change is absorbed by the other rival's.
+        """
+        generator = np.random.Generator(np.random.Philox(seed))
+        fits = tuple(fit for fit, _ in rivals)
+        models = tuple(_as_next(fit.model, extra) for fit, extra in rivals)
+        own = set(bench.own.free)
+        return cls(bench, fits, models, tuple(_drawn(fit, own, generator) for fit in fits))
+
+    def pairs(self) -> list[tuple[int, int]]:
+        """Which rival may be true, and which is then wrong."""
+        return list(permutations(range(len(self.fits)), 2))
+
+    def odds(
+        self,
+        protocols: Sequence[Protocol],
+        pairs: Sequence[tuple[int, int]],
+        refitted: bool = True,
+    ) -> Array:
+        """Log odds to expect of protocols for each pair, shape (protocols, pairs).
+
+        The lower quartile over what the true rival may be: a promise that is mostly kept.
+
+        Args:
+            protocols: simulated by the models, in their order.
+            pairs: true and wrong rivals.
+            refitted: take out what the wrong one's parameters absorb, which costs its derivatives.
+        """
+        found = np.zeros((len(protocols), len(pairs)))
+        changes = {true: self._changes(true, protocols) for true, _ in pairs}
+        first = {wrong: true for true, wrong in reversed(pairs) if refitted}
+        absorbing = {
+            wrong: self._slopes(wrong, _simulated(protocols, true)) for wrong, true in first.items()
+        }
+        for at, (true, wrong) in enumerate(pairs):
+            fit, trials = self.fits[wrong], _simulated(protocols, true)
+            given = columns(self.bench, self.models[wrong], fit.paths, trials, fit.values[None])
+            for k, each in enumerate(given):
+                if each is None:
+                    continue
+                apart = each[0].astype(np.float64).ravel() - changes[true][k]
+                if refitted:
+                    by = absorbing[wrong][k]
+                    gains = np.zeros(1) if by is None else unabsorbed(apart, by, fit)
+                else:
+                    gains = np.sum(apart**2, axis=1)
+                found[k, at] = 0.5 * float(np.quantile(gains, 0.25))
+        return found
+
+    def _changes(self, true: int, protocols: Sequence[Protocol]) -> list[Array]:
+        """What draws of a rival change of its simulations, whitened, shape (1 + k, n) each.
+
+        To first order, which size is nearly: a simulation of every draw may meet parameters so
+        odd that it hardly ends.
+        """
+        fit, draws = self.fits[true], self.draws[true]
+        effects = np.flatnonzero(np.any(draws != fit.values, axis=0))
+        if not len(effects):
+            return [np.zeros((1, 1))] * len(protocols)
+        by = self._slopes(true, _simulated(protocols, true), effects)
+        moves = (draws - fit.values)[:, effects]
+        return [np.zeros((1, 1)) if each is None else moves @ each for each in by]
+
+    def _slopes(
+        self, rival: int, trials: Sequence[Trial], which: NDArray[np.int64] | None = None
+    ) -> list[Array | None]:
+        """Derivatives of trials, if a rival is true, by its parameters, or some of them."""
+        return derivatives(self.bench, self.models[rival], self.fits[rival], trials, which)
+
+
+def _simulated(protocols: Sequence[Protocol], rival: int) -> list[Trial]:
+    return [protocol.simulated[rival] for protocol in protocols]
+
+
+def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExperiment | None:
+    """The safe protocol that tells rivals apart fastest.
+
+    Args:
+        bench: the trials so far.
+        rivals: models that explain them, each fitted, with the suspects in it.
+        seed: of what is random in protocols, and of what the rivals may be.
+    Returns:
+        What to measure next; None where there are not two rivals, see `blind_spots.for_blind` then,
+        or where no protocol is safe.
+    """
+    if len(rivals) < 2:
+        return None
+    contest = Contest.of(bench, rivals, seed)
+    best = fastest(contest, list(library([*contest.models, bench.given], seed)))
+    if best is None:
+        return None
+    promised = min(best.log_odds, *_after_refit(contest, rivals, best))
+    shared = set.intersection(*(set(fit.names) for fit in contest.fits))
+    names = [" + ".join(n for n in fit.names if n not in shared) for fit in contest.fits]
+    told = [name for name in names if name]
+    if len(told) != 1:
+        told = [name or "none of them" for name in names]
+    return proposal(best.protocol, told, promised)
+
+
+def fastest(contest: Contest, protocols: Sequence[Protocol]) -> Hope | None:
+    """The best of protocols, None if there are none.
+
+    What parameters absorb only lowers the odds. So differences as they are bound them from above,
+    and the costly derivatives are needed for few protocols.
+    """
+    if not protocols:
+        return None
+    pairs = contest.pairs()
+    bound = contest.odds(protocols, pairs, refitted=False)
+    # Two rivals that nothing tells apart must not hide what tells them from a third.
+    told = np.max(bound, axis=0) >= LEAST
+    kept = np.flatnonzero(told if told.any() else ~told)
+    chosen = [pairs[k] for k in kept]
+    hoped = [
+        Hope(each, float(np.min(row[kept]))) for each, row in zip(protocols, bound, strict=True)
+    ]
+    best: Hope | None = None
+    for hope in sorted(hoped, key=lambda each: each.rank, reverse=True):
+        if best is not None and hope.rank <= best.rank:
+            break
+        (odds,) = contest.odds([hope.protocol], chosen)
+        found = Hope(hope.protocol, float(np.min(odds)), chosen[int(np.argmin(odds))])
+        if best is None or found.rank > best.rank:
+            best = found
+    return best
+
+
+def _after_refit(contest: Contest, rivals: Sequence[Rival], hope: Hope) -> Iterator[float]:
+    """Log odds of the hardest pair, either way round, when the wrong one is really refitted.
+
+    Where trials hardly determine a rival, first order underestimates what it can absorb.
+    """
+    bench = contest.bench
+    for true, wrong in (hope.pair, hope.pair[::-1]):
+        fit, extra = rivals[wrong]
+        trial = as_measured(bench, hope.protocol.simulated[true])
+        joint = replace(bench, trials=[*bench.trials, trial])
+        refitted = joint.fit(fit.model, [_once_more(suspect) for suspect in extra])
+        if refitted is not None:
+            yield max(0.0, 0.5 * (refitted.chi_square - fit.chi_square))
+
+
+def _once_more(suspect: Suspect) -> Suspect:
+    """A suspect with one trial more, the first after a rest."""
+    return replace(suspect, own={path: [*each, min(each)] for path, each in suspect.own.items()})
+
+
+def _drawn(fit: Fitted, own: set[str], generator: np.random.Generator) -> Array:
+    """The estimate, then draws of a fit's effects, within bounds, shape (1 + DRAWS, p)."""
+    free = np.array([path not in own for path in fit.paths])
+    moves = (covariance_root(fit) @ generator.standard_normal((len(fit.paths), DRAWS))).T
+    scale = np.where(fit.values == 0.0, 1.0, fit.values)
+    drawn = fit.values * np.where(free, np.clip(1.0 + moves / scale, *PLAUSIBLE), 1.0)
+    return np.concatenate([fit.values[None], np.clip(drawn, *bounds(fit.paths))])
+
+
+def _as_next(model: Model, extra: Sequence[Suspect]) -> Model:
+    """A model as a new trial would see it, the first after a rest."""
+    own = {path: float(min(each)) for suspect in extra for path, each in suspect.own.items()}
+    return model.replace(own) if own else model

@@ -1,0 +1,87 @@
+"""A candidate: an effect that a model may lack, ready to be fitted."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import Model
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Suspect:
+    """One effect that may be missing.
+
+    Attributes:
+        name: its name in the diagnosis.
+        effect: its effect's name in the catalogue.
+        model: the model with the effect where it does nothing.
+        paths: the parameters that make it what it is.
+        fitted: which of them are fitted with it, shape (p,); the others only switch it on.
+        absent: their values where it does nothing, at the door, shape (p,).
+        probes: values at which it is looked for, shape (n, p).
+        amplitudes: which of them scale with the size of the effect, shape (p,).
+        signs: for each probe, whether the opposite makes sense too.
+        own: values (SI) that a parameter has in each trial, by path.
+        left: paths that left the law because the trials do not determine them (`nested_laws`).
+    """
+
+    name: str
+    effect: str
+    model: Model
+    paths: tuple[str, ...]
+    fitted: NDArray[np.bool_]
+    absent: Array
+    probes: Array
+    amplitudes: NDArray[np.bool_]
+    signs: NDArray[np.bool_]
+    own: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
+
+    @property
+    def fitted_paths(self) -> list[str]:
+        """Paths of the parameters that are fitted."""
+        pairs = zip(self.paths, self.fitted, strict=True)
+        return [path for path, free in pairs if free and path not in self.left]
+
+    def beside(self, model: Model) -> Model:
+        """Another model with this effect where it does nothing."""
+        if self.effect in model.parameters:
+            return model
+        table = self.model.at_the_door(self.effect)
+        return model.with_effects({self.effect: table})
+
+    def grown(self, probe: int, factor: float) -> Array:
+        """A probe whose effect is so many times as large, within bounds."""
+        chosen = self.probes[probe].copy()
+        # A time of an effect without another size counts from 0.
+        origin = self.absent if self.fitted.all() else np.zeros_like(self.absent)
+        scaled = origin + factor * (chosen - origin)
+        chosen[self.amplitudes] = scaled[self.amplitudes]
+        for at, path in enumerate(self.paths):
+            if factor < 0.0 and path.endswith(".phase_deg"):
+                # The opposite of a wave is the wave half a period later.
+                chosen[at] += 180.0 if chosen[at] <= 0.0 else -180.0
+                chosen[self.amplitudes] = -scaled[self.amplitudes]
+        lower, upper = bounds(self.paths)
+        return np.clip(chosen, lower, upper)
+
+
+def bounds(paths: Sequence[str]) -> tuple[Array, Array]:
+    """Bounds of parameters at the door."""
+    quantities = [_quantity(path) for path in paths]
+    return (
+        np.array([quantity.lower for quantity in quantities], float),
+        np.array([quantity.upper for quantity in quantities], float),
+    )
+
+
+def _quantity(path: str) -> Quantity:
+    effect, _, door = path.partition(".")
+    law = CATALOGUE[effect]
+    return law.quantities[law.names_at_the_door()[door]]

@@ -1,0 +1,76 @@
+"""Standard errors that a model a little wrong does not make too small.
+
+The curvature of chi-square alone says how sure parameters are if nothing is left but noise. What is
+left of a real rig is slow too, and pulls at parameters for seconds together. So the pull of
+stretches of time is looked at, of a second and of whole trials (the sandwich of Huber and White, by
+clusters), and the largest error of the three counts.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.preparation.whitened_residuals import PIECE_S, Pieces
+
+Array = NDArray[np.float64]
+
+STRETCH_S = 1.0
+"""Length of a stretch of time (s)."""
+
+LEAST_TRIALS = 4
+"""Fewer trials than this say nothing of how parameters scatter between them."""
+
+
+def covariance(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Array:
+    """Covariance of a fit's parameters, shape (p, p), at the door.
+
+    Correlations are those of the curvature; errors are the largest that it, stretches or trials
+    give.
+    """
+    evidence = bench.evidence(fit.model, chosen)
+    pieces = evidence.pieces(fit.values, fit.steps)
+    if pieces is None:
+        return fit.covariance
+    known = np.isfinite(np.diag(fit.covariance))
+    pulls = pieces.products[:, 1:, 0][:, known]
+    inverse = fit.covariance[np.ix_(known, known)]
+    squares = widened(np.diag(inverse), pulls, inverse, clusters(pieces))
+    wider = np.ones(len(known))
+    wider[known] = np.sqrt(squares / np.diag(inverse))
+    return fit.covariance * np.outer(wider, wider)
+
+
+def clusters(pieces: Pieces) -> list[NDArray[np.int64]]:
+    """Of every piece, its stretch of time; and its trial, where there are trials enough."""
+    order = np.arange(len(pieces.trial)) - np.searchsorted(pieces.trial, pieces.trial)
+    stretch = order // round(STRETCH_S / PIECE_S)
+    found = [pieces.trial * (stretch.max() + 1) + stretch]
+    if len(np.unique(pieces.trial)) >= LEAST_TRIALS:
+        found.append(pieces.trial)
+    return found
+
+
+def widened(
+    squares: Array, pulls: Array, inverse: Array, groups: Sequence[NDArray[np.int64]]
+) -> Array:
+    """Squared errors, or those by how pulls scatter between clusters where these are larger.
+
+    Args:
+        squares: of the curvature, shape (p,).
+        pulls: of every piece at every parameter, shape (pieces, p).
+        inverse: of the curvature, shape (p, p).
+        groups: the cluster of every piece, in each way of making clusters.
+    """
+    for group in groups:
+        _, index = np.unique(group, return_inverse=True)
+        count = int(index.max()) + 1
+        if count < 2:
+            continue
+        summed = np.zeros((count, pulls.shape[1]))
+        np.add.at(summed, index, pulls)
+        moves = summed @ inverse
+        squares = np.maximum(squares, count / (count - 1.0) * np.sum(moves**2, axis=0))
+    return squares

@@ -1,0 +1,139 @@
+"""Readings that a fit has not seen: how far it is from them.
+
+Whole trials are left out. Of one long trial, stretches of time are: it is simulated from its
+beginning, so that what the rig remembers goes on through them, but their readings take no part.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.predictive_density import Whole
+from pma_gym.discovery.preparation.splits import folds, stretches
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Unseen:
+    """What a model says of readings that it was not fitted to.
+
+    Attributes:
+        readings: what its sensors hold (SI), shape (4, rows) for each trial.
+        chi_square: of the whitened residuals of each trial, shape (trials,).
+        surprise: the same of each fold, given how well the others hold the parameters
+            (`predicting.Whole.surprise`), shape (folds,); empty if that was not asked for.
+    """
+
+    readings: list[Array]
+    chi_square: Array
+    surprise: Array
+
+
+def unseen(
+    bench: Bench,
+    fit: Fitted,
+    chosen: Sequence[Suspect],
+    progress: Callable[[int, int], None] | None = None,
+    judged: bool = False,
+) -> Unseen | None:
+    """Leave each fold out once, fit the others from where the fit of all is, and look at it.
+
+    Where nothing is free, nothing is fitted. None with a single trial that is not long, or where a
+    fit fails.
+
+    Args:
+        bench: the trials.
+        fit: of all of them.
+        chosen: the suspects in it.
+        progress: called with the number of folds that are done, and of all.
+        judged: whether to find out how surprising folds are.
+    """
+    whole = Whole.of(bench, fit, chosen) if judged else None
+    if len(bench.trials) < 2:
+        return _unseen_stretches(bench, fit, chosen, progress, whole)
+    count = len(bench.trials)
+    readings: list[Array] = [np.empty(0)] * count
+    chi_square, surprised = np.zeros(count), list[float]()
+    parts, begun = folds(count, bench.files), fit.model if whole is None else whole.fit.model
+    for number, left_out in enumerate(parts):
+        if progress is not None:
+            progress(number, len(parts))
+        seen = [i for i in range(count) if i not in left_out]
+        found = bench.fit(begun, chosen, trials=seen) if fit.paths else fit
+        held = None if found is None else _look(bench, found, chosen, left_out)
+        if found is None or held is None:
+            return None
+        if whole is not None:
+            surprised.append(whole.surprise(bench.evidence(begun, chosen, seen), found))
+        for k, i in enumerate(left_out):
+            readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
+    return Unseen(readings, chi_square, np.array(surprised))
+
+
+def _unseen_stretches(
+    bench: Bench,
+    fit: Fitted,
+    chosen: Sequence[Suspect],
+    progress: Callable[[int, int], None] | None,
+    whole: Whole | None,
+) -> Unseen | None:
+    """The same for the stretches of a single trial; None where it has none."""
+    parts = stretches(bench.trials)
+    if not parts:
+        return None
+    (trial,) = bench.trials
+    readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
+    surprised, begun = list[float](), fit.model if whole is None else whole.fit.model
+    for number, left_out in enumerate(parts):
+        if progress is not None:
+            progress(number, len(parts))
+        seen, rest = _masked(trial, left_out), _masked(trial, ~left_out)
+        if not all(_measures(part) for part in (seen, rest)):
+            return None
+        part = replace(bench, trials=[seen])
+        found = part.fit(begun, chosen) if fit.paths else fit
+        held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
+        if found is None or held is None:
+            return None
+        if whole is not None:
+            surprised.append(whole.surprise(part.evidence(begun, chosen), found))
+        readings[:, left_out] = held.readings[0][:, left_out]
+        chi_square += float(held.chi_square[0])
+    return Unseen([readings], np.array([chi_square]), np.array(surprised))
+
+
+@dataclass(frozen=True)
+class _Held:
+    """As `Unseen`, of one fold: readings (SI) and chi-square of each of its trials."""
+
+    readings: list[Array]
+    chi_square: Array
+
+
+def _look(
+    bench: Bench, found: Fitted, chosen: Sequence[Suspect], left_out: Sequence[int]
+) -> _Held | None:
+    """Trials beside a fit; None where it cannot be simulated on them."""
+    evidence = bench.evidence(found.model, chosen, left_out)
+    pieces = evidence.pieces(found.values, np.empty(0))
+    held = evidence.readings(found.values)
+    if pieces is None or held is None:
+        return None
+    count = range(len(left_out))
+    return _Held(held, np.array([pieces.total([k])[0, 0] for k in count]))
+
+
+def _masked(trial: Trial, left_out: NDArray[np.bool_]) -> Trial:
+    """A trial whose readings in some rows do not count."""
+    kept = {name: np.where(left_out, np.nan, row) for name, row in trial.measurements.items()}
+    return replace(trial, measurements=kept)
+
+
+def _measures(trial: Trial) -> bool:
+    return any(np.isfinite(row).any() for row in trial.measurements.values())

@@ -1,0 +1,184 @@
+"""What belongs to each trial and not to the model: zeros, starts, the trial's own parameters.
+
+A diagnosis writes them beside the model (`model.toml` and `trials.toml`). Both read back give the
+misfit that it printed, so that nothing that was fitted is lost on the way.
+"""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
+from pma_gym.discovery.diagnosis import TrialState
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
+from pma_gym.documents import read_toml
+from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import Plant
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+
+FILE = "trials.toml"
+STARTS = {"contraction": "start.contraction_mm", "velocity": "start.velocity_mm_per_s"}
+"""States of a rig that nothing holds, and where a model file says how a trial begins."""
+
+SEARCHED, LEAST_SPEED = 0.2, 1.0
+"""How far about a starting velocity the best one is searched, as a share of it, and the least speed
+(mm/s) that the share is of."""
+
+
+def trial_states(
+    bench: Bench, fit: Fitted, chosen: Sequence[Suspect], names: Sequence[str]
+) -> dict[str, TrialState]:
+    """The state of every trial of a fit, by the trial's name."""
+    own: dict[str, Sequence[float]] = {}
+    for suspect in chosen:
+        own |= suspect.own
+    evidence = bench.evidence(fit.model, chosen)
+    begun = evidence.first_states(fit.values) if _begins_freely(fit.model) else None
+    found = {}
+    for i, name in enumerate(names):
+        parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
+        if begun is not None:
+            states = dict(zip(evidence.plant.states, begun[i].tolist(), strict=True))
+            parameters |= {
+                path: states[state] / SI_FACTORS[unit(path)] for state, path in STARTS.items()
+            }
+        if begun is not None:
+            parameters = _started(fit.model, bench.trials[i], parameters)
+        held = simulated(fit.model, bench.trials[i], TrialState({}, parameters))
+        found[name] = TrialState(_zeros(bench.trials[i], held), parameters)
+    return found
+
+
+def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dict[str, float]:
+    """A trial's own parameters with the starting velocity that fits it best.
+
+    A fit moves simulations along a derivative to the velocity that fits best, which is exact to
+    first order. Dry friction is not of first order, so the velocity itself is searched here, about
+    the derivative's.
+    """
+    path, measured = STARTS["velocity"], trial.measurements["contraction"]
+    about = parameters[path]
+
+    def off(velocity: float) -> float:
+        held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
+        left = held["contraction"] - measured
+        return float(np.nanvar(left))
+
+    reach = SEARCHED * max(abs(about), LEAST_SPEED)
+    best = minimize_scalar(off, bounds=(about - reach, about + reach), method="bounded")
+    fits_better = best.fun < off(about)  # type: ignore[attr-defined]
+    return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
+
+
+def simulated(model: Model, trial: Trial, state: TrialState) -> dict[str, Array]:
+    """What a model's sensors hold in a trial (SI), with the trial's own state."""
+    plant = Plant(model.replace(dict(state.parameters)))
+    held = plant.simulate(Trial(trial.time, trial.commands), noise=False).measurements
+    zeros = {
+        BY_NAME[name].quantity: value * SI_FACTORS[BY_NAME[name].unit]
+        for name, value in state.zeros.items()
+    }
+    return {name: row + zeros.get(name, 0.0) for name, row in held.items()}
+
+
+def misfits(
+    named: Iterable[NamedTrial], model: Model, states: Mapping[str, TrialState]
+) -> dict[str, float]:
+    """Misfit of a model by signal, over all trials (root mean square, by column, in its unit).
+
+    Args:
+        named: measured trials.
+        model: the model.
+        states: of the trials, by name; a trial without one begins as the model says.
+    """
+    squares: dict[str, float] = {name: 0.0 for name in OUTPUTS}
+    counts: dict[str, int] = {name: 0 for name in OUTPUTS}
+    for each in named:
+        held = simulated(model, each.trial, states.get(each.name, TrialState()))
+        for name, row in held.items():
+            if name not in each.trial.measurements:
+                continue
+            off = row - each.trial.measurements[name]
+            squares[name] += float(np.nansum(off**2))
+            counts[name] += int(np.isfinite(off).sum())
+    return {
+        BY_QUANTITY[name].name: float(np.sqrt(squares[name] / count))
+        / SI_FACTORS[BY_QUANTITY[name].unit]
+        for name, count in counts.items()
+        if count
+    }
+
+
+def dump_states(states: Mapping[str, TrialState]) -> str:
+    """The states as TOML text; the same states give the same bytes."""
+    lines = ["# What belongs to each trial: zeros of the signals, and parameters of its own."]
+    for name, state in states.items():
+        # JSON's strings are TOML's; what no text holds (a stray byte of a file's name) is replaced.
+        key = json.dumps(name.encode("utf-8", "replace").decode("utf-8"))
+        for part in ("zeros", "parameters"):
+            numbers = getattr(state, part)
+            lines += ["", f"[trials.{key}.{part}]"] * bool(numbers)
+            lines += [f"{json.dumps(path)} = {value!r}" for path, value in numbers.items()]
+    return "\n".join(lines) + "\n"
+
+
+def read_states(path: Path) -> dict[str, TrialState]:
+    """The states in a file that `dump_states` made.
+
+    Raises:
+        TrialError: names what is wrong, the rule and what came.
+    """
+    tables = read_toml(path, finite=False).get("trials", {})
+    if not isinstance(tables, dict):
+        raise TrialError(f"trials in {path} must be a table, [trials], got {tables!r:.80}")
+    found = {}
+    for name, table in tables.items():
+        parts = {part: _numbers(path, name, table, part) for part in ("zeros", "parameters")}
+        found[name] = TrialState(**parts)
+    return found
+
+
+def _numbers(path: Path, name: str, table: object, part: str) -> dict[str, float]:
+    """The numbers of one part of a trial's table."""
+    place = f'[trials."{name}".{part}] in {path}'
+    given = table.get(part, {}) if isinstance(table, dict) else None
+    if not isinstance(given, dict):
+        raise TrialError(f"{place} must be a table of numbers, got {given!r:.80}")
+    numbers = {}
+    for key, value in given.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+            raise TrialError(f"{key} in {place} must be a finite number, got {value!r:.80}")
+        if part == "zeros" and (key not in BY_NAME or BY_NAME[key].kind != "measurement"):
+            known = [BY_QUANTITY[each].name for each in OUTPUTS]
+            raise TrialError(f"{place} takes {', '.join(known)}, got {key!r:.80}")
+        numbers[key] = float(value)
+    return numbers
+
+
+def _zeros(trial: Trial, held: Mapping[str, Array]) -> dict[str, float]:
+    """What a trial's signals with a free zero read above the model, on average."""
+    zeros = {}
+    for name in FREE_ZEROS:
+        if name in trial.measurements and name in held:
+            off = trial.measurements[name] - held[name]
+            if np.isfinite(off).any():
+                column = BY_QUANTITY[name]
+                zeros[column.name] = float(np.nanmean(off)) / SI_FACTORS[column.unit]
+    return zeros
+
+
+def _begins_freely(model: Model) -> bool:
+    """Whether a model file says how a trial begins, for nothing holds the rig."""
+    return "start" in model.parameters

@@ -1,0 +1,1 @@
+"""Before anything is fitted: trials, their noise and floors, and whitened residuals."""

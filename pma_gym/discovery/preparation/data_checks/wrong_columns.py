@@ -1,0 +1,158 @@
+"""Columns in another unit, and what to write in `dataset.toml` to correct them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.preparation.data_checks.absolute import both_absolute
+from pma_gym.discovery.preparation.data_checks.clock import wrong_clock
+from pma_gym.discovery.preparation.data_checks.proposals import instruction, lines
+from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair, pairs
+from pma_gym.discovery.preparation.data_checks.units import (
+    MOTION_UNITS,
+    Unit,
+    motion_unit,
+    pressure_unit,
+    slope_of,
+)
+from pma_gym.plant.model import Model
+
+FAR_M = 0.02
+"""Distance from the simulated contraction (m) from which on a zero is proposed too."""
+
+COMMAND_OF = {"load": "load_command", "pressure": "pressure_command"}
+
+
+def clock_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model) -> list[str]:
+    """What to say of a clock that cannot be in seconds; nothing of one that may be."""
+    found = wrong_clock(named, model)
+    if found is None:
+        return []
+    said, factor = found
+    if not factor:
+        return [f"{said}; give time_s in seconds"]
+    return [f"{said}; {_how(dataset, [each.name for each in named], 'time', factor)}"]
+
+
+def unit_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model) -> list[str]:
+    """What to say of every signal that is certainly in another unit, with the lines to write."""
+    trials = [each.trial for each in named]
+    found = pairs(model, trials)
+    said = []
+    for quantity in MOTION_UNITS:
+        said += _of_motion(dataset, named, found, quantity)
+    unit = pressure_unit(found)
+    if unit is not None:
+        said.append(_of_pressure(dataset, named, found, unit))
+    elif (misfits := both_absolute(model, trials)) is not None:
+        said.append(_of_both(dataset, named, *misfits))
+    return said
+
+
+def _of_motion(
+    dataset: Dataset, named: Sequence[NamedTrial], found: Sequence[Pair], quantity: str
+) -> list[str]:
+    """Of contraction, rotation or load: which trials have it in which unit."""
+    told = {pair.number: motion_unit(quantity, pair) for pair in found if slope_of(pair, quantity)}
+    said = []
+    for unit in dict.fromkeys(unit for unit in told.values() if unit is not None):
+        numbers = [number for number, other in told.items() if other == unit]
+        right = [number for number, other in told.items() if other is None]
+        slopes = [slope_of(pair, quantity) for pair in found if pair.number in numbers]
+        slope = float(np.median([each.slope for each in slopes if each is not None]))
+        name = BY_QUANTITY[quantity].name
+        seen = f"{name} is {slope:.3g} times what model and commands give"
+        if unit.command:
+            command = BY_QUANTITY[COMMAND_OF[quantity]].name
+            seen += f": {command} is in {unit.words}"
+        else:
+            seen += f": {unit.words}"
+        if not right:
+            zero = _zero(quantity, unit, [pair for pair in found if pair.number in numbers])
+            said.append(f"{seen}; {_for_unit(dataset, named, quantity, unit, zero)}")
+        elif len(numbers) >= len(right):
+            files = [named[number].name for number in numbers]
+            said.append(f"{seen}, in {', '.join(files)}; {_renamed(name, unit)}")
+    return said
+
+
+def _renamed(name: str, unit: Unit) -> str:
+    """What to do where only some files are in another unit."""
+    other = f"{name}_2"
+    line = f'"{other}" = {{ name = "{name}", factor = {1.0 / unit.factor:.7g} }}'
+    return f"rename the column to {other} there, and under [columns] of dataset.toml write: {line}"
+
+
+def _for_unit(
+    dataset: Dataset, named: Sequence[NamedTrial], quantity: str, unit: Unit, zero: float = 0.0
+) -> str:
+    """How to correct a column that all files have in a unit, and from another zero (SI)."""
+    names = [each.name for each in named]
+    if unit.command:
+        return _how(dataset, names, COMMAND_OF[quantity], unit.factor)
+    return _how(dataset, names, quantity, 1.0 / unit.factor, zero - unit.offset / unit.factor)
+
+
+def _zero(quantity: str, unit: Unit, found: Sequence[Pair]) -> float:
+    """What a corrected contraction is to be moved by (m): 0 unless it is far from a muscle's.
+
+    Its zero is free in every trial, so a whole millimetre will do.
+    """
+    if quantity != "contraction":
+        return 0.0
+    signals = [pair.signal(quantity)[1:] for pair in found]
+    away = float(np.median([np.median(s) - np.median(m) / unit.factor for s, m in signals]))
+    return round(1e3 * away) * 1e-3 if abs(away) > FAR_M else 0.0
+
+
+def _of_pressure(
+    dataset: Dataset, named: Sequence[NamedTrial], found: Sequence[Pair], unit: Unit
+) -> str:
+    column, command = BY_QUANTITY["pressure"], BY_QUANTITY["pressure_command"]
+    levels = [pair.signal("pressure")[1:] for pair in found]
+    simulated = np.concatenate([each[0] for each in levels])
+    measured = np.concatenate([each[1] for each in levels])
+    names = [each.name for each in named]
+    if unit.offset and unit.factor == 1.0:
+        above = float(np.median(measured - simulated)) / 1e3
+        if not unit.command:
+            return (
+                f"{column.name} reads {above:.4g} kPa above its command at rest: absolute "
+                f"pressure; {_how(dataset, names, 'pressure', 1.0, -ATMOSPHERE)}"
+            )
+        return (
+            f"{column.name} reads {-above:.4g} kPa below its command at rest: the command is an "
+            f"absolute pressure; {_how(dataset, names, 'pressure_command', 1.0, -ATMOSPHERE)}"
+        )
+    share = float(np.median(measured / np.where(simulated == 0.0, np.nan, simulated)))
+    seen = f"{column.name} is {share:.3g} times what its command asks for"
+    if unit.command:
+        how = _how(dataset, names, "pressure_command", unit.factor)
+        return f"{seen}: {command.name} is in {unit.words}; {how}"
+    return f"{seen}: {unit.words}; {_for_unit(dataset, named, 'pressure', unit)}"
+
+
+def _of_both(dataset: Dataset, named: Sequence[NamedTrial], given: float, off: float) -> str:
+    names = [each.name for each in named]
+    both = any("pressure" in each.trial.measurements for each in named)
+    what = (
+        "pressure_command_kpa and pressure_kpa both read" if both else "pressure_command_kpa reads"
+    )
+    before = f"not {1e3 * given:.2g} mm" if np.isfinite(given) else "and cannot follow them now"
+    written = lines(dataset, names, "pressure_command", 1.0, -ATMOSPHERE)
+    if both:
+        written |= lines(dataset, names, "pressure", 1.0, -ATMOSPHERE)
+    return (
+        f"{what} 101.3 kPa above gauge pressure: absolute pressure (with 101.3 kPa less the model "
+        f"misses contraction by {1e3 * off:.2g} mm, {before}); "
+        f"{instruction(written, dataset.columns)}"
+    )
+
+
+def _how(
+    dataset: Dataset, names: Sequence[str], quantity: str, factor: float, offset: float = 0.0
+) -> str:
+    written = lines(dataset, names, quantity, factor, offset)
+    return instruction(written, dataset.columns)

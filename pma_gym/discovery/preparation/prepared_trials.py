@@ -1,0 +1,105 @@
+"""Trials as a diagnosis takes them, and what it must say of them beforehand."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.quality import clipping
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.preparation.splits import FOLDS, stretches
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model
+from pma_gym.plant.rigs import slide
+
+PIECE_S = 1.0
+"""Longest trial of a free slide (s): an error of its force leads it away with the square of time,
+and what starts anew forgets it."""
+
+
+def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial], tuple[str, ...]]:
+    """Trials without what their sensors read at an end of their range; a free slide's in pieces.
+
+    Args:
+        named: the trials as they were given.
+        model: what they are compared with.
+    Returns:
+        The trials, and warnings: what was taken out of them, how a single trial is held out.
+    """
+    trials = [each.trial for each in named]
+    clipped = clipping.ends(trials)
+    words = [end.words([each.name for each in named], trials) for end in clipped]
+    kept = [
+        replace(each, trial=trial)
+        for each, trial in zip(named, clipping.without(trials, clipped), strict=True)
+    ]
+    # By the model as it was given: a line that is fitted later says what such volts give.
+    kept = [replace(each, trial=_in_volts(each.trial, model)) for each in kept]
+    if model.plant == "slide":
+        words += _unused(trials)
+        pieces = [piece for each in kept for piece in _pieces(each)]
+        if len(pieces) > len(kept):
+            words.append(
+                f"nothing holds this slide, so its {len(kept)} trials are taken as {len(pieces)} "
+                f"pieces of up to {PIECE_S:g} s, each with a start of its own"
+            )
+        kept = pieces
+    elif stretches(trials):
+        words.append(
+            f"there is one trial, of {trials[0].duration:.4g} s: instead of whole trials, every "
+            f"{FOLDS}th stretch of its time is left out in turn; readings beside a stretch tell of "
+            "it, so measure several trials if you can"
+        )
+    return kept, tuple(words)
+
+
+def _unused(trials: Sequence[Trial]) -> list[str]:
+    """Words on what was measured that a slide does not have."""
+    found = [
+        BY_QUANTITY[name].name
+        for name in slide.SILENT
+        if any(name in trial.measurements for trial in trials)
+    ]
+    said = (
+        "not used: a slide has neither pulley nor pressure, and its load is its command; a "
+        "measured load that drives it is read by [columns] as load_command_n"
+    )
+    return [f"{', '.join(found)}: {said}"] if found else []
+
+
+def _pieces(named: NamedTrial) -> list[NamedTrial]:
+    """A trial cut into equal pieces that are short enough; as it is if it is."""
+    trial = named.trial
+    count = max(1, math.ceil(trial.duration / PIECE_S * (1.0 - 1e-9)))
+    if count == 1:
+        return [named]
+    edges = np.searchsorted(trial.time, np.linspace(trial.time[0], trial.time[-1], count + 1))
+    edges[-1] = len(trial)
+    found = []
+    for start, stop in zip(edges, edges[1:], strict=False):
+        rows = slice(int(start), int(stop))
+        piece = Trial(
+            trial.time[rows],
+            {name: values[rows] for name, values in trial.commands.items()},
+            {name: values[rows] for name, values in trial.measurements.items()},
+            provenance=trial.provenance,
+        )
+        since = f"from {trial.time[start]:.4g} s"
+        repeats = named.repeat_of and f"{named.repeat_of} {since}"
+        if any(np.isfinite(values).any() for values in piece.measurements.values()):
+            name = f"{named.name} {since}"
+            found.append(
+                replace(
+                    named, name=name, trial=piece, repeat_of=repeats, file=named.file or named.name
+                )
+            )
+    return found
+
+
+def _in_volts(trial: Trial, model: Model) -> Trial:
+    """A trial whose commands are the volts that a model has for them, in every row."""
+    motor, regulator = sensors.voltages(model, trial)
+    return replace(trial, commands={"motor_voltage": motor, "regulator_voltage": regulator})

@@ -1,0 +1,265 @@
+"""Measured trials beside a model: whitened residuals, and sums of them that are small.
+
+Residuals are simulated less measured, made white by each signal's noise; the zeros of contraction
+and rotation are free in every trial and projected out. Sums are kept for pieces of a quarter of a
+second, so that trials can be left out, and chance be simulated by turning the signs of pieces,
+without another simulation.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.assumed_range import (
+    assumed_range,
+    at_assumed_edge,
+    needed_reach,
+)
+from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.estimation.logged import Logged
+from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
+from pma_gym.plant.model import Model
+
+Array = NDArray[np.float64]
+
+FREE_ZEROS = ("contraction", "rotation")
+"""Outputs whose zero is free in every trial."""
+
+ROWS = 256
+"""Rows in one product of matrices: few enough that no BLAS shares it between threads."""
+
+PIECE_S = 0.25
+"""How long a piece is (s): longer than what whitening leaves of the noise's memory, and so short
+that what shows for a second or two still makes more than a handful of pieces."""
+
+
+@dataclass(frozen=True)
+class Pieces:
+    """Products of columns, over pieces of trials.
+
+    Attributes:
+        products: shape (pieces, columns, columns); column 0 is the residual.
+        trial: which trial each piece belongs to, shape (pieces,).
+        counts: how many readings each has, shape (pieces,).
+    """
+
+    products: Array
+    trial: NDArray[np.int64]
+    counts: NDArray[np.int64]
+
+    def total(self, trials: Sequence[int] | None = None) -> Array:
+        """Products over some trials, or all; shape (columns, columns)."""
+        if trials is None:
+            return self.products.sum(axis=0)
+        return self.products[np.isin(self.trial, trials)].sum(axis=0)
+
+    def readings(self, trials: Sequence[int] | None = None) -> int:
+        """How many readings some trials have, or all."""
+        if trials is None:
+            return int(self.counts.sum())
+        return int(self.counts[np.isin(self.trial, trials)].sum())
+
+
+class Evidence(Residuals):
+    """Trials beside a model with free parameters, whitened; what a search may lower.
+
+    Args:
+        model: the model.
+        trials: the trials.
+        free: paths of its free parameters.
+        noise: whitening of each output.
+        prior: standard deviations of the free parameters about `centre`, at the door; infinite
+            for one that may be anything.
+        centre: what they are expected to be; the model's own values if not given.
+        own: values (SI) that a parameter has in each trial, by path.
+        tolerance, joined, threads: as `Residuals`.
+        reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
+
+    Attributes:
+        noise, prior, centre: as given.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        free: Sequence[str],
+        noise: Sequence[Whitening],
+        prior: Array,
+        centre: Array | None = None,
+        own: Mapping[str, Sequence[float]] | None = None,
+        tolerance: float = DEFAULT_TOLERANCE,
+        joined: bool = True,
+        threads: int = 1,
+        reach: Mapping[str, float] | None = None,
+    ) -> None:
+        super().__init__(model, trials, free, tolerance, joined, threads)
+        self.noise, self.prior = tuple(noise), np.asarray(prior, float)
+        self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
+        self._possible = self.lower, self.upper
+        wider = np.array([(reach or {}).get(path, 1.0) for path in free])
+        # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
+        self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
+        self._own = self._places(own or {})
+
+    @property
+    def logged(self) -> list[Logged]:
+        """The trials as they are read."""
+        return self._trials
+
+    def at_assumed_edge(self, values: Array) -> list[str]:
+        """Paths of parameters that are at an edge of what was assumed of them beforehand."""
+        at = at_assumed_edge(values, self.lower, self.upper, *self._possible)
+        return [free.path for free, edge in zip(self.free, at, strict=True) if edge]
+
+    def needed_reach(self, values: Array) -> dict[str, float]:
+        """How many times as wide as assumed the ranges that do not hold values must be, by path."""
+        wider = needed_reach(values, self.centre, self.prior, *self._possible)
+        pairs = zip(self.free, wider.tolist(), strict=True)
+        return {free.path: reach for free, reach in pairs if reach > 1.0}
+
+    def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
+        """Sums over whitened residuals, with what the prior adds."""
+        found = self._moved_products(values, steps, central, self._product)
+        total = np.sum(found, axis=0) if found else np.full((1, 1), np.nan)
+        if not np.isfinite(total).all():
+            size = len(steps)
+            return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
+        away = (values - self.centre) / self.prior
+        chi_square = float(total[0, 0] + away @ away)
+        if not steps.size:
+            return Sums(chi_square, np.empty(0), np.empty((0, 0)))
+        gradient = total[1:, 0] + away / self.prior
+        return Sums(chi_square, gradient, total[1:, 1:] + np.diag(self.prior**-2.0))
+
+    def pieces(self, values: Array, steps: Array, central: bool = False) -> Pieces | None:
+        """Products of the residual and its derivatives by the parameters (per unit at the door).
+
+        None where the model cannot be simulated.
+        """
+        return self.gathered(self._moved_products(values, steps, central, self._products))
+
+    def _moved_products(
+        self,
+        values: Array,
+        steps: Array,
+        central: bool,
+        products: Callable[[Logged, Array], Array],
+    ) -> list[Array]:
+        """What `products` makes of each trial's whitened residual and its derivatives."""
+        moves = np.diag(steps) if steps.size else np.empty((0, len(values)))
+        tried = np.concatenate([values[None], values + moves, *([values - moves] * central)])
+        widths = np.concatenate([[1.0], steps])
+
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            found = self._differences(logged, states, zeros, vectors, central)
+            # A rig that cannot be simulated has no finite products; who asks for them looks.
+            with np.errstate(invalid="ignore", over="ignore"):
+                white = self.whitened(logged, found[:, :, : len(logged.time)])
+                return products(logged, white / widths[:, None, None])
+
+        return self._each(tried, work)
+
+    def columns(self, tried: Array) -> list[Any] | None:
+        """Whitened residual at the first of some parameters, and what the others change.
+
+        Shape (tried, 4, rows) for each trial, single precision; None where it cannot be simulated.
+        """
+
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
+            found = self._differences(logged, states, zeros, vectors, central=False)
+            return self.whitened(logged, found[:, :, : len(logged.time)]).astype(np.float32)
+
+        found = self._each(tried, work)
+        if not self._settled or not all(np.isfinite(part).all() for part in found):
+            return None
+        return found
+
+    def readings(self, values: Array) -> list[Array] | None:
+        """What the sensors hold at parameters (SI), shape (4, rows) for each trial."""
+
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            return np.stack([signal[0] for signal in self._held(states, zeros, vectors)])
+
+        found = self._each(values[None], work)
+        return found if self._settled else None
+
+    def first_states(self, values: Array) -> list[Array]:
+        """States (SI) in which each trial begins at parameters, shape (states,) for each trial."""
+
+        def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
+            return states[0, 0].copy()
+
+        return self._each(values[None], work)
+
+    def whitened(self, logged: Logged, differences: Array) -> Array:
+        """Differences (SI), shape (columns, 4, rows), made white and free of free zeros."""
+        white = np.zeros_like(differences)
+        for channel, (name, noise) in enumerate(zip(OUTPUTS, self.noise, strict=True)):
+            if not logged.measures[channel]:
+                continue
+            missing = logged.missing[channel]
+            found = noise.white(differences[:, channel], missing)
+            if name in FREE_ZEROS:
+                one = np.ones(len(logged.time))
+                one[missing] = 0.0
+                along = noise.white(one[None], missing)[0]
+                found -= np.outer(found @ along / (along @ along), along)
+            white[:, channel] = found
+        return white
+
+    def products(self, columns: Sequence[Array]) -> Pieces:
+        """Products of whitened columns, as `columns` gives them."""
+        found = [
+            self._products(logged, part.astype(np.float64))
+            for logged, part in zip(self._trials, columns, strict=True)
+        ]
+        gathered = self.gathered(found)
+        assert gathered is not None
+        return gathered
+
+    def gathered(self, found: Sequence[Array]) -> Pieces | None:
+        """Products of all trials, put together; None where there are none, or no numbers."""
+        if not found or not all(np.isfinite(part).all() for part in found):
+            return None
+        trial = np.repeat(np.arange(len(found)), [len(part) for part in found])
+        counts = np.concatenate([self._counts(logged) for logged in self._trials])
+        return Pieces(np.concatenate(found), trial, counts)
+
+    def edges(self, logged: Logged) -> list[int]:
+        """Where the pieces of a trial begin, and its end."""
+        duration = float(logged.time[-1] - logged.time[0])
+        count = max(1, min(round(duration / PIECE_S), len(logged.time) // 4))
+        return [round(k * len(logged.time) / count) for k in range(count + 1)]
+
+    def _products(self, logged: Logged, white: Array) -> Array:
+        """Products over the pieces of one trial, shape (pieces, columns, columns)."""
+        edges = self.edges(logged)
+        found = np.empty((len(edges) - 1, len(white), len(white)))
+        for k, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
+            part = white[:, :, start:stop].reshape(len(white), -1)
+            found[k] = part @ part.T
+        return found
+
+    def _product(self, logged: Logged, white: Array) -> Array:
+        """The sum of `_products`, shape (columns, columns), in fewer and larger steps."""
+        total = np.zeros((len(white), len(white)))
+        for start in range(0, len(logged.time), ROWS):
+            part = white[:, :, start : start + ROWS].reshape(len(white), -1)
+            total += part @ part.T
+        return total
+
+    def _counts(self, logged: Logged) -> NDArray[np.int64]:
+        there = np.zeros((len(OUTPUTS), len(logged.time)), bool)
+        for channel in range(len(OUTPUTS)):
+            if logged.measures[channel]:
+                there[channel] = True
+                there[channel, logged.missing[channel]] = False
+        edges = self.edges(logged)
+        return np.add.reduceat(there.sum(axis=0), edges[:-1]).astype(np.int64)

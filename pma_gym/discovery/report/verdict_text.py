@@ -1,0 +1,263 @@
+"""A diagnosis in sentences: its verdict, what was done, and why a parameter is not determined."""
+
+import numpy as np
+
+from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
+from pma_gym.discovery.fitting.fit_problem import Fitted
+from pma_gym.discovery.fitting.free_parameters import Own, unit
+from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
+from pma_gym.discovery.report.approximate_text import left_words
+from pma_gym.discovery.report.size_text import sized_effects
+from pma_gym.discovery.report.text import (
+    at_its_limit,
+    chance,
+    effect_name,
+    effect_names,
+    figure,
+    listed,
+    percent,
+    signal_name,
+    signal_unit,
+)
+from pma_gym.discovery.report.unknown_text import unknown_words
+from pma_gym.discovery.selection.backward_elimination import ODDS
+from pma_gym.discovery.verdict.adequacy import OPEN
+from pma_gym.discovery.verdict.decision import BLIND_SHARE, MOST_RIVALS, MOVED_CHANGE
+from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.discovery.verdict.residual_fraction import Left
+from pma_gym.discovery.verdict.unknown import Reason
+from pma_gym.units import with_unit
+
+ALIKE = 0.9
+"""Correlation from which on two parameters do the same to the signals."""
+
+
+def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
+    """The verdict as a person would say it.
+
+    Args:
+        diagnosis: the diagnosis.
+        unknown: why its verdict is `unknown`; None where it is another.
+    """
+    trials = trials_words(diagnosis)
+    name = diagnosis.given.name
+    if diagnosis.verdict == "effect":
+        return (
+            f"In {trials} model {name} misses {sized_effects(diagnosis.effects)}"
+            f"{_approximately(diagnosis)}{_closed(diagnosis)}{_unsure(diagnosis)}."
+        )
+    if diagnosis.verdict == "parameters":
+        off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
+        shown = ", ".join(map(_change_of(diagnosis), off[:3]))
+        more = f" and {len(off) - 3} more" if len(off) > 3 else ""
+        return (
+            f"Model {name} has the right structure for {trials}{agreement(diagnosis)}, but its "
+            f"parameters are off: {shown}{more}{_closed(diagnosis)}{_unsure(diagnosis)}."
+        )
+    if diagnosis.verdict == "agrees":
+        return (
+            f"Model {name} agrees with {trials}{agreement(diagnosis)}: what is left is "
+            f"{remainder(diagnosis)}."
+        )
+    if unknown is not None:
+        return unknown_words(diagnosis, unknown, trials)
+    if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
+        equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
+        if len(equal) <= MOST_RIVALS:
+            added = [each.name for each in diagnosis.candidates if each.why == ADDED]
+            instead = f" (or {effect_names(equal, 'or')})" if equal else ""
+            return (
+                f"Model {name} misses something, {effect_names(added)}{instead} most likely, but "
+                f"what is left out of {trials} does not bear it out"
+            ) + _propose(diagnosis)
+        rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
+        return (
+            f"Model {name} misses something, but {trials} cannot tell which of {rivals} it is"
+        ) + _propose(diagnosis)
+    few_blind = len(diagnosis.blind) <= BLIND_SHARE * max(len(diagnosis.candidates), 1)
+    if few_blind and any(each.fault in OPEN for each in diagnosis.adequacy.values()):
+        return (
+            f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
+            f"{undecided(diagnosis)}."
+        )
+    best = diagnosis.candidates[0] if diagnosis.candidates else None
+    if best is not None and few_blind:
+        return (
+            f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
+            f"in too little of {trials} to rule chance out"
+        ) + _propose(diagnosis)
+    return (
+        f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
+        f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
+    ) + _propose(diagnosis)
+
+
+def trials_words(diagnosis: Diagnosis) -> str:
+    """The trials in words: pieces of one log are not taken for trials."""
+    count = len(diagnosis.trials)
+    files = len({record.file for record in diagnosis.trials})
+    if files == count:
+        return f"these {count} trials" if count != 1 else "this trial"
+    return f"{f'these {files} trials' if files != 1 else 'this trial'} (in {count} pieces)"
+
+
+def _propose(diagnosis: Diagnosis) -> str:
+    following = diagnosis.next_experiment
+    return f"; measure next: {following.protocol}." if following else "."
+
+
+def _approximately(diagnosis: Diagnosis) -> str:
+    known = diagnosis.approximate
+    return "" if known is None else f" ({left_words(known)})"
+
+
+def _unsure(diagnosis: Diagnosis) -> str:
+    """What the headline adds: a fit that did not converge, signals and trials that got worse."""
+    words = "" if diagnosis.converged else "; the fit did not converge, so its values are rough"
+    signals, trials = diagnosis.worsened
+    worse = []
+    for signal in signals:
+        gap = diagnosis.gap[signal]
+        worse.append(
+            f"{signal_name(signal)} ({figure(gap.before)} to {figure(gap.after)} "
+            f"{signal_unit(signal)})"
+        )
+    more = f" and {len(trials) - 3} more" if len(trials) > 3 else ""
+    worse += [f"{', '.join(trials[:3])}{more}"] if trials else []
+    return words + (f"; but it fits {listed(worse)} worse than the model as given" if worse else "")
+
+
+def _closed(diagnosis: Diagnosis) -> str:
+    gaps = {
+        signal: gap.closed
+        for signal, gap in diagnosis.gap.items()
+        if gap.closed is not None and gap.before > 1.1 * gap.floor
+    }
+    if not gaps:
+        return ""
+    effect, found = diagnosis.verdict == "effect", diagnosis.gap
+    widest = max(
+        gaps,
+        key=lambda signal: (
+            (found[signal].parameters if effect else found[signal].before) / found[signal].floor
+        ),
+    )
+    gap = found[widest]
+    refitted = f" ({figure(gap.parameters)} with its parameters refitted)" if effect else ""
+    unseen = " of trials that it was not fitted to" if gap.held_out else ""
+    return (
+        f"; the amended model brings the misfit of {signal_name(widest)} from "
+        f"{figure(gap.before)}{refitted} to {figure(gap.after)} {signal_unit(widest)} (noise "
+        f"{figure(gap.floor)}), "
+        f"{percent(max(gap.closed or 0.0, 0.0))} of the gap{unseen}"
+    )
+
+
+def _change_of(diagnosis: Diagnosis):  # noqa: ANN202
+    def words(path: str) -> str:
+        moved = diagnosis.parameters[path]
+        limit = at_its_limit(moved.now)
+        return f"{path} {moved.now.value:.4g}{limit} instead of {moved.start:.4g}"
+
+    return words
+
+
+def unidentified(path: str, fit: Fitted, own: Own) -> str:
+    """Why the data do not determine a parameter."""
+    at = fit.paths.index(path)
+    spread = np.sqrt(np.diag(fit.covariance))
+    if not np.isfinite(spread[at]):
+        return "it changes nothing in these trials"
+    other = twin(path, fit)
+    if other is not None:
+        return f"{other} does the same to the signals"
+    prior = own.prior[own.free.index(path)]
+    return (
+        f"these trials hold it to {with_unit(f'{spread[at]:.2g}', unit(path))}, hardly less than "
+        f"the {prior:.2g} that was assumed beforehand"
+    )
+
+
+def doubt(path: str, fit: Fitted, own: Own) -> str:
+    """What speaks against a parameter that is named although another could stand for it."""
+    others = "if that one is off" if twin(path, fit) else "if others are off instead"
+    return f"{path}: {unidentified(path, fit, own)}; {others}, {path} may be as it was given"
+
+
+def twin(path: str, fit: Fitted) -> str | None:
+    """The parameter that does the same to the signals as another; None where none does."""
+    at = fit.paths.index(path)
+    spread = np.sqrt(np.diag(fit.covariance))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = np.abs(fit.covariance[at] / (spread * spread[at]))
+    alike[at] = 0.0
+    alike = np.where(np.isfinite(alike), alike, 0.0)
+    return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
+
+
+def steps(found: Findings, diagnosis: Diagnosis, left: Left) -> tuple[str, ...]:
+    """What was done, a sentence each."""
+    bench, selection = found.bench, found.selection
+    said = [
+        f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}.",
+        f"Parameters first: {len(bench.own.free)} numbers of {found.given.name} were refitted, "
+        "with the zeros of contraction and rotation free in every trial; each is held to its value "
+        "as by a measurement with 10 % error, which counts only where the trials say nothing.",
+    ]
+    for number, stage in enumerate(selection.stages, 1):
+        best = stage.looks[0]
+        said.append(
+            f"Round {number}: {len(stage.looks)} effects were looked at; {best.suspect.name} could "
+            f"explain most (chi-square {best.gain:.4g}, family-wise p {best.p_value:.2g}, "
+            f"{best.change:.2g} of the noise in its clearest signal). "
+            + (
+                f"{len(stage.fits)} were fitted."
+                if stage.fits
+                else "None explains more than chance, or arithmetic, would."
+            )
+            + (
+                " Quarters of a second of the residual are beyond what noise can do "
+                f"({chance(stage.burst.chance)}): that opened the gate, and the best explains them."
+                if stage.burst.excess
+                else ""
+            )
+        )
+    if selection.chosen:
+        said.append(
+            f"Of what was slow in the residual, {percent(left.slow)} is left by "
+            f"{effect_names([suspect.name for suspect in selection.chosen])}; of its "
+            f"autocorrelation, {percent(left.remembered)}."
+        )
+    if found.fewest is not None:
+        said.append(_named(len(found.fewest.fit.paths), len(bench.own.free), diagnosis.verdict))
+    if found.unseen is not None:
+        said.append(
+            "Trials were left out in up to six parts; curves and gaps after the amendment are of "
+            "fits that had not seen them."
+        )
+    return tuple(said)
+
+
+def _named(count: int, free: int, verdict: Verdict) -> str:
+    """How many parameters are said to be off, and what that takes for granted."""
+    if not count:
+        return f"Parameters that are off: none of {free} is needed to explain these trials."
+    said = (
+        f"Parameters that are off: {count} of {free} {'is' if count == 1 else 'are'} needed to "
+        f"explain these trials, by odds of {ODDS:g} to 1 or more if the others are as they were "
+        "given. "
+    )
+    if verdict == "agrees":
+        return said + (
+            f"But with all refitted the signals change by less than {MOVED_CHANGE:g} of the noise: "
+            "the model stays as it was given."
+        )
+    return said + (
+        "Intervals are no narrower than with all parameters free, as the others may be a little "
+        "off too."
+    )
+
+
+def _floor(diagnosis: Diagnosis, signal: str) -> str:
+    floor = diagnosis.floors[signal]
+    return f"{signal} {floor.value:.3g} ({floor.source})"

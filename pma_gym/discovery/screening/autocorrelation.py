@@ -1,0 +1,116 @@
+"""Whether a residual remembers itself for longer than noise does: then something is missing.
+
+No candidate is asked. Sensors' noise has forgotten itself after some hundredths of a second; what a
+wrong model leaves goes on, or rings. The largest autocorrelation beyond that is set against
+Bartlett's standard error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.preparation.noise import ENOUGH, SLOW_S
+
+Array = NDArray[np.float64]
+
+LONGEST_S = 0.6
+"""Longest lag (s) that is looked at."""
+
+SURE = 6.0
+"""Standard errors of the largest autocorrelation that chance does not reach, over all lags."""
+
+LEAST = 0.025
+"""Autocorrelation below which what remembers itself is smaller than 0.16 of the noise."""
+
+SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
+"""A tone's least frequency (Hz), for slower than that every trial is one swing; half its width as a
+share of it; the least share of what a residual remembers that is a tone."""
+
+
+@dataclass(frozen=True)
+class Memory:
+    """What a signal's residual remembers of itself.
+
+    Attributes:
+        share: largest autocorrelation, either sign, at lags that noise does not reach.
+        score: the same in standard errors.
+        variance: mean square of the residual (SI squared).
+    """
+
+    share: float
+    score: float
+    variance: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is more than chance, and large enough to matter."""
+        return self.share > LEAST and self.score > SURE
+
+
+def memory(parts: Sequence[Array], rate_hz: float) -> Memory:
+    """What one signal's residual remembers of itself.
+
+    Args:
+        parts: of each trial (SI), NaN where there is none.
+        rate_hz: readings a second.
+    """
+    series = [np.where(np.isfinite(part), part, 0.0) for part in parts]
+    there = [np.isfinite(part).astype(float) for part in parts]
+    first, last = max(1, round(SLOW_S[0] * rate_hz)), max(1, round(LONGEST_S * rate_hz))
+    sums, counts = np.zeros(last + 1), np.zeros(last + 1)
+    for values, known in zip(series, there, strict=True):
+        for lag in range(min(last + 1, len(values))):
+            size = len(values) - lag
+            sums[lag] += values[:size] @ values[lag:]
+            counts[lag] += known[:size] @ known[lag:]
+    if counts[0] < ENOUGH or sums[0] <= 0.0:
+        return Memory(0.0, 0.0, 0.0)
+    variance = sums[0] / counts[0]
+    enough = counts >= 0.5 * ENOUGH
+    shares = np.where(enough, sums / np.maximum(counts, 1.0) / variance, 0.0)
+    own = 1.0 + 2.0 * float(np.sum(shares[1:first] ** 2))
+    scores = np.abs(shares[first:]) * np.sqrt(counts[first:] / own)
+    return Memory(float(np.abs(shares[first:]).max()), float(scores.max()), float(variance))
+
+
+@dataclass(frozen=True)
+class Tone:
+    """A frequency at which a residual rings.
+
+    Attributes:
+        hertz: the frequency (Hz).
+        rms: of what lies within a quarter of it, beyond the noise beside it (SI).
+    """
+
+    hertz: float
+    rms: float
+
+
+def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
+    """The frequency at which a residual rings; None where it is noise or remembers otherwise.
+
+    Args:
+        parts: of each trial (SI), NaN where there is none.
+        rate_hz: readings a second.
+    """
+    kept = memory(parts, rate_hz)
+    if not kept.sure:
+        return None
+    size = max(len(part) for part in parts)
+    count = sum(int(np.isfinite(part).sum()) for part in parts)
+    power = np.zeros(size // 2 + 1)
+    for part in parts:
+        power += np.abs(np.fft.rfft(np.where(np.isfinite(part), part, 0.0), size)) ** 2
+    power *= 2.0 / size / count
+    hertz = np.arange(len(power)) * rate_hz / size
+    peak = int(np.argmax(np.where(hertz < SLOWEST_HZ, 0.0, power)))
+    away = np.abs(hertz - hertz[peak])
+    near = away < WIDTH * hertz[peak]
+    # Noise with a memory is not of one level; about the peak it nearly is.
+    floor = np.median(power[away < max(2.0 * WIDTH * hertz[peak], 4.0 * hertz[1])])
+    inside = float(np.sum(power[near] - floor))
+    if peak == 0 or inside < MOSTLY * kept.share * kept.variance:
+        return None
+    return Tone(float(hertz[peak]), float(np.sqrt(inside)))

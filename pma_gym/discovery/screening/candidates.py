@@ -1,0 +1,260 @@
+"""Suspects: every effect that a model lacks and the catalogue has, ready to be tried.
+
+A suspect is a model that has the effect where it does nothing, the parameters that say how large it
+is and of what shape, and probes: parameters at which it would be seen. Three kinds come up: effects
+that the model has not at all; numbers that it has at their neutral value, such as the slack of a
+taut cable; and sensors that are slower than it says.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.effects import CATALOGUE, Effect
+from pma_gym.plant import sensors
+from pma_gym.plant.model import PLANTS, Model, ModelError
+from pma_gym.units import Quantity
+
+Array = NDArray[np.float64]
+
+STAND_INS = frozenset(
+    {
+        "contractile_force",
+        "stiffness",
+        "sarosi_force",
+        "schulte_force",
+        "schulz_force",
+        "chou_hannaford_force",
+        "caldwell_force",
+        "tondu_lopez_force",
+        "colbrunn_spring",
+        "repperger_spring",
+        "damping",
+        "symmetric_damping",
+        "repperger_damping",
+        "operator",
+        "residual_force_of_contraction",
+        "residual_force_of_velocity",
+        "residual_force_of_pressure",
+        "residual_load",
+    }
+)
+"""Laws that stand in place of another, not beside it: a whole muscle's force or damping (compare
+such models as models), the operator's hand, which no experiment without one has, and the laws
+without a shape of their own (`residual_law`)."""
+
+SCALES = (0.1, 0.3, 1.0, 3.0)
+"""How many times its usual value an amplitude is probed at."""
+
+SHAPES = (0.4, 1.0, 2.5)
+"""The same for what gives an effect its shape."""
+
+THRESHOLDS = tuple(1.13**k for k in range(-16, 9))
+"""The same for a limit, which does nothing until it is reached."""
+
+FAR = 20.0
+"""A neutral value so many times the usual one is a limit that is never reached."""
+
+DELAYS = (0.15, 0.4, 1.0, 2.5)
+"""How many times its usual value a time is probed at, of an effect that has no other size."""
+
+PERIODS = tuple(range(3, 61, 3))
+"""Periods a turn at which a ripple is looked for: a trial of a quarter turn tells no finer."""
+
+SLOWER = (0.5, 0.2, 0.08, 0.03)
+"""Bandwidths of a sensor that are probed, as a share of what the model says."""
+
+_LAGS = {
+    "lvdt": "lvdt_lag",
+    "load_cell": "load_cell_lag",
+    "pressure_transducer": "pressure_transducer_lag",
+    "potentiometer": "potentiometer_lag",
+}
+
+
+def suspects(model: Model, orders: Sequence[float] | None = None) -> list[Suspect]:
+    """Every effect that a model lacks, in the order of the catalogue.
+
+    Args:
+        model: the model, a station.
+        orders: which repeat each trial is, 0 for the first; None where that is not known.
+    """
+    found = [
+        *(_lacking(model, effect, orders) for effect in CATALOGUE.values()),
+        *_at_neutral(model),
+        *_slow_sensors(model),
+    ]
+    return [suspect for suspect in found if suspect is not None]
+
+
+def _lacking(model: Model, effect: Effect, orders: Sequence[float] | None) -> "Suspect | None":
+    """An effect that the model has not."""
+    if effect.name in model.parameters or effect.name in STAND_INS or effect.neutral is None:
+        return None
+    counted = "repeat" in effect.quantities
+    if counted and (orders is None or len(set(orders)) < 2):
+        return None
+    if effect.port not in PLANTS[model.plant].PORTS and not effect.port.startswith("sensor:"):
+        return None
+    if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
+        return None
+    doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+    shown = {
+        stem: quantity
+        for stem, quantity in effect.quantities.items()
+        if (stem not in effect.held or quantity.neutral is not None)
+        and stem not in effect.rows
+        and stem != "repeat"
+    }
+    if any(quantity.usual is None for quantity in shown.values()):
+        return None
+    usual = {doors[stem]: q.usual for stem, q in effect.quantities.items() if q.usual is not None}
+    neutral = {
+        doors[stem]: quantity.neutral
+        for stem, quantity in shown.items()
+        if quantity.neutral is not None
+    }
+    try:
+        extended = model.with_effects({effect.name: {**usual, **neutral}})
+    except ModelError:
+        return None
+    own = {f"{effect.name}.{doors['repeat']}": list(orders or ())} if counted else {}
+    return _suspect(effect.name, effect, extended, doors, shown, own)
+
+
+def _suspect(
+    name: str,
+    effect: Effect,
+    model: Model,
+    doors: Mapping[str, str],
+    shown: Mapping[str, Quantity],
+    own: Mapping[str, Sequence[float]],
+) -> Suspect:
+    stems = list(shown)
+    amplitudes = [stem for stem in stems if shown[stem].neutral is not None]
+    switches = [stem for stem in amplitudes if stem in effect.held]
+    shapes = [stem for stem in stems if shown[stem].neutral is None]
+    absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
+    probes, signs = [], []
+    for sizes in _sizes(amplitudes, switches, shown):
+        for shape in _shapes(shapes, bool(switches), shown):
+            row = dict(zip(stems, absent, strict=True))
+            row.update(sizes)
+            row.update(shape)
+            probes.append([float(np.clip(row[s], shown[s].lower, shown[s].upper)) for s in stems])
+            signs.append(
+                "phase" in shapes
+                or all(shown[s].lower < _neutral_or_usual(shown[s]) < shown[s].upper for s in sizes)
+                and not any(_is_limit(shown[s]) for s in sizes)
+            )
+    kept = [k for k, row in enumerate(probes) if row not in probes[:k]]
+    times = [stem in shapes for stem in stems] if switches else [False] * len(stems)
+    scaled = [stem in amplitudes and not _is_limit(shown[stem]) for stem in stems]
+    return Suspect(
+        name,
+        effect.name,
+        model,
+        tuple(f"{effect.name}.{doors[stem]}" for stem in stems),
+        np.array([stem not in switches for stem in stems]),
+        absent,
+        np.array([probes[k] for k in kept]),
+        np.array(times if switches else scaled),
+        np.array([signs[k] for k in kept]),
+        own,
+    )
+
+
+def _shapes(
+    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity]
+) -> Iterator[dict[str, float]]:
+    """Shapes at which an effect is looked for: the first in some steps, the others as usual."""
+    usual = {stem: _usual(shown[stem]) for stem in shapes}
+    if "phase" in shapes:
+        for periods, phase in product(PERIODS, (0.0, 90.0)):
+            yield usual | {"periods": float(periods), "phase": phase}
+        return
+    for factor in (DELAYS if timed else SHAPES) if shapes else (1.0,):
+        yield usual | {stem: factor * usual[stem] for stem in shapes[:1]}
+
+
+def _sizes(
+    amplitudes: Sequence[str], switches: Sequence[str], shown: Mapping[str, Quantity]
+) -> Iterator[dict[str, float]]:
+    """Sizes at which an effect is looked for: all amplitudes together, then each alone."""
+    if switches:
+        yield {stem: _usual(shown[stem]) for stem in switches}
+        return
+    limits = [stem for stem in amplitudes if _is_limit(shown[stem])]
+    plain = [stem for stem in amplitudes if stem not in limits]
+    for stem in limits:
+        for factor in THRESHOLDS:
+            yield {stem: _usual(shown[stem]) * factor}
+    for scale in SCALES if plain else ():
+        yield {stem: _scaled(shown[stem], scale) for stem in plain}
+    if len(plain) > 1:
+        for stem in plain:
+            yield {stem: _scaled(shown[stem], 1.0)}
+
+
+def _scaled(quantity: Quantity, scale: float) -> float:
+    neutral = _neutral_or_usual(quantity)
+    return neutral + scale * (_usual(quantity) - neutral)
+
+
+def _at_neutral(model: Model) -> Iterator[Suspect]:
+    """Numbers that the model has at their neutral value."""
+    for name, effect in model.effects.items():
+        if name in sensors.SENSORS or name in ("limits", "validity", "operator"):
+            continue
+        doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+        for stem, quantity in effect.quantities.items():
+            here = getattr(model.parameters[name], stem)
+            if (
+                quantity.neutral is None
+                or quantity.usual is None
+                or stem in effect.rows
+                or stem in effect.held
+                or here != quantity.to_si(quantity.neutral)
+            ):
+                continue
+            alone = {stem: quantity}
+            yield _suspect(f"{name}_{stem}", effect, model, doors, alone, {})
+
+
+def _slow_sensors(model: Model) -> Iterator[Suspect]:
+    """Sensors that may be slower than the model says."""
+    for name, shown in _LAGS.items():
+        if name not in model.parameters:
+            continue
+        path = f"{name}.bandwidth_hz"
+        here = values(model, [path])
+        probes = here * np.array(SLOWER)[:, None]
+        none = np.zeros(1, bool)
+        yield Suspect(
+            *(shown, name, model, (path,), ~none, here, probes, none),
+            np.zeros(len(probes), bool),
+        )
+
+
+def _has_sensor(model: Model, port: str) -> bool:
+    return any(
+        model.effects[name].port == port for name in sensors.SENSORS if name in model.effects
+    )
+
+
+def _is_limit(quantity: Quantity) -> bool:
+    """Whether a parameter is a limit, whose neutral value is one that is never reached."""
+    return quantity.neutral is not None and quantity.neutral > FAR * abs(_usual(quantity))
+
+
+def _usual(quantity: Quantity) -> float:
+    assert quantity.usual is not None
+    return quantity.usual
+
+
+def _neutral_or_usual(quantity: Quantity) -> float:
+    return _usual(quantity) if quantity.neutral is None else quantity.neutral

@@ -1,0 +1,184 @@
+"""Where a model and its trials disagree, in words, and maps of it over two conditions.
+
+The gap of a signal is its residual's mean square beyond the noise. Regions are one condition, such
+as "while held", or two of different kinds together; the share of the gap that lies in one is set
+against the share of readings that do. Chance is simulated by dealing the pieces of a second, each
+with its gap, anew over all trials.
+
+The residual is taken in units of the noise, not whitened: whitening leaves little of a gap that
+changes slowly, and such are the gaps that a person sees.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.diagnosis import Map, Place
+from pma_gym.discovery.fitting.fit_problem import Fitted
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, single_regions
+from pma_gym.discovery.screening.residual_maps import residual_map
+from pma_gym.discovery.screening.residuals import left_over
+from pma_gym.discovery.screening.time_bins import PIECE_TICKS, Ticks, ticks_of
+from pma_gym.plant.compiled_model import OUTPUTS
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Single = NDArray[np.float32]
+
+RESAMPLES = 999
+"""Deals for p-values."""
+
+SIGNIFICANT = 0.05
+"""Largest p-value of a region that is told."""
+
+MOST_OF_A_SIGNAL, MOST = 3, 8
+"""Regions that are told at most."""
+
+LEAST_SHARE, LEAST_LIFT = 0.15, 1.25
+"""Least share of the gap in a region that is told, and how many times its share of readings."""
+
+SECOND_WORTH = 1.15
+"""How many times the score of either must be that of two conditions together."""
+
+OVERLAP = 0.5
+"""Share of a region's gap that may lie in another that is told already."""
+
+VISIBLE = 1.05
+"""Mean square of a residual, in units of the noise's, from which there is a gap."""
+
+
+def localise(
+    evidence: Evidence, fit: Fitted, noise_levels: Sequence[float] | Array, seed: int
+) -> tuple[tuple[Place, ...], tuple[Map, ...]]:
+    """Where the residual of a fitted model lies.
+
+    Args:
+        evidence: the trials beside the model.
+        fit: its parameters.
+        noise_levels: standard deviations of the four signals' noise (SI), shape (4,).
+        seed: of the simulated residuals.
+    Returns:
+        Regions, the largest share of its signal's gap first, and a map for each signal with a gap.
+    """
+    readings = evidence.readings(fit.values)
+    if readings is None:
+        return (), ()
+    levels = np.asarray(noise_levels, float)[:, None]
+    residuals = [part / levels for part in left_over(evidence, readings)]
+    ticks = ticks_of(evidence.logged, readings, residuals)
+    seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(ticks, channel)]
+    return _places(ticks, seen, seed), tuple(residual_map(ticks, channel) for channel in seen)
+
+
+def _has_gap(ticks: Ticks, channel: int) -> bool:
+    count = np.sum(ticks.counts[channel])
+    return bool(count > 0 and np.sum(ticks.excess[channel]) > (VISIBLE - 1.0) * count)
+
+
+def _places(ticks: Ticks, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
+    singles = single_regions(ticks)
+    regions = singles + [
+        Region(first.kinds + second.kinds, "", first.inside & second.inside)
+        for first, second in combinations(singles, 2)
+        if first.kinds != second.kinds
+    ]
+    names = [(k,) for k in range(len(singles))] + [
+        (i, j)
+        for i, j in combinations(range(len(singles)), 2)
+        if singles[i].kinds != singles[j].kinds
+    ]
+    if not seen or not regions:
+        return ()
+    inside = np.stack([region.inside for region in regions])
+    generator = np.random.Generator(np.random.Philox(seed))
+    pieces = inside.shape[1] // PIECE_TICKS
+    deals = generator.permuted(np.tile(np.arange(pieces), (RESAMPLES, 1)), axis=1)
+    member = inside.astype(np.float32).T
+    p_values = np.stack([_p_values(ticks.excess[channel], member, deals) for channel in seen])
+    p_values = adjusted(p_values.ravel()).reshape(p_values.shape)
+    found = []
+    for channel, p_value in zip(seen, p_values, strict=True):
+        share, readings = _shares(ticks, channel, member)
+        for k in _told(ticks.excess[channel], inside, names, share, readings, p_value):
+            words = ", ".join(singles[i].words for i in names[k])
+            signal = BY_QUANTITY[OUTPUTS[channel]].name
+            found.append(Place(signal, words, float(share[k]), float(p_value[k])))
+    found.sort(key=lambda place: -place.share_of_gap)
+    return tuple(found[:MOST])
+
+
+def _shares(ticks: Ticks, channel: int, member: Single) -> tuple[Array, Array]:
+    """Shares of a signal's gap, and of its readings, in regions; shape (regions,) each."""
+    both = np.stack([ticks.excess[channel], ticks.counts[channel]])
+    parts = (both.astype(np.float32) @ member).astype(np.float64)
+    share, readings = parts / np.sum(both, axis=1)[:, None]
+    return np.clip(share, 0.0, 1.0), readings
+
+
+def _p_values(excess: Array, member: Single, deals: NDArray[np.int64]) -> Array:
+    """Chance of so much gap in each region, had every piece's gap been any other's.
+
+    Args:
+        excess: shape (n,).
+        member: 1 for the ticks of a region, shape (n, regions).
+        deals: orders of the pieces, shape (RESAMPLES, pieces).
+    """
+    pieces = excess.reshape(-1, PIECE_TICKS).astype(np.float32)
+    dealt = pieces[deals].reshape(len(deals), -1)
+    drawn, here = dealt @ member, excess.astype(np.float32) @ member
+    # Single precision: what is equal but for rounding counts as equal.
+    slack = 1e-5 * np.sum(np.abs(excess))
+    return (1.0 + np.sum(drawn >= here - slack, axis=0)) / (len(deals) + 1.0)
+
+
+def adjusted(p_values: Array) -> Array:
+    """P-values for as many as there are (Benjamini and Hochberg 1995), shape kept.
+
+    >>> adjusted(np.array([0.01, 0.04, 0.03, 0.5])).round(3).tolist()
+    [0.04, 0.053, 0.053, 0.5]
+    """
+    order = np.argsort(p_values, kind="stable")
+    ratio = p_values[order] * len(p_values) / np.arange(1, len(p_values) + 1)
+    found = np.empty_like(p_values)
+    found[order] = np.minimum(np.minimum.accumulate(ratio[::-1])[::-1], 1.0)
+    return found
+
+
+def _told(
+    excess: Array,
+    inside: Mask,
+    names: Sequence[tuple[int, ...]],
+    share: Array,
+    readings: Array,
+    p_value: Array,
+) -> list[int]:
+    """Regions that are told of one signal: high scores that hardly overlap."""
+    score = _scores(share, readings)
+    single = np.array([score[k] for k, name in enumerate(names) if len(name) == 1])
+    alone = np.array([max(single[i] for i in name) if len(name) > 1 else 0.0 for name in names])
+    good = (
+        (p_value <= SIGNIFICANT)
+        & (readings >= SMALLEST)
+        & (readings <= LARGEST)
+        & (share >= np.maximum(LEAST_SHARE, LEAST_LIFT * readings))
+        & (score >= SECOND_WORTH * alone)
+    )
+    chosen: list[int] = []
+    for k in sorted(np.flatnonzero(good).tolist(), key=lambda k: -score[k]):
+        if len(chosen) == MOST_OF_A_SIGNAL:
+            break
+        own = excess @ inside[k]
+        if all(excess @ (inside[k] & inside[other]) < OVERLAP * own for other in chosen):
+            chosen.append(k)
+    return chosen
+
+
+def _scores(share: Array, readings: Array) -> Array:
+    """Likelihood ratio of Kulldorff's scan: large where much of the gap lies in few readings."""
+    s, n = np.clip(share, 1e-9, 1.0 - 1e-9), np.clip(readings, 1e-9, 1.0 - 1e-9)
+    ratio = s * np.log(s / n) + (1.0 - s) * np.log((1.0 - s) / (1.0 - n))
+    return np.where(s > n, ratio, 0.0)

@@ -1,0 +1,95 @@
+"""Regions of one condition, in words: where readings were taken, as a person says it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.screening.time_bins import Ticks
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+SMALLEST, LARGEST = 0.02, 0.9
+"""Shares of a signal's readings between which a region is one."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """One condition, or two.
+
+    Attributes:
+        kinds: what they are about; two of one kind are never joined.
+        words: in words.
+        inside: which ticks it holds, shape (n,).
+    """
+
+    kinds: tuple[str, ...]
+    words: str
+    inside: Mask
+
+
+def single_regions(ticks: Ticks) -> list[Region]:
+    """Regions of one condition, those of motion first, as a person says them."""
+    there = np.isfinite(ticks.order)
+    held, speed = ticks.held, ticks.speed
+    found: list[tuple[str, str, Mask]] = []
+    for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
+        since = np.where(there, getattr(ticks, kind), np.nan)
+        found += [(kind, f"0-{t:g} s after {words}", since <= t) for t in (0.1, 0.2, 0.5)]
+        found.append((kind, f"more than 1 s after {words}", (since > 1.0) & np.isfinite(since)))
+    found.append(("motion", "while held", held > 0.0))
+    found.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
+    moving = held == 0.0
+    for sign, words in ((1.0, "shortening"), (-1.0, "pulling out")):
+        along = np.where(moving, sign * speed, np.nan)
+        found.append(("motion", f"while {words}", along > 0.0))
+        found += [
+            ("motion", f"{words} faster than {v:g} mm/s", along > v)
+            for v in _round_cuts(along[along > 0.0], (0.5, 0.8))
+        ]
+    found.append(("motion", "while moving", moving))
+    crawl = _round_cuts(np.abs(speed[moving]), (0.3,))
+    found += [
+        ("motion", f"moving slower than {v:g} mm/s", moving & (abs(speed) < v)) for v in crawl
+    ]
+    phases = ("before the first command", "between the first command and the last", "")
+    for number, words in enumerate(phases[:2]):
+        found.append(("phase", words, ticks.phase == number))
+    found.append(("phase", "in the final hold", ticks.phase == 2.0))
+    for kind, name, unit in _LEVELS:
+        values = getattr(ticks, kind)
+        for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
+            found.append((kind, f"{name}above {cut:g} {unit}", values > cut))
+            found.append((kind, f"{name}under {cut:g} {unit}", values < cut))
+    found.append(("order", "in the first half of the trials", ticks.order < 0.5))
+    found.append(("order", "in the second half of the trials", ticks.order > 0.5))
+    count = int(there.sum())
+    kept = {}
+    for kind, words, inside in found:
+        if SMALLEST * count <= inside.sum() <= LARGEST * count:
+            # Of two ways to say the same, the first.
+            kept.setdefault(inside.tobytes(), Region((kind,), words, inside))
+    return list(kept.values())
+
+
+_LEVELS = (
+    ("pressure", "", "kPa"),
+    ("load", "load ", "N"),
+    ("contraction", "contraction ", "mm"),
+)
+
+
+def _round_cuts(values: Array, quantiles: Sequence[float]) -> list[float]:
+    """Round numbers near quantiles, distinct and within the values."""
+    if not values.size:
+        return []
+    low, high = np.quantile(values, [0.01, 0.99])
+    span = high - low
+    if span <= 1e-3 * max(abs(low), abs(high), 1e-9):
+        return []
+    # The roundest step that still tells the quantiles apart.
+    step = 10.0 ** np.floor(np.log10(span / 4.0))
+    cuts = {float(np.round(np.quantile(values, q) / step) * step) for q in quantiles}
+    return sorted(round(cut, 9) for cut in cuts if low < cut < high)

@@ -1,0 +1,321 @@
+"""Screening: how much each suspect could explain, from one look at each of its probes.
+
+What a probe changes in the signals is made white, and what the model's own parameters could do of
+it is projected out. The rest, times a free factor, is set against the residual. Chance is simulated
+by turning the signs of pieces of a quarter of a second of the residual, for the whole catalogue at
+once, so the p-value holds for the largest of all.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.preparation.whitened_residuals import Evidence
+
+Array = NDArray[np.float64]
+
+RESAMPLES = 1999
+"""Simulated residuals for p-values."""
+
+SHOWN_GAIN = 25.0
+"""Chi-square that an effect must gain to be seen for certain: five standard deviations."""
+
+FACTORS = (0.1, 8.0)
+"""By what a probe may be multiplied to start a fit from."""
+
+PROBES = 3
+"""How many probes of a suspect are looked at again."""
+
+SIZES = (0.1, 0.17, 0.3, 0.5, 0.85, 1.4)
+"""Factors on a probe at which a closer look simulates it: a dead zone of a size between two of them
+still explains most of a burst."""
+
+CLOSER, AT_ONCE = 24, 64
+"""How many probes of a suspect a closer look simulates at most, taken evenly, and how many lie in
+memory together."""
+
+LEAST_PART = 1e-6
+"""Share of a probe's change that parameters must leave, or it is one of theirs."""
+
+LEAST_CHANGE = 1e-3
+"""Root mean square of a probe's change in standard deviations of the noise, at least: what is less
+may be steps of the integrator that rounding made fall otherwise."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the best probe of a suspect could explain.
+
+    Attributes:
+        suspect: the suspect.
+        gain: fall of chi-square.
+        p_value: family-wise.
+        probe: which probe it is; -1 where none changes anything.
+        factor: by which it explains most.
+        change: rms of what it then changes beyond what parameters could, over the noise, in the
+            signal where that is most.
+        resolvable: factor on the usual size from which on it would be seen; None if it never is.
+        starts: probes that explain most, with their factors, the best first.
+    """
+
+    suspect: Suspect
+    gain: float
+    p_value: float
+    probe: int
+    factor: float
+    change: float
+    resolvable: float | None
+    starts: tuple[tuple[int, float], ...]
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """The refitted model that suspects are tried beside.
+
+    Attributes:
+        evidence: the trials beside it.
+        values: its parameters at the door.
+        columns: whitened residual and derivatives of each trial, shape (1 + p, 4, rows).
+        inverse: of the curvature with the prior, shape (p, p).
+    """
+
+    evidence: Evidence
+    values: Array
+    columns: list[Any]
+    inverse: Array
+
+    @classmethod
+    def at(cls, evidence: Evidence, values: Array, steps: Array) -> "Baseline":
+        """At parameters, whose derivatives take such steps.
+
+        Raises:
+            ValueError: the model cannot be simulated there.
+        """
+        columns = evidence.columns(np.concatenate([values[None], values + np.diag(steps)]))
+        if columns is None:
+            raise ValueError("the refitted model cannot be simulated")
+        for part in columns:
+            part[1:] /= steps[:, None, None].astype(np.float32)
+        total = evidence.products(columns).total()
+        curvature = total[1:, 1:] + np.diag(evidence.prior**-2.0)
+        # A parameter of an effect may change nothing here, and nothing is assumed of it.
+        diagonal = np.diag(curvature)
+        scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+        inner = np.linalg.pinv(curvature * np.outer(scale, scale), hermitian=True)
+        return cls(evidence, values, columns, inner * np.outer(scale, scale))
+
+
+def look(
+    baseline: Baseline,
+    suspects: Sequence[Suspect],
+    seed: int,
+    evidence_of: Callable[[Suspect], Evidence],
+    progress: Callable[[int], None] | None = None,
+) -> list[Look]:
+    """Look at every suspect.
+
+    Args:
+        baseline: the refitted model.
+        suspects: the suspects.
+        seed: of the simulated residuals.
+        evidence_of: the trials beside the refitted model with a suspect in it, whose parameters
+            are free.
+        progress: called with the number of suspects that are done.
+    """
+    size = len(baseline.columns[0])
+    found = []
+    for number, suspect in enumerate(suspects):
+        found.append(_probe(baseline, evidence_of(suspect), suspect, size))
+        if progress is not None:
+            progress(number + 1)
+    return _judged(found, suspects, seed)
+
+
+@dataclass(frozen=True)
+class _Probed:
+    """Scores of a suspect's probes, by pieces: slopes g (n, pieces), strengths h (n,), changes."""
+
+    slopes: Array
+    strengths: Array
+    changes: Array
+
+
+def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed:
+    """Scores of a suspect's probes beside the refitted model, which has `size - 1` parameters."""
+    tried = np.concatenate([suspect.absent[None], suspect.probes])
+    columns = evidence.columns(tried)
+    if columns is None:
+        columns = _balanced(evidence, tried)
+    changes = [part[1:] for part in columns]
+    across = np.zeros((size - 1, len(suspect.probes)))
+    whole = np.zeros(len(suspect.probes))
+    along, own = [], []
+    readings = sum(part[0].size for part in changes)
+    for logged, ours, theirs in zip(
+        baseline.evidence.logged, baseline.columns, changes, strict=True
+    ):
+        flat = theirs.reshape(len(theirs), -1)
+        across += ours[1:].reshape(size - 1, -1) @ flat.T
+        whole += np.einsum("ij,ij->i", flat, flat, dtype=np.float64)
+        edges = baseline.evidence.edges(logged)[:-1]
+        for found, part in ((along, theirs), (own, ours[1:])):
+            slopes = np.einsum("kcr,cr->kr", part, ours[0], dtype=np.float64)
+            found.append(np.add.reduceat(slopes, edges, axis=1))
+    weights = baseline.inverse @ across
+    strengths = whole - np.sum(across * weights, axis=0)
+    seen = (strengths > LEAST_PART * whole) & (whole > LEAST_CHANGE**2 * readings)
+    strengths = np.where(seen, strengths, 0.0)
+    slopes = np.concatenate(along, axis=1) - weights.T @ np.concatenate(own, axis=1)
+    return _Probed(slopes, strengths, _changes(baseline, changes, weights))
+
+
+def _balanced(evidence: Evidence, tried: Array) -> list[Any]:
+    """As `_one_by_one`, but those that balance the load go together, which takes far less time."""
+    able = evidence.balanced[: len(tried)]
+    together = evidence.columns(tried[able]) if able[0] and not able.all() else None
+    if together is None:
+        return _one_by_one(evidence, tried)
+    columns = []
+    for part in together:
+        whole = np.zeros((len(tried), *part.shape[1:]), part.dtype)
+        whole[able] = part
+        columns.append(whole)
+    return columns
+
+
+def _one_by_one(evidence: Evidence, tried: Array) -> list[Any]:
+    """As `Evidence.columns`; a probe that cannot be simulated changes nothing."""
+    rows = [evidence.columns(np.stack([tried[0], row])) for row in tried[1:]]
+    first = evidence.columns(tried[:1])
+    if first is None:
+        raise ValueError(f"model {evidence.plant.model.name} cannot be simulated")
+    return [
+        np.concatenate(
+            [part, *(np.zeros_like(part) if row is None else row[i][1:] for row in rows)]
+        )
+        for i, part in enumerate(first)
+    ]
+
+
+def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Array:
+    """Rms of what each probe changes beyond parameters, over the noise, where that is most."""
+    squares = np.zeros((weights.shape[1], 4))
+    counts = np.zeros(4)
+    reduced = weights.T.astype(np.float32)
+    for logged, ours, theirs in zip(
+        baseline.evidence.logged, baseline.columns, changes, strict=True
+    ):
+        rest = theirs - np.tensordot(reduced, ours[1:], axes=1)
+        squares += np.einsum("kcr,kcr->kc", rest, rest, dtype=np.float64)
+        counts += [len(logged.time) * measured for measured in logged.measures]
+    return np.sqrt(np.max(squares / np.maximum(counts, 1.0), axis=1))
+
+
+def _judged(found: Sequence[_Probed], suspects: Sequence[Suspect], seed: int) -> list[Look]:
+    generator = np.random.Generator(np.random.Philox(seed))
+    pieces = found[0].slopes.shape[1]
+    flips = generator.choice([-1.0, 1.0], size=(RESAMPLES, pieces))
+    largest = np.zeros(RESAMPLES)
+    for each, suspect in zip(found, suspects, strict=True):
+        drawn = _gains(flips @ each.slopes.T, each.strengths, suspect.signs)
+        largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
+    looks = []
+    for each, suspect in zip(found, suspects, strict=True):
+        if not each.strengths.any():
+            looks.append(Look(suspect, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
+            continue
+        sums = each.slopes.sum(axis=1)
+        gains = _gains(sums[None], each.strengths, suspect.signs)[0]
+        best = int(np.argmax(gains))
+        p_value = (1.0 + np.sum(largest >= gains[best])) / (RESAMPLES + 1.0)
+        factors = np.divide(
+            -sums, each.strengths, out=np.zeros_like(sums), where=each.strengths > 0
+        )
+        usual = int(np.argmax(each.strengths))
+        looks.append(
+            Look(
+                suspect,
+                float(gains[best]),
+                float(p_value),
+                best,
+                float(factors[best]),
+                float(abs(factors[best]) * each.changes[best]),
+                float(np.sqrt(SHOWN_GAIN / each.strengths[usual])),
+                _starts(gains, factors),
+            )
+        )
+    return looks
+
+
+def _gains(slopes: Array, strengths: Array, signs: NDArray[np.bool_]) -> Array:
+    """Fall of chi-square by each probe's best factor, which is positive unless signs say so."""
+    allowed = np.where((slopes < 0.0) | signs, slopes, 0.0)
+    return np.divide(allowed**2, strengths, out=np.zeros_like(allowed), where=strengths > 0.0)
+
+
+def _starts(gains: Array, factors: Array) -> tuple[tuple[int, float], ...]:
+    """The probes that explain most, with their factors."""
+    low, high = FACTORS
+    return tuple(
+        (int(k), float(np.copysign(np.clip(abs(factors[k]), low, high), factors[k])))
+        for k in np.argsort(-gains, kind="stable")[:PROBES]
+        if gains[k] > 0.0
+    )
+
+
+def closer(baseline: Baseline, evidence: Evidence, found: Look) -> Look:
+    """A look at a suspect whose probes are simulated at many sizes.
+
+    What comes a little later is not what a look makes of it, a change times a factor: a cable that
+    comes taut beats once, at another instant.
+
+    Args:
+        baseline: the refitted model.
+        evidence: the trials beside it with the suspect in it.
+        found: the look so far.
+    Returns:
+        The same look with the gain that is the larger of the two, and starts from all sizes.
+    """
+    suspect = found.suspect
+    if not len(suspect.probes):
+        return found
+    starts = list(found.starts)
+    for probe in range(0, len(suspect.probes), -(-len(suspect.probes) // CLOSER)):
+        starts += [(probe, size) for size in SIZES]
+        starts += [(probe, -size) for size in SIZES if suspect.signs[probe]]
+    tried = np.array([suspect.grown(probe, factor) for probe, factor in starts])
+    gains = np.concatenate(
+        [
+            _simulated_gains(baseline, evidence, replace(suspect, probes=tried[k : k + AT_ONCE]))
+            for k in range(0, len(tried), AT_ONCE)
+        ]
+    )
+    order = [k for k in np.argsort(-gains, kind="stable")[:PROBES] if gains[k] > 0.0]
+    best = max(found.gain, float(gains.max()))
+    return replace(found, gain=best, starts=tuple(starts[k] for k in order) or found.starts)
+
+
+def _simulated_gains(baseline: Baseline, evidence: Evidence, suspect: Suspect) -> Array:
+    """Fall of chi-square by a suspect's probes as they are, parameters free beside them."""
+    probed = _probe(baseline, evidence, suspect, len(baseline.columns[0]))
+    return -2.0 * probed.slopes.sum(axis=1) - probed.strengths
+
+
+def beginnings(baseline: Baseline, evidence: Evidence, found: Look) -> list[Array]:
+    """Where to begin fits of a suspect: values that explain most as they are, the best first.
+
+    A look takes what a probe changes times a factor; here each is simulated, for a dead zone twice
+    as wide does not change twice as much.
+    """
+    suspect, tried = found.suspect, []
+    for probe, factor in found.starts:
+        for each in (factor, np.sign(factor) * np.sqrt(abs(factor)), 1.0, 0.4 * factor):
+            values = suspect.grown(probe, float(each))
+            if not any(np.array_equal(values, other) for other in tried):
+                tried.append(values)
+    gains = _simulated_gains(baseline, evidence, replace(suspect, probes=np.array(tried)))
+    return [tried[k] for k in np.argsort(-gains, kind="stable")]

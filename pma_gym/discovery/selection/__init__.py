@@ -1,0 +1,1 @@
+"""Which candidates or parameters are selected, and what rivals explain about equally."""

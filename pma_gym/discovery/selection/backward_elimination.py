@@ -1,0 +1,109 @@
+"""Which parameters are off, where nothing else is: the fewest that explain the trials.
+
+With all parameters free at once, one that is off hides behind others that do nearly the same, each
+of them a little off. A lab seldom has all its numbers wrong. So parameters are put back to the
+values that they were given, one after the other, the least missed first, as long as the odds that
+it is off are less than `ODDS`. With a parameter's estimate z standard errors away from its given
+value, and errors p assumed beforehand and e in the end,
+
+    log odds = z^2 / 2 - log(p / e)
+
+(Laplace; the second term is Occam's: a number of which one assumed that it may be off by a tenth is
+not likely to be off by a thousandth). Sums over the readings are enough for it, taken where all
+parameters are free; what is left is then refitted.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.covariance import clusters, covariance, widened
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import Own
+from pma_gym.discovery.preparation.whitened_residuals import Pieces
+
+Array = NDArray[np.float64]
+
+ODDS = 20.0
+"""Odds beyond which a parameter is said to be off: that it is not is then as unlikely as that a
+95 % interval misses."""
+
+
+@dataclass(frozen=True)
+class Fewest:
+    """The fewest parameters that explain trials.
+
+    Attributes:
+        bench: on which they alone are free.
+        fit: of them; the others are as they were given.
+    """
+
+    bench: Bench
+    fit: Fitted
+
+
+def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
+    """The fewest parameters that explain the trials.
+
+    Args:
+        bench: the trials, with the noise that the fit leaves.
+        fit: of all parameters, nothing added.
+    Returns:
+        They, or None where the sums are no numbers, or where chi-square grows by more than each
+        parameter that was put back may cost, all together: a rig that is so far from the model is
+        not to be judged by them.
+    """
+    evidence = bench.evidence(fit.model)
+    pieces = evidence.pieces(fit.values, fit.steps, central=True)
+    if pieces is None:
+        return None
+    kept = np.arange(len(fit.paths))
+    moves, room = np.empty(0), 0.0
+    while kept.size:
+        moves, errors = _without_others(pieces, fit.values, evidence.centre, evidence.prior, kept)
+        occam = np.log(np.maximum(evidence.prior[kept] / errors, 1.0))
+        odds = 0.5 * (moves / errors) ** 2 - occam
+        least = int(np.argmin(odds))
+        if odds[least] > np.log(ODDS):
+            break
+        room += 2.0 * (np.log(ODDS) + occam[least])
+        kept = np.delete(kept, least)
+    most = fit.chi_square + room
+    if not np.isfinite(most):
+        return None
+    paths = tuple(fit.paths[i] for i in kept)
+    narrow = replace(bench, own=Own(paths, evidence.prior[kept]))
+    if not paths:
+        given = as_given(bench)
+        return given if given.fit.chi_square <= most else None
+    begun = np.clip(evidence.centre[kept] + moves, evidence.lower[kept], evidence.upper[kept])
+    found = narrow.fit(bench.given.replace(dict(zip(paths, map(float, begun), strict=True))))
+    if found is None or not found.chi_square <= most:
+        return None
+    return Fewest(narrow, replace(found, covariance=covariance(narrow, found, ())))
+
+
+def as_given(bench: Bench) -> Fewest:
+    """The model as it was given, with nothing free."""
+    none = np.empty(0)
+    narrow = replace(bench, own=Own((), none))
+    left = narrow.evidence(bench.given).sums(none, none).chi_square
+    return Fewest(narrow, Fitted(bench.given, (), (), none, np.empty((0, 0)), left, none, True))
+
+
+def _without_others(
+    pieces: Pieces, values: Array, centre: Array, prior: Array, kept: NDArray[np.int64]
+) -> tuple[Array, Array]:
+    """How far some parameters move away from `centre` if all others stay there, and the errors."""
+    curvatures = pieces.products[:, 1:, 1:]
+    curvature = curvatures.sum(axis=0)
+    back = centre - values
+    gradient = pieces.products[:, 1:, 0].sum(axis=0) + curvature @ back
+    own = np.ix_(kept, kept)
+    inverse = np.linalg.inv(curvature[own] + np.diag(prior[kept] ** -2.0))
+    moves = -inverse @ gradient[kept]
+    away = back.copy()
+    away[kept] += moves
+    pulls = (pieces.products[:, 1:, 0] + curvatures @ away)[:, kept]
+    return moves, np.sqrt(widened(np.diag(inverse), pulls, inverse, clusters(pieces)))

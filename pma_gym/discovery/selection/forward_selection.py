@@ -1,0 +1,259 @@
+"""Selection: which suspects are added to the model, one after the other.
+
+The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
+two hundred data sets. It opens too where the residual itself is no noise: where it is many times as
+large (`far_off`), where it is autocorrelated beyond the noise (`excess`), or bursts (`bursts`) and
+an effect explains the bursts. What passes is fitted together with the model's parameters; the
+likeliest is taken; then the same again beside it. Each effect is then left out once: one that is
+not missed goes. Noise is learnt anew only when all effects are found: before, an autoregression
+would take the next effect for noise.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from pma_gym.discovery.diagnosis import Undetermined
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.covariance import covariance
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.screening.residuals import burst_of, far_off, relearnt, remembers
+from pma_gym.discovery.screening.scan_statistic import NO_BURSTS, Bursts
+from pma_gym.discovery.screening.score_test import Baseline, Look, closer, look
+from pma_gym.discovery.selection.candidate_fits import (
+    better,
+    cost,
+    fitted,
+    led_nearer,
+    refit,
+    stripped,
+    without_idle,
+)
+from pma_gym.plant.model import Model
+
+ALARM = 0.005
+"""Family-wise rate of false alarms that the gate lets through."""
+
+LEAST_CHANGE = 0.15
+"""Least rms of what an effect changes beyond parameters, over the noise of the signal where that is
+most: what is smaller is not worth a name, and no model's arithmetic is that exact."""
+
+COARSE_CHANGE = 0.5
+"""The same beside a sensor whose readings keep to coarse steps: what is lost between them is no
+noise, and follows the motion."""
+
+SECOND_SHARE, SURE_SHARE = 0.12, 0.02
+"""Least share of the first effect's gain that another must bring: what a law of the catalogue
+misses of its real likeness is of that order; and the same where the residual is surely no noise."""
+
+BEGINNINGS = 3
+"""How often the selection begins anew from a better refitted model."""
+
+MOST_EFFECTS = 3
+"""Most effects that are added."""
+
+TRIED, NEAR = 8, 0.05
+"""How many suspects are fitted at most, and the share of the best look's gain that one needs."""
+
+CARRIED = 0.5
+"""Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
+noise that is larger in places bursts too, and no effect explains half of that."""
+
+Progress = Callable[[str, int, int], None]
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One round of the selection.
+
+    Attributes:
+        bench: with the noise of this round.
+        before: the model that suspects were tried beside.
+        baseline: the same, ready to be looked beside.
+        looks: at every suspect.
+        fits: of those that were fitted, by name, each together with what was there before.
+        gate: the looks that passed.
+        missing: whether the residual says of itself that something is missing.
+        burst: pieces of it that opened the gate by themselves.
+    """
+
+    bench: Bench
+    before: Fitted
+    baseline: Baseline
+    looks: tuple[Look, ...]
+    fits: dict[str, Fitted]
+    gate: tuple[Look, ...]
+    missing: bool
+    burst: Bursts = NO_BURSTS
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What was selected.
+
+    Attributes:
+        stages: the rounds.
+        chosen: the suspects in the model, in the order in which they came.
+        fit: the model with them.
+        bench: with the noise that it leaves.
+        refitted: the model with its own parameters refitted alone; better than what the selection
+            began with, where it had been caught.
+        undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
+    """
+
+    stages: tuple[Stage, ...]
+    chosen: tuple[Suspect, ...]
+    fit: Fitted
+    bench: Bench
+    refitted: Fitted
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
+
+
+def select(
+    bench: Bench,
+    refitted: Fitted,
+    suspects: Sequence[Suspect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Selection:
+    """Select suspects.
+
+    Args:
+        bench: the trials.
+        refitted: the model with its own parameters refitted.
+        suspects: the whole catalogue.
+        seed: of simulated residuals.
+        journal: keeps fits.
+        progress: called with a step's name, what is done and the total.
+    """
+    chosen: tuple[Suspect, ...] = ()
+    stages: list[Stage] = []
+    begun: list[str] = []
+    best = refitted
+    while len(chosen) < MOST_EFFECTS:
+        rest = [suspect for suspect in suspects if suspect not in chosen]
+        stage = _stage(bench, best, chosen, rest, seed, journal, progress)
+        stages.append(stage)
+        added = _likeliest(stage, stages[0])
+        if added is None:
+            break
+        chosen = (*chosen, next(s for s in suspects if s.name == added))
+        best = better(bench, stage.fits[added], chosen, journal)
+        chosen, best = without_idle(bench, best, chosen, refitted, journal)
+        if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
+            # The refitted model had been caught in a hollow that any effect led out of.
+            refitted, stages = best, []
+            begun.append(added)
+        elif len(chosen) < len(stages):
+            # One is not missed beside the other, and that is the end of it.
+            break
+    bench = replace(bench, noise=relearnt(bench, best, chosen))
+    fit = refit(bench, best, chosen, journal)
+    fit = replace(fit, covariance=covariance(bench, fit, chosen))
+    return Selection(tuple(stages), chosen, fit, bench, refitted)
+
+
+def _stage(
+    bench: Bench,
+    before: Fitted,
+    chosen: tuple[Suspect, ...],
+    rest: Sequence[Suspect],
+    seed: int,
+    journal: Journal,
+    progress: Progress,
+) -> Stage:
+    step = f"looking for effect {len(chosen) + 1}"
+    progress(step, 0, len(rest))
+    baseline = Baseline.at(bench.evidence(before.model, chosen), before.values, before.steps)
+    plain = stripped(bench, before)
+    looks = look(
+        baseline,
+        rest,
+        seed + len(chosen),
+        lambda suspect: bench.probed(plain, suspect),
+        lambda done: progress(step, done, len(rest)),
+    )
+    looks.sort(key=lambda each: -each.gain)
+    # Where the residual itself rules chance out, a look need not.
+    far = far_off(bench, before, chosen)
+    missing = far or remembers(bench, before, chosen)
+    gate = tuple(each for each in looks if passes(bench, each, far or (missing and not chosen)))
+    burst = NO_BURSTS if gate or chosen else burst_of(bench, before)
+    least, plainly = 0.0, looks
+    if burst.excess:
+        rows = sum(len(trial.time) for trial in bench.trials)
+        # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
+        least = max(CARRIED * burst.excess, LEAST_CHANGE**2 * rows)
+        looks = _closer(bench, baseline, plain, looks, burst.chance, least)
+        gate = tuple(each for each in looks if each.starts)
+    fits: dict[str, Fitted] = {}
+    if gate:
+        worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
+        for number, each in enumerate(worth[:TRIED]):
+            progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
+            found = fitted(bench, baseline, before, chosen, each, journal)
+            if found is not None:
+                fits[each.suspect.name] = found
+        fits |= led_nearer(bench, baseline, before, chosen, worth, fits, journal, progress)
+    if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
+        gate, fits, looks, burst = (), {}, plainly, NO_BURSTS
+    return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)
+
+
+def _closer(
+    bench: Bench,
+    baseline: Baseline,
+    plain: Model,
+    looks: Sequence[Look],
+    chance: float,
+    least: float,
+) -> list[Look]:
+    """Closer looks, the best first; of one that explains bursts, chance is that of the bursts.
+
+    Args:
+        bench: the trials.
+        baseline: the refitted model.
+        plain: the same, as suspects are put into it.
+        looks: the looks so far.
+        chance: that noise bursts so.
+        least: chi-square that explains bursts.
+    """
+    found = [closer(baseline, bench.probed(plain, each.suspect), each) for each in looks]
+    found = [
+        replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
+        for each in found
+    ]
+    return sorted(found, key=lambda each: -each.gain)
+
+
+def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
+    """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
+    least = COARSE_CHANGE if bench.coarse else LEAST_CHANGE
+    return (missing or each.p_value <= ALARM) and each.change >= least
+
+
+def _likeliest(stage: Stage, first: Stage) -> str | None:
+    """The suspect to add, or None."""
+    if not stage.gate or not stage.fits:
+        return None
+    passed = {each.suspect.name for each in stage.gate}
+    most = stage.gate[0].gain
+    # What did not pass may still explain more than what did: a look is linear, a fit is not.
+    worth = {
+        name: fit
+        for name, fit in stage.fits.items()
+        if name in passed or stage.before.chi_square - fit.chi_square > most
+    }
+    if not worth:
+        return None
+    name = min(worth, key=lambda each: cost(worth[each]))
+    gain = stage.before.chi_square - stage.fits[name].chi_square
+    if gain < 30.0:
+        return None
+    if stage is not first:
+        least = min(first.fits.values(), key=cost)
+        share = SURE_SHARE if stage.missing else SECOND_SHARE
+        if gain < share * (first.before.chi_square - least.chi_square):
+            return None
+    return name

@@ -1,0 +1,1 @@
+"""Which of the five verdicts the evidence supports."""

@@ -1,0 +1,149 @@
+"""Whether an effect is of one size in all trials and conditions: what is not has the wrong law."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.preparation.whitened_residuals import Evidence, Pieces
+from pma_gym.estimation.least_squares import inverse
+from pma_gym.plant.compiled_model import OUTPUTS
+
+Array = NDArray[np.float64]
+
+LEAST_STRENGTH = 3.0
+"""Standard errors that an effect must have in a group for the group to count."""
+
+LEAST_PART = 1e-3
+"""Share of the largest curvature below which a difference of sizes is none that data tell."""
+
+LEAST_GAIN = 30.0
+"""Chi-square that sizes of their own must gain: chance gives some three."""
+
+GROUPS = 4
+"""Groups of equal size by each condition."""
+
+
+def spreads(
+    bench: Bench, fit: Fitted, chosen: Sequence[Suspect], place: int
+) -> Mapping[str, float]:
+    """How much the size of an effect scatters beyond its errors, as a share of it.
+
+    Every group of pieces is given a size of its own, to first order, with all parameters refitted.
+
+    Args:
+        bench: the trials.
+        fit: of a model with effects.
+        chosen: the effects.
+        place: of the one that is asked about.
+    Returns:
+        The scatter over trials, and over quarters of the pieces by contraction, load and pressure
+        as simulated, by name; 0 where fewer than three groups show the effect, or where chance
+        would scatter as much. Empty where the model cannot be simulated.
+    """
+    evidence = bench.evidence_of(fit, chosen)
+    pieces = evidence.pieces(fit.values, fit.steps)
+    if pieces is None:
+        return {}
+    direction = _direction(fit, chosen[place])
+    if not direction.any():
+        return {}
+    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
+    own = inverse(curvature)
+    across = pieces.products[:, 1:, 1:] @ direction
+    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(evidence, fit, pieces)
+    return {
+        name: _scatter(slopes, across, direction, own, group)
+        for name, group in _groups(evidence, fit, pieces).items()
+    }
+
+
+def _last_step(evidence: Evidence, fit: Fitted, pieces: Pieces) -> Array:
+    """What was left of a fit's way to the least chi-square, shape (p,).
+
+    It is some hundredths of an error. But where a group sees an effect a thousand times as sharply
+    as the others (by the instant at which a cable tightens), that is a slope as large as theirs.
+    """
+    gradient = pieces.products[:, 1:, 0].sum(axis=0)
+    gradient += (fit.values - evidence.centre) / evidence.prior**2
+    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
+    out = (fit.values <= evidence.lower) & (gradient > 0.0)
+    out |= (fit.values >= evidence.upper) & (gradient < 0.0)
+    return newton_step(gradient, curvature, ~out)
+
+
+def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> Array:
+    """The step to the least of a quadratic, shape (p,).
+
+    Args:
+        gradient: shape (p,).
+        curvature: shape (p, p).
+        free: which parameters may move, shape (p,); those that nothing determines stay too.
+    """
+    step, moving = np.zeros_like(gradient), np.flatnonzero(free)
+    if not len(moving):
+        return step
+    own = inverse(curvature[np.ix_(moving, moving)])
+    known = np.isfinite(np.diag(own))
+    step[moving[known]] = -own[np.ix_(known, known)] @ gradient[moving[known]]
+    return step
+
+
+def _direction(fit: Fitted, suspect: Suspect) -> Array:
+    """How a fit's parameters move where the effect as a whole grows."""
+    direction = np.zeros(len(fit.paths))
+    rows = zip(suspect.paths, suspect.absent, suspect.amplitudes, strict=True)
+    for path, absent, scales in rows:
+        if path in suspect.fitted_paths and (scales or len(suspect.paths) == 1):
+            at = fit.paths.index(path)
+            size = fit.values[at] - (absent if suspect.fitted.all() and scales else 0.0)
+            direction[at] = size
+    return direction
+
+
+def _groups(evidence: Evidence, fit: Fitted, pieces: Pieces) -> dict[str, NDArray[np.int64]]:
+    """Group of every piece, by trial and by conditions."""
+    found: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
+    readings = evidence.readings(fit.values)
+    if readings is None:
+        return found
+    for channel, name in enumerate(OUTPUTS):
+        if name == "rotation":
+            continue
+        means = []
+        for logged, held in zip(evidence.logged, readings, strict=True):
+            edges = evidence.edges(logged)
+            means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
+        ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
+        found[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
+    return found
+
+
+def _scatter(
+    slopes: Array, across: Array, direction: Array, own: Array, group: NDArray[np.int64]
+) -> float:
+    """Scatter of sizes that every group has of its own, the model's parameters refitted beside."""
+    count = int(group.max()) + 1
+    slope = np.bincount(group, slopes, count)
+    shared = np.zeros((count, across.shape[1]))
+    np.add.at(shared, group, across)
+    strength = shared @ direction
+    seen = strength > LEAST_STRENGTH**2
+    if seen.sum() < 3:
+        return 0.0
+    known = np.isfinite(np.diag(own))
+    shared = shared[:, known][seen]
+    left = np.diag(strength[seen]) - shared @ own[np.ix_(known, known)] @ shared.T
+    errors = np.linalg.pinv(left, rcond=LEAST_PART, hermitian=True)
+    if slope[seen] @ errors @ slope[seen] < LEAST_GAIN:
+        return 0.0
+    # All groups alike is the effect itself, which the fit has placed where it is best.
+    sizes = 1.0 - errors @ slope[seen]
+    weights = strength[seen] / strength[seen].sum()
+    mean = float(weights @ sizes)
+    centred = np.eye(len(sizes)) - weights
+    chance = float(weights @ np.diag(centred @ errors @ centred.T))
+    beyond = float(weights @ (sizes - mean) ** 2) - chance
+    return float(np.sqrt(max(0.0, beyond))) / max(abs(mean), 1e-9)

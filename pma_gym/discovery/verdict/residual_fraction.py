@@ -1,0 +1,84 @@
+"""What the selected effects leave of all that was slow, or rang, in the residual."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.discovery.preparation.noise import slow_part, sparse
+from pma_gym.discovery.preparation.quantisation import is_coarse
+from pma_gym.discovery.screening.autocorrelation import memory, tone
+from pma_gym.discovery.screening.residuals import residuals
+from pma_gym.discovery.verdict.findings import Findings
+from pma_gym.plant.compiled_model import OUTPUTS
+
+LEAST_SLOW = 0.02
+"""Mean square of a signal's slow residual over that of its noise, below which there is none."""
+
+
+@dataclass(frozen=True)
+class Left:
+    """What the selected effects leave, as shares over all signals; 0 where there was nothing.
+
+    Attributes:
+        slow: of what was slow in the residual.
+        remembered: of what it remembered of itself, where that is still more than chance.
+    """
+
+    slow: float
+    remembered: float
+
+    @property
+    def most(self) -> float:
+        """The larger."""
+        return max(self.slow, self.remembered)
+
+
+def leftover(found: Findings) -> Left:
+    """What the selected effects leave."""
+    bench, selection = found.bench, found.selection
+    begun = residuals(bench.evidence(found.refitted.model), found.refitted)
+    before = _slow(found, begun)
+    evidence = selection.bench.evidence(selection.fit.model, selection.chosen)
+    after = _slow(found, residuals(evidence, selection.fit))
+    # What may be chance before has no share afterwards. Of a few readings no memory is known, and
+    # a slide's starts are taken from readings, whose noise it remembers.
+    seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
+    free = found.given.plant == "slide"
+    there = (before[1] > 0.0) | np.array(seldom) | free
+    shares = [
+        float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0
+        for then, now in zip(before, after, strict=True)
+    ]
+    return Left(*shares)
+
+
+def tones(found: Findings) -> dict[str, float]:
+    """Frequency (Hz) of each signal, by column, whose residual after the refit rings."""
+    evidence = found.bench.evidence(found.refitted.model)
+    left, rate, heard = residuals(evidence, found.refitted), _rate(found), {}
+    for channel, name in enumerate(OUTPUTS):
+        kept = tone([part[channel] for part in left], rate)
+        if kept is not None:
+            heard[BY_QUANTITY[name].name] = kept.hertz
+    return heard
+
+
+def _rate(found: Findings) -> float:
+    """Usual readings a second."""
+    return float(np.median([1.0 / np.median(np.diff(each.trial.time)) for each in found.named]))
+
+
+def _slow(found: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Mean squares of the four signals over those of their noise: slow ones, remembered ones."""
+    rate = _rate(found)
+    shares = np.zeros((2, 4))
+    for channel, floor in enumerate(found.floors):
+        parts = [part[channel] for part in left]
+        shares[0, channel] = slow_part(parts, rate, floor.level) / floor.level**2
+        kept = memory(parts, rate)
+        # What a coarse sensor loses between its steps follows the motion, and no effect carries it.
+        if kept.sure and not is_coarse(floor):
+            shares[1, channel] = kept.share * kept.variance / floor.level**2
+    return shares

@@ -1,0 +1,167 @@
+"""Unknown: the law that is missing where no effect of the catalogue fits, drawn and put into words.
+
+Forces on the slide by contraction, speed and pressure, and a load by the load that is asked for,
+are fitted as straight lines between nine heights, together with the model's own parameters. The
+one that explains most is shown.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.diagnosis import ResidualLaw
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant import sensors
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+
+LAWS = {
+    "residual_force_of_contraction": ("force on the slide (N)", "contraction (mm)", "mm"),
+    "residual_force_of_velocity": ("force on the slide (N)", "speed of contraction (mm/s)", "mm/s"),
+    "residual_force_of_pressure": ("force on the slide (N)", "pressure (kPa)", "kPa"),
+    "residual_load": ("load of the drive (N)", "load that is asked for (N)", "N"),
+}
+"""What each law is, of what, and the unit of that."""
+
+RANGE = (2.0, 98.0)
+"""Percentiles of the data between which heights are laid."""
+
+UNDETERMINED = 3.0
+"""Times the median standard error from which on a height is none that the data know, and is not
+drawn."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A law that was fitted.
+
+    Attributes:
+        name: its effect in the catalogue.
+        suspect: it, with its ends where the data end.
+        fit: the model with it.
+        gain: fall of chi-square.
+    """
+
+    name: str
+    suspect: Suspect
+    fit: Fitted
+    gain: float
+
+
+def drawn_laws(bench: Bench, refitted: Fitted) -> list[Drawn]:
+    """Every law fitted, the one that explains most first; none for a slide, which lacks a muscle.
+
+    They are laws of a muscle and of a drive that only pulls.
+    """
+    if bench.given.plant == "slide":
+        return []
+    before = bench.evidence(refitted.model).sums(refitted.values, np.empty(0)).chi_square
+    ranges = _ranges(bench, refitted)
+    found = []
+    for name in LAWS:
+        suspect = _suspect(bench, name, ranges[name])
+        fit = bench.fit(refitted.model, (suspect,), {name: suspect.absent})
+        if fit is not None:
+            found.append(Drawn(name, suspect, fit, before - fit.chi_square))
+    return sorted(found, key=lambda law: -law.gain)
+
+
+def residual_law(drawn: Drawn) -> ResidualLaw:
+    """A law as the report shows it, less what is a straight line or a constant of the model's."""
+    quantity, variable, _ = LAWS[drawn.name]
+    table = drawn.fit.model.at_the_door(drawn.name)
+    first, reach = (float(value) for value in list(table.values())[:2])  # type: ignore[arg-type]
+    at = np.linspace(first, first + reach, len(drawn.suspect.fitted_paths))
+    places = [drawn.fit.paths.index(path) for path in drawn.suspect.fitted_paths]
+    law = drawn.fit.values[places]
+    covariance = drawn.fit.covariance[np.ix_(places, places)]
+    spread = np.sqrt(np.diag(covariance))
+    known = spread < UNDETERMINED * np.median(spread)
+    at, law, covariance = at[known], law[known], covariance[np.ix_(known, known)]
+    # The model's own parameters make any line of it, so a line says nothing about what is missing,
+    # and what only a line is uncertain by is no error of the rest.
+    lines = np.vander(at, 2)
+    rest = np.eye(len(at)) - lines @ np.linalg.pinv(lines)
+    law, errors = rest @ law, np.sqrt(np.diag(rest @ covariance @ rest))
+    return ResidualLaw(
+        quantity,
+        variable,
+        at,
+        law,
+        law - 1.96 * errors,
+        law + 1.96 * errors,
+        words(at, law, errors, variable),
+    )
+
+
+def words(at: Array, law: Array, errors: Array, variable: str) -> str:
+    """The shape of a law in words."""
+    name, _, unit = variable.partition(" (")
+    unit = unit.rstrip(")")
+    sure = np.abs(law) > 2.0 * errors
+    if not sure.any():
+        return f"no height of it leaves 0 by more than its error, over {name}"
+    top = int(np.argmax(np.where(sure, np.abs(law), 0.0)))
+    sign = "more" if law[top] > 0 else "less"
+    turns = int(np.sum(np.diff(np.sign(law[sure])) != 0))
+    half = np.abs(law) > 0.5 * abs(law[top])
+    shape = f"most near {at[top]:.3g} {unit}: {abs(law[top]):.2g} N {sign} than the model has"
+    if turns >= 4:
+        return f"it changes sign {turns} times over {name}, as a periodic law would; {shape}"
+    if half.sum() <= 3:
+        return f"a bump, confined in {name}; {shape}"
+    if np.all(np.diff(law) >= -np.abs(errors[1:])) or np.all(np.diff(law) <= np.abs(errors[1:])):
+        return f"it goes one way over all of {name}, bent rather than straight; {shape}"
+    return f"it bends over {name}; {shape}"
+
+
+def _ranges(bench: Bench, refitted: Fitted) -> dict[str, tuple[float, float]]:
+    """Where the data of each law's variable begin and end, at the door."""
+    evidence = bench.evidence(refitted.model)
+    readings = evidence.readings(refitted.values)
+    assert readings is not None
+    speeds = np.concatenate(
+        [
+            np.gradient(held[0], logged.time)
+            for held, logged in zip(readings, evidence.logged, strict=True)
+        ]
+    )
+    drive = bench.given.parameters["drive"]
+    motor = [sensors.voltages(bench.given, trial)[0] for trial in bench.trials]
+    loads = drive.gain * np.concatenate(motor) + drive.offset
+    seen = {
+        "residual_force_of_contraction": np.concatenate([held[0] for held in readings]),
+        "residual_force_of_velocity": speeds,
+        "residual_force_of_pressure": np.concatenate([held[3] for held in readings]),
+        "residual_load": loads,
+    }
+    ranges = {}
+    for name, values in seen.items():
+        low, high = np.percentile(values, RANGE) / SI_FACTORS[LAWS[name][2]]
+        middle, half = 0.5 * (low + high), max(0.5 * (high - low), 1.0)
+        ranges[name] = (float(middle - half), float(middle + half))
+    return ranges
+
+
+def _suspect(bench: Bench, name: str, ends: tuple[float, float]) -> Suspect:
+    """A law that does nothing, between its ends."""
+    effect = CATALOGUE[name]
+    doors = list(effect.names_at_the_door())
+    heights = doors[2:]
+    table = dict(zip(doors, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
+    zero = np.zeros(len(heights))
+    return Suspect(
+        name,
+        name,
+        bench.given.with_effects({name: table}),
+        tuple(f"{name}.{door}" for door in heights),
+        np.ones(len(heights), bool),
+        zero,
+        np.eye(len(heights)),
+        np.ones(len(heights), bool),
+        np.ones(len(heights), bool),
+    )

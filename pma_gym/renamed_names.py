@@ -1,0 +1,49 @@
+"""Classes, functions and attributes by their old names: they work, with a deprecation warning."""
+
+import warnings
+from collections.abc import Callable, Mapping
+from typing import Any
+
+
+def warn_renamed(what: str, new: str, stacklevel: int = 3) -> None:
+    """Say that a name is an old one, to whoever uses it.
+
+    Args:
+        what: the old name, with what it is of.
+        new: the new name.
+        stacklevel: as `warnings.warn` counts it from here.
+    """
+    warnings.warn(f"{what} is now {new}; use that name", DeprecationWarning, stacklevel)
+
+
+def renamed_names(module: str, names: Mapping[str, Any]) -> Callable[[str], Any]:
+    """The `__getattr__` of a module whose old names are classes or functions that have new ones.
+
+    Args:
+        module: the module's name.
+        names: what each old name stands for.
+    """
+
+    def lookup(name: str) -> Any:  # noqa: ANN401 - whatever the name stands for
+        if name not in names:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        warn_renamed(f"{module}.{name}", names[name].__name__)
+        return names[name]
+
+    return lookup
+
+
+def renamed_attribute(old: str, new: str) -> property:
+    """A property by an attribute's old name.
+
+    Args:
+        old: the old name.
+        new: the attribute that it stands for.
+    """
+
+    def read(self: object) -> Any:  # noqa: ANN401 - whatever the attribute holds
+        warn_renamed(f"{type(self).__name__}.{old}", new)
+        return getattr(self, new)
+
+    read.__doc__ = f"Old name of `{new}`."
+    return property(read)

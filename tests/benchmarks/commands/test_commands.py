@@ -1,0 +1,82 @@
+"""`python -m benchmarks`: a file that cannot be written is refused before anything runs."""
+
+import os
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from benchmarks.__main__ import app
+from benchmarks.reproduction import job
+from benchmarks.reproduction.execution import Execution
+from benchmarks.suites.reproduction import load_suite
+
+COMMANDS = ["profiles", "studies", "identify", "tune", "accuracy"]
+
+
+@pytest.fixture
+def nothing_runs(monkeypatch):
+    """Every command's work is a failure of the test."""
+    from benchmarks.accuracy import job as accuracy_job
+    from benchmarks.dissertation import profiles, studies
+    from benchmarks.identification import job as identification_job
+    from benchmarks.tuning import tune
+
+    def runs(*_, **__):
+        raise AssertionError("it ran")
+
+    modules = {
+        "accuracy": accuracy_job,
+        "identify": identification_job,
+        "profiles": profiles,
+        "studies": studies,
+        "tune": tune,
+    }
+    for name, module in modules.items():
+        monkeypatch.setattr(module, f"run_{name}", runs)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("out", "message"),
+    [
+        ("folder", "folder is a folder; name a file in it"),
+        ("nowhere/file", "there is no folder {0}/nowhere; name a file in a folder that exists"),
+        ("file/file", "{0}/file is no folder; name a file in a folder"),
+        ("pipe", "it is no ordinary file; name another"),
+    ],
+)
+def test_a_file_that_cannot_be_written_is_refused_at_once(
+    command, out, message, tmp_path, nothing_runs
+):
+    (tmp_path / "folder").mkdir()
+    (tmp_path / "file").touch()
+    os.mkfifo(tmp_path / "pipe")
+    before = sorted(tmp_path.rglob("*"))
+    done = CliRunner().invoke(app, [command, "--out", str(tmp_path / out)])
+    assert done.exit_code == 2
+    assert done.stdout == "" and done.stderr.count("\n") == 1
+    assert done.stderr.startswith(f"error: --out: cannot write {tmp_path / out}: ")
+    assert message.format(tmp_path) in done.stderr
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_ctrl_c_before_the_first_case_says_that_nothing_was_measured(tmp_path, monkeypatch):
+    monkeypatch.setattr(job, "compile_models", lambda suite: None)
+    monkeypatch.setattr(job, "execute", lambda *_: Execution((), {}, False))
+    with (tmp_path / "terminal.txt").open("w") as terminal:
+        console = Console(file=terminal, width=200)
+        assert job.run_job(load_suite(), tmp_path / "out", 2, console) == 130
+    words = (tmp_path / "terminal.txt").read_text()
+    assert "before the first case was done: nothing was measured, and nothing is written" in words
+    assert not list((tmp_path / "out").iterdir())
+
+
+def test_ctrl_c_before_the_cases_begin_says_the_same(monkeypatch, tmp_path):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(job, "run_job", interrupted)
+    done = CliRunner().invoke(app, ["--out", str(tmp_path)])
+    assert done.exit_code == 130
+    assert done.stderr == "Interrupted before the first case: nothing is measured or written\n"

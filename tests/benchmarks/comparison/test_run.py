@@ -1,0 +1,253 @@
+"""A run loses nothing: killed or interrupted it goes on, and ends with the same bits."""
+
+import csv
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+from typer.testing import CliRunner
+
+from benchmarks.__main__ import app
+from benchmarks.comparison.job import chosen, run_comparison
+from benchmarks.comparison.scores import SCORES, TIMES
+from benchmarks.runner import fingerprint, provenance
+from benchmarks.runner.case import cases, failed_row
+from benchmarks.runner.execution import execute, plan
+from benchmarks.runner.journal import JOURNAL, Journal, read_rows
+from benchmarks.runner.provenance import finished_rows, read_run
+from benchmarks.runner.worker import ProcessDied
+from benchmarks.suites.frozen import frozen_suite
+
+ROOT = Path(__file__).parents[3]
+
+SUITE = """
+schema = 2
+name = "small"
+title = "A few cases"
+version = 1
+seed = 7
+model = "station"
+[environment]
+control_rate_hz = 100.0
+[stations]
+of = "robust"
+count = 2
+nominal = true
+[[episodes]]
+tasks = ["displacement"]
+pressures_kpa = [200, 300, 400]
+per_station = 2
+[[controllers]]
+name = "pid"
+title = "PID"
+"""
+
+MINE = """
+import time
+class {name}:
+    name = "mine"
+    def reset(self, reference, station):
+        self.reference, self.volts = reference, 0.0
+    def act(self, observation, now):
+        time.sleep({sleep})
+        self.volts += 20.0 * (self.reference(now) - observation.extension)
+        return min(max(self.volts, 0.0), 10.0)
+"""
+
+
+@pytest.fixture
+def suite(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SUITE)
+    return frozen_suite(str(path))
+
+
+def own(folder, name, sleep=0.0):
+    path = folder / f"{name}.py"
+    path.write_text(MINE.format(name=name, sleep=sleep))
+    return f"{path}:{name}"
+
+
+def run(suite, controllers, out, jobs=1):
+    words = io.StringIO()
+    entries = chosen(suite, controllers)
+    code = run_comparison(suite, entries, out, jobs, Console(file=words, width=200))
+    return code, words.getvalue()
+
+
+def table(out):
+    rows = csv.DictReader((out / SCORES).read_text().splitlines())
+    return [{name: value for name, value in row.items() if name not in TIMES} for row in rows]
+
+
+def test_a_run_that_is_interrupted_and_killed_ends_as_if_it_had_not_been(suite, tmp_path):
+    slow = own(tmp_path, "Slow", sleep=0.0004)
+    out = tmp_path / "out"
+    command = [sys.executable, "-m", "benchmarks", "run", "--suite", suite.source]
+    command += ["--controllers", f"pid,{slow}", "--out", str(out)]
+    # Of any number of processes, the bits are the same.
+    interrupted, done = _stop([*command, "--jobs", "2"], out, 2, signal.SIGINT)
+    assert interrupted.returncode == 130, interrupted.stderr
+    assert f"Interrupted: {done} of 12 cases are done and stay in" in interrupted.stdout
+    assert "The same command goes on from there." in interrupted.stdout
+    killed, after = _stop([*command, "--jobs", "1"], out, done + 2, signal.SIGKILL)
+    assert killed.returncode == -signal.SIGKILL and after < 12
+    assert not (out / SCORES).exists()
+    with (out / JOURNAL).open("ab") as journal:
+        journal.write(b'{"suite": "small", "versi')
+    before = sum(1 for _ in read_rows(out / JOURNAL))
+    command += ["--jobs", "1"]
+    finished = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert finished.returncode == 0, finished.stdout + finished.stderr
+    assert f"{before} cases are done" in finished.stdout
+    # No case ran twice.
+    assert sum(1 for _ in read_rows(out / JOURNAL)) == 12
+    whole = tmp_path / "whole"
+    assert run(suite, f"pid,{slow}", whole)[0] == 0
+    assert len(table(out)) == 12 and table(out) == table(whole)
+    assert read_run(out)["complete"] and len(finished_rows(out)) == 12
+
+
+def _stop(command, out, rows, how):
+    """Run a command until its journal has so many rows, and stop it; how many there are then."""
+    with subprocess.Popen(
+        command,
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=os.environ | {"COLUMNS": "300"},
+        # A test run in the background ignores Ctrl-C, and its children would inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as process:
+        deadline = time.monotonic() + 60
+        while sum(1 for _ in read_rows(out / JOURNAL)) < rows and time.monotonic() < deadline:
+            time.sleep(0.02)
+        process.send_signal(how)
+        output, errors = process.communicate(timeout=60)
+    done = subprocess.CompletedProcess(command, process.returncode, output, errors)
+    return done, sum(1 for _ in read_rows(out / JOURNAL))
+
+
+def test_a_line_torn_by_a_crash_costs_its_case_alone(tmp_path):
+    path = tmp_path / JOURNAL
+    with Journal(path) as journal:
+        journal.append({"case": 1})
+    with path.open("ab") as torn:
+        torn.write(b'{"case": 2, "rm')
+    assert list(read_rows(path)) == [{"case": 1}]
+    with Journal(path) as journal:
+        journal.append({"case": 3})
+    assert list(read_rows(path)) == [{"case": 1}, {"case": 3}]
+    assert list(read_rows(tmp_path / "nothing")) == []
+
+
+def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeypatch):
+    mine, out = own(tmp_path, "Mine"), tmp_path / "out"
+    assert run(suite, f"pid,{mine}", out)[0] == 0
+    entries = chosen(suite, f"pid,{mine}")
+    assert not plan(suite, entries, out).missing
+    (tmp_path / "Mine.py").write_text(MINE.format(name="Mine", sleep=0.0) + "# another\n")
+    changed = plan(suite, entries, out)
+    assert {case.contender.name for case in changed.missing} == {"Mine"}
+    assert (len(changed.known), changed.outdated) == (6, 6)
+    for module in (fingerprint, provenance):
+        monkeypatch.setattr(module, "code_digest", lambda: "another")
+    assert len(plan(suite, entries, out).missing) == 12
+    _, words = run(suite, "pid", out)
+    assert "6 rows there were made with other code" in words
+    # What was made with other code is not compared with what is made now.
+    assert {row["controller"] for row in finished_rows(out)} == {"pid"}
+
+
+def test_a_figure_depends_on_no_file_that_its_key_leaves_out():
+    code = "import sys, benchmarks.runner.case\nprint(*sys.modules)"
+    listed = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    files = {
+        f"{name.replace('.', '/')}.py"
+        for name in listed.stdout.split()
+        if name.startswith("benchmarks.") and name not in ("benchmarks.runner", "benchmarks.suites")
+    }
+    # What a suite asks of its controllers moves no figure.
+    assert files - {"benchmarks/suites/target.py"} <= set(fingerprint.SOURCES)
+    assert all(list(ROOT.glob(pattern)) for pattern in fingerprint.SOURCES)
+
+
+def test_a_later_run_adds_controllers_to_the_same_folder(suite, tmp_path):
+    mine, out = own(tmp_path, "Mine"), tmp_path / "out"
+    run(suite, "pid", out)
+    code, words = run(suite, mine, out)
+    assert code == 0 and "mine" in words
+    assert {row["controller"] for row in finished_rows(out)} == {"pid", "Mine"}
+    known = read_run(out)
+    assert known["contenders"]["Mine"]["title"] == "mine"
+    assert known["suite"]["digest"] == suite.digest
+    assert {"git", "versions", "platform"} <= set(known)
+    stations = json.loads((out / "stations.json").read_text())
+    assert [one["station"] for one in stations] == [-1, 0, 1]
+    assert stations[1]["parameters"]["drive"]["gain_n_per_v"] > 0.0
+
+
+def test_what_fails_is_a_row_with_its_reason(suite, tmp_path):
+    path = tmp_path / "fails.py"
+    path.write_text(MINE.format(name="Fails", sleep=0.0).replace("self.volts +=", "1 / 0 #"))
+    code, words = run(suite, f"{path}:Fails", tmp_path / "out")
+    assert code == 1
+    rows = list(read_rows(tmp_path / "out" / JOURNAL))
+    assert len(rows) == 6 and len({row["failure"] for row in rows}) == 1
+    told = "act raised ZeroDivisionError: division by zero (line 9 of fails.py, at 0 s)"
+    assert rows[0]["failure"] == f"ControllerError: {told}"
+    assert f"Fails/-1/displacement/200/0 and 5 more: {told}" in words
+
+
+def test_a_case_whose_process_died_is_run_again(suite, tmp_path):
+    entries = chosen(suite, "pid")
+    todo = plan(suite, entries, tmp_path)
+    with Journal(tmp_path / JOURNAL) as journal:
+        for case in todo.cases[:2]:
+            row = failed_row(case, ProcessDied(-9, again=True))
+            journal.append(row | {"key": todo.keys["pid"]})
+        journal.append(failed_row(todo.cases[2], ValueError("no")) | {"key": todo.keys["pid"]})
+    assert len(plan(suite, entries, tmp_path).missing) == 5
+
+
+def test_a_full_disk_ends_the_run_with_what_is_there(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr(os, "write", lambda file, line: len(line) // 2)
+    with pytest.raises(OSError, match="bytes of a row could be written"):
+        execute(plan(suite, chosen(suite, "pid"), tmp_path), 1, tmp_path, lambda row: None)
+
+
+def test_all_means_the_controllers_of_the_suite(suite):
+    assert [entry.contender.title for entry in chosen(suite, "all")] == ["PID"]
+    assert len(cases(suite, suite.entries)) == 6
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--suite", "robst"], "error: no suite 'robst'"),
+        (["--suite", "nominal", "--controllers", "pd"], "error: no controller 'pd'"),
+        (["--suite", "nominal", "--out", "{0}/file"], "file is a file; name a folder"),
+        (["--suite", "nominal", "--out", "{0}"], "has results of suite other; name another"),
+    ],
+)
+def test_bad_input_is_one_message_and_exit_code_2(options, message, tmp_path):
+    (tmp_path / "file").touch()
+    (tmp_path / "run.json").write_text('{"suite": {"name": "other"}}')
+    done = CliRunner().invoke(app, ["run", *(text.format(tmp_path) for text in options)])
+    assert done.exit_code == 2 and done.stdout == ""
+    assert message in done.stderr and done.stderr.count("\n") == 1
+
+
+def test_suites_lists_what_can_be_run():
+    done = CliRunner().invoke(app, ["suites"])
+    assert done.exit_code == 0
+    for name in ("reproduction", "nominal", "robust", "hard", "pressure"):
+        assert name in done.stdout

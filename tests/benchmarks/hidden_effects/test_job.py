@@ -1,0 +1,288 @@
+"""`python -m benchmarks hidden-effects`: goes on where it stopped, the same on two processes."""
+
+import json
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from benchmarks.__main__ import app
+from benchmarks.hidden_effects import job
+from benchmarks.hidden_effects.evaluation import scoring
+from benchmarks.hidden_effects.evaluation.diagnosis import Answer
+from benchmarks.hidden_effects.evaluation.rounds import follow, with_trial
+from benchmarks.hidden_effects.evaluation.targets import RATES
+from benchmarks.hidden_effects.evaluation.verdicts import compare, unanswered
+from benchmarks.hidden_effects.generation.blocks import Block
+from benchmarks.hidden_effects.generation.effect_size import simulate_variants
+from benchmarks.hidden_effects.generation.effects import KINDS
+from benchmarks.hidden_effects.generation.experiment_library import random_experiment
+from benchmarks.hidden_effects.generation.likelihood_ratios import UNTOLD
+from benchmarks.hidden_effects.generation.undecidable import BLOCKS, SHOWN, draw_undecidable
+from benchmarks.hidden_effects.job import JobError, Order, run_block
+from benchmarks.hidden_effects.physics.rig import noise_levels
+from benchmarks.hidden_effects.physics.simulation import Commands
+from tests.benchmarks.hidden_effects.cheap_diagnosis import by_size, document
+
+TINY = Block("nothing", trials=3, seconds=2.0)
+
+
+class Interrupting:
+    """A diagnosis that Ctrl-C stops at some case."""
+
+    def __init__(self, last):
+        self.left = last
+
+    def __call__(self, folder):
+        self.left -= 1
+        if self.left < 0:
+            raise KeyboardInterrupt
+        return by_size(folder)
+
+
+def order(folder, **more):
+    return Order(
+        **({"block": TINY, "count": 3, "seed": 4, "folder": folder, "judge": by_size} | more)
+    )
+
+
+def timeless(figures):
+    """Figures without how long it took, which alone may differ."""
+    return {
+        **figures,
+        "blocks": {k: {**v, "seconds": None} for k, v in figures["blocks"].items()},
+    }
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A set that ran through in one process: its folder and figures."""
+    folder = tmp_path_factory.mktemp("whole")
+    return folder, run_block(order(folder))
+
+
+def test_an_interrupted_run_keeps_its_cases_and_goes_on_to_the_same_figures(
+    whole, tmp_path, capsys
+):
+    assert run_block(order(tmp_path, judge=Interrupting(2))) is None
+    assert "2 of 3 cases" in capsys.readouterr().err
+    kept = sorted((tmp_path / "cases").iterdir())
+    assert [path.name for path in kept] == ["case_0001.json", "case_0002.json"]
+    before = [path.stat().st_mtime_ns for path in kept]
+    again = run_block(order(tmp_path))
+    assert [path.stat().st_mtime_ns for path in kept] == before
+    assert again is not None and timeless(again) == timeless(whole[1])
+    assert timeless(json.loads((tmp_path / "score.json").read_text("utf-8"))) == timeless(again)
+
+
+def test_two_processes_find_what_one_finds(whole, tmp_path):
+    found = run_block(order(tmp_path, jobs=2))
+    assert found is not None and timeless(found) == timeless(whole[1])
+
+
+def test_a_larger_set_has_the_same_first_cases(whole, tmp_path):
+    run_block(order(tmp_path, count=1))
+    first = json.loads((tmp_path / "cases" / "case_0001.json").read_text("utf-8"))
+    there = json.loads((whole[0] / "cases" / "case_0001.json").read_text("utf-8"))
+    assert first["truth"] == there["truth"] and first["answer"] == there["answer"]
+
+
+def test_what_raises_counts_as_unanswered_and_is_shown(whole, capsys):
+    figures = whole[1]["blocks"]["nothing"]
+    run_block(order(whole[0]))
+    assert "3 are done" in capsys.readouterr().err
+    silent = figures["unanswered"]
+    assert silent and all(each["sentence"] == "ValueError: an odd file" for each in silent)
+    alarm = figures["rates"]["false alarm"]
+    assert alarm["n"] == 3 and alarm["hits"] == 3 - len(silent)
+
+
+def test_trials_are_kept_on_demand(tmp_path):
+    run_block(order(tmp_path, count=1, keep=True))
+    assert (tmp_path / "data" / "cases" / "case_0001" / "dataset.toml").is_file()
+
+
+def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(job, "fingerprint", lambda: "older")
+    run_block(order(tmp_path, count=1))
+    monkeypatch.setattr(job, "fingerprint", lambda: "newer")
+    found = run_block(order(tmp_path, count=1))
+    assert found is not None and found["code"] == {"older": 1}
+    assert "1 of them by other code" in capsys.readouterr().err
+    found = run_block(order(tmp_path, count=1, again=True))
+    assert found is not None and found["code"] == {"newer": 1}
+
+
+def test_cases_without_the_rounds_that_are_asked_for_are_made_anew(tmp_path, capsys):
+    run_block(order(tmp_path, count=1))
+    run_block(order(tmp_path, count=1, block=replace(TINY, rounds=1)))
+    assert "are done" not in capsys.readouterr().err
+    run_block(order(tmp_path, count=1))
+    assert "1 are done" in capsys.readouterr().err
+
+
+def test_a_folder_holds_one_set(whole):
+    with pytest.raises(JobError, match="holds block nothing of seed 4, not nothing of seed 5"):
+        run_block(order(whole[0], seed=5))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--block", "sinlge", "--n", "1"], "--block sinlge: no such block; choose single, faint"),
+        (["--block", "single", "--n", "0"], "greater than or equal to 1"),
+        (
+            ["--block", "single", "--n", "1", "--json", "{0}/nowhere/x.json"],
+            "error: --json: cannot write {0}/nowhere/x.json: there is no folder {0}/nowhere",
+        ),
+        (["--block", "single", "--n", "1", "--out", "{0}/file"], "file is a file; name a folder"),
+    ],
+)
+def test_refuses_before_anything_is_computed(arguments, message, tmp_path):
+    (tmp_path / "file").touch()
+    given = [each.format(tmp_path) for each in arguments]
+    done = CliRunner().invoke(app, ["hidden-effects", *given])
+    assert done.exit_code == 2
+    assert message.format(tmp_path) in re.sub(r"\s*[│\n]\s*", " ", done.output)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+def truth(block, *effects, **more):
+    hidden = [{"name": n, "parameters": p, "r": r} for n, p, r in effects]
+    return {"block": block, "effects": hidden, "base_factors": {}, "number": 1} | more
+
+
+def test_rates_stand_beside_their_targets():
+    creep = ("creep", {"time_constant_s": 2.0, "stiffness_n_per_mm": 0.5}, 1.0)
+    fitted = {"time_constant_s": {"value": 2.2, "low": 1.9, "high": 2.5}}
+    right = compare(truth("single", creep), document("effect", ("creep", fitted)))
+    wrong = compare(truth("single", creep), document("effect", ("filling", {})))
+    weak = compare(truth("single", (*creep[:2], 0.2)), document("agrees"))
+    silent = unanswered(truth("single", creep), "ValueError: no")
+    figures = scoring.count([right] * 96 + [wrong, weak, silent, silent])["blocks"]["single"]
+    named = figures["rates"]["named right"]
+    assert (named["hits"], named["n"], named["target"], named["met"]) == (96, 100, ">= 0.92", True)
+    assert figures["rates"]["right or in its group"]["met"] is False
+    assert figures["rates"]["confidently wrong"]["met"] is True
+    assert figures["rates"]["named right, r as promised"]["n"] == 99
+    assert figures["confusion"] == {
+        "creep": {"creep": 96, "no answer": 2, "filling": 1, "agrees": 1}
+    }
+    assert figures["sizes"]["median_error"]["value"] == pytest.approx(0.1)
+    assert figures["sizes"]["median_error"]["met"] is False
+    assert figures["sizes"]["covered"]["hits"] == 96
+    assert [miss["said"] for miss in figures["misses"]] == ["filling", "agrees", *["no answer"] * 2]
+
+
+def test_parameters_count_as_named_only_where_they_moved():
+    off = truth("parameters", base_factors={"radius": 1.12})
+    named = document("parameters") | {"parameters": {"rotor.radius_mm": {"significant": True}}}
+    other = document("parameters") | {"parameters": {"slide.mass_kg": {"significant": True}}}
+    told = document("parameters") | {"not_identifiable": {"rotor.radius_mm": "constant"}}
+    first, second, third = (compare(off, each) for each in (named, other, told))
+    assert first.parameters and not first.parameters_spurious
+    assert second.parameters is False and second.parameters_spurious
+    assert third.parameters is False and third.parameters_told
+
+
+def test_every_block_has_its_rates_and_effects_take_turns():
+    assert list(BLOCKS) == list(RATES)
+    assert BLOCKS["single"].turns == tuple(KINDS) == BLOCKS["faint"].turns
+
+
+@pytest.fixture(scope="module")
+def poor():
+    """A case of three trials at one pressure each, which cannot tell that its regulator is late."""
+    return draw_undecidable(90003, 1, "regulator_delay")
+
+
+def test_an_undecidable_case_keeps_what_the_ruler_promised(poor):
+    (hidden,) = poor.truth["effects"]
+    assert poor.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN
+    motor, regulator = np.array(poor.motor), np.array(poor.regulator)
+    assert np.all(np.ptp(regulator, axis=1) == 0.0) and np.ptp(motor) > 1.0
+    commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
+    rig, with_it = poor.truth["base"], {"regulator_delay": hidden["parameters"]}
+    plain, late = simulate_variants(commands, [(rig, {}), (rig, with_it)])
+    # Without any refit, so that nothing rests on what a refit may absorb.
+    assert np.sum(((late - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
+    assert hidden["witness"]["protocol"].startswith("pressure steps")
+
+
+def asking(folder):
+    """Names a wrong effect as soon as it has the short trial."""
+    trials = sorted(folder.glob("trial_*.csv"))
+    rows = len(trials[-1].read_text("utf-8").splitlines()) - 1
+    if rows == 150:
+        return Answer(document("effect", ("hysteresis", {})))
+    raise ValueError(f"a trial of {rows} rows")
+
+
+def test_what_is_proposed_is_carried_out_on_the_same_rig(poor):
+    assert follow(poor, Answer(document("undecidable")), 2, asking) == {}
+    said = document("undecidable") | {"next_experiment": {"protocol": "a short hold"}}
+    first = Answer(said, following=(np.full(150, 3.0), np.full(150, 5.0)))
+    rounds = follow(poor, first, 2, asking)
+    assert [len(rounds[way]) for way in ("proposed", "random")] == [1, 1]
+    assert rounds["proposed"][0]["protocol"] == "a short hold"
+    assert rounds["proposed"][0]["said"] == "hysteresis" and rounds["proposed"][0]["wrong"]
+    more = with_trial(poor, (np.full(150, 3.0), np.full(150, 5.0)), np.random.default_rng(3))
+    assert len(more.readings) == len(poor.readings) + 1 and more.readings[-1].shape == (150, 4)
+    # 3 V: 97.84 N/V, give or take a tenth; 5 V: 59.9 kPa/V.
+    assert more.readings[-1][:, 2].mean() == pytest.approx(291.5, rel=0.12)
+    assert more.readings[-1][:, 3].mean() == pytest.approx(279.1, rel=0.02)
+
+
+def test_a_random_experiment_is_as_long_as_the_one_proposed():
+    g = np.random.default_rng(2)
+    for rows in (300, 5000):
+        words, (motor, regulator) = random_experiment(g, rows)
+        assert words and motor.shape == regulator.shape == (rows,)
+        assert 0.0 <= motor.min() and motor.max() <= 10.0
+
+
+def test_rounds_are_counted_by_way():
+    def after(proposed, random, verdict="undecidable"):
+        hidden = truth("undecidable", ("bump", {}, 0.0), kind="one load")
+        outcome = compare(hidden, document(verdict))
+        outcome.rounds = {
+            way: [{"settled": each, "wrong": False} for each in came]
+            for way, came in (("proposed", proposed), ("random", random))
+        }
+        return outcome
+
+    silent = compare(truth("undecidable", ("bump", {}, 0.0), kind="held"), document("agrees"))
+    some = [after([True], [False, True]), after([False, True], [False, False]), silent]
+    figures = scoring.count(some)["blocks"]["undecidable"]
+    assert figures["rates"]["undecidable"]["hits"] == 2
+    assert figures["rates"]["proposed, settled in 2 rounds"]["hits"] == 2
+    assert figures["rates"]["proposed, settled in 2 rounds"]["n"] == 3
+    assert figures["rates"]["random, settled in 2 rounds"]["hits"] == 1
+    rounds = figures["rounds"]
+    assert rounds["asked"]["hits"] == 2 and rounds["proposed"]["mean_rounds"] == 1.5
+    assert rounds["random"]["mean_rounds"] == 2.5 and rounds["faster"]["hits"] == 2
+    assert figures["by_kind"]["held"]["verdicts"] == {"agrees": 1}
+
+
+def test_a_page_has_every_block_once(whole, tmp_path):
+    score = whole[0] / "score.json"
+    call = ["hidden-effects-report", str(whole[0])]
+    text = CliRunner().invoke(app, call).stdout
+    alarm = whole[1]["blocks"]["nothing"]["rates"]["false alarm"]
+    assert re.search(
+        rf"nothing *\| *false alarm *\| .*{alarm['hits']} of 3 *\| *<= 0.01 *\| *missed", text
+    )
+    assert CliRunner().invoke(app, [*call, "--out", str(tmp_path / "page.html")]).exit_code == 0
+    assert "false alarm" in (tmp_path / "page.html").read_text("utf-8")
+    # As JSON it can be read again, and says the same.
+    kept = tmp_path / "kept.json"
+    assert CliRunner().invoke(app, [*call, "--out", str(kept)]).exit_code == 0
+    assert CliRunner().invoke(app, ["hidden-effects-report", str(kept)]).stdout == text
+    twice = CliRunner().invoke(app, [*call, str(score)])
+    assert twice.exit_code == 2 and "block nothing is in 2 of the files" in twice.stderr
+    torn = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path / "page.html")])
+    assert torn.exit_code == 2 and "page.html is no JSON file" in torn.stderr
+    nowhere = CliRunner().invoke(app, ["hidden-effects-report", str(tmp_path)])
+    assert nowhere.exit_code == 2 and "there is no such file" in nowhere.stderr

@@ -1,0 +1,300 @@
+"""The leaderboard: what it reads from rows, what it says of them, and what it refuses."""
+
+import csv
+import json
+import math
+import random
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from benchmarks.__main__ import app
+from benchmarks.bounds import cache as module
+from benchmarks.report.errors import Measure, Record, is_bound, measures, pooled_measure
+from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
+from benchmarks.report.page import page_blocks
+from benchmarks.report.plot_style import styles_of
+from benchmarks.report.plots import profile_plot
+from benchmarks.report.publish import NUMBERS, PAGE, PAIRS, TEXT, numbers_csv, pairs_csv, run_report
+from benchmarks.report.tracking_cost import spending
+from benchmarks.runner.journal import JOURNAL, Journal
+from benchmarks.runner.provenance import RUN
+from benchmarks.suites.frozen import Episode
+from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.target import parse_target
+from controllers import CONTROLLERS
+from pma_gym.pages.document import to_markdown
+from tests.benchmarks.report.simulated_rows import (
+    LEVELS,
+    simulated_row,
+    simulated_rows,
+    simulated_suite,
+)
+
+RUN_AT = {"started": "today", "command": "python -m benchmarks run"}
+
+INFO = {
+    "contenders": {
+        name: {"title": name.upper(), "source": name, "key": f"key-{name}", **RUN_AT}
+        for name in LEVELS
+    },
+    "git": {"commit": "0123", "dirty": False},
+    "versions": {"python": "3"},
+    "platform": "somewhere",
+    "processors": 2,
+    "code": "abc",
+}
+
+
+@pytest.fixture(autouse=True)
+def bounds(monkeypatch):
+    """An oracle that may see, and a bound of phase III that takes no time."""
+    monkeypatch.setitem(CONTROLLERS, "oracle", type("Seer", (), {"receive": None}))
+    monkeypatch.setattr(module, "achievable_bound", lambda *given: {"III": 0.02})
+
+
+def board(suite, rows):
+    return Leaderboard(Record.of(suite, rows), INFO)
+
+
+def test_measures_keep_the_way_back_and_unseen_references_apart():
+    found = measures(["displacement", "rotation", "rotation_sine", "isotonic", "triangle_low"])
+    assert [(m.name, m.tasks, m.unit) for m in found] == [
+        ("displacement", ("displacement",), "mm"),
+        ("rotation I, II", ("rotation",), "deg"),
+        ("rotation III", ("rotation",), "deg"),
+        ("unseen rotation", ("rotation_sine",), "deg"),
+        ("contraction", ("isotonic", "triangle_low"), "mm"),
+    ]
+    assert found[1].phases("rotation") == ["I", "II"]
+    assert found[2].phases("rotation") == ["III"]
+    # A regulator vents: its way back is like any other phase.
+    assert found[4].phases("isotonic") == ["I", "II", "III"]
+
+
+def test_error_of_a_row_is_the_rmse_of_its_phases_together():
+    suite = simulated_suite()
+    episode = Episode(0, "rotation", 275.0, 0)
+    row = simulated_row(suite, "pid", episode, 1.0)
+    row["phases"]["I"]["rmse"], row["phases"]["II"]["rmse"] = 0.3, 0.4
+    there, back = (m for m in measures(["rotation"]))
+    assert there.of_row(row) == pytest.approx(math.sqrt((0.3**2 + 0.4**2) / 2))
+    assert back.of_row(row) == pytest.approx(0.9)
+    assert pooled_measure(["rotation"]).of_row(row) == pytest.approx(there.of_row(row) / 0.9)
+
+
+def test_a_failed_case_is_off_by_the_whole_range():
+    suite = simulated_suite()
+    for task, unit_range in (("displacement", 25.0), ("rotation", 90.0)):
+        row = simulated_row(suite, "pid", Episode(0, task, 275.0, 0), 1.0, "it broke")
+        assert measures([task])[0].of_row(row) == pytest.approx(unit_range)
+        assert pooled_measure([task]).of_row(row) == pytest.approx(100.0)
+
+
+def test_figures_do_not_depend_on_the_order_of_the_rows():
+    suite = simulated_suite()
+    rows = simulated_rows(suite)
+    shuffled = random.Random(1).sample(rows, len(rows))
+    boards = board(suite, rows), board(suite, shuffled)
+    assert len({numbers_csv(each) for each in boards}) == 1
+    assert len({pairs_csv(each) for each in boards}) == 1
+    styles = styles_of(boards[0].labels)
+    found = [list(each.standings.values()) for each in boards]
+    assert profile_plot(found[0], styles) == profile_plot(found[1], styles)
+
+
+def test_standings_find_who_is_better_and_by_how_much():
+    suite = simulated_suite(stations=48)
+    found = board(suite, simulated_rows(suite)).standings["displacement"]
+    by_name = {row.name: row for row in found.rows}
+    # The bound is last and has no rank; 0.9 and 1.0 are told apart, equals are not.
+    assert found.rows[-1].name == "oracle"
+    assert by_name["oracle"].rank is None
+    assert by_name["mpc"].rank == (1, 1)
+    assert by_name["pid"].rank == by_name["feedforward_pid"].rank == (2, 3)
+    assert by_name["improved_feedforward"].rank == (4, 4)
+    assert by_name["pid"].to_best.low < 1.0 / 0.9 < by_name["pid"].to_best.high
+    assert by_name["pid"].to_bound.low < 2.0 < by_name["pid"].to_bound.high
+    assert by_name["mpc"].to_best == (1.0, 1.0, 1.0)
+    assert by_name["pid"].percent == pytest.approx(4.0 * by_name["pid"].mean.estimate)
+
+
+def test_improvement_of_pairs_adds_up_to_one():
+    suite = simulated_suite()
+    pairs = board(suite, simulated_rows(suite)).standings["all tasks"].pairs
+    by_names = {(pair.first, pair.second): pair for pair in pairs}
+    assert len(pairs) == 20
+    for (first, second), pair in by_names.items():
+        back = by_names[second, first]
+        assert pair.improvement.estimate + back.improvement.estimate == 1.0
+        assert pair.ratio.estimate * back.ratio.estimate == pytest.approx(1.0)
+        assert not (pair.separated and back.separated)
+
+
+def test_missing_and_incomplete_controllers_are_named_and_not_ranked():
+    suite = simulated_suite()
+    rows = [row for row in simulated_rows(suite) if row["controller"] != "mpc"]
+    half = [row for row in rows if row["controller"] == "pid"][::2]
+    kept = [row for row in rows if row["controller"] != "pid"] + half
+    found = board(suite, kept)
+    assert [entry.contender.name for entry in found.missing] == ["mpc"]
+    ((entry, done, wanted),) = found.incomplete
+    assert (entry.contender.name, done, wanted) == ("pid", len(half), len(suite.episodes))
+    names = found.standings["displacement"].errors.names
+    assert names == ("oracle", "feedforward_pid", "improved_feedforward")
+    text = to_markdown(page_blocks(found), {}, "plots")
+    assert "**Not run: MPC.**" in text
+    assert f"PID ({len(half)} of {wanted} cases)" in text
+
+
+def test_an_interrupted_run_compares_the_cases_that_all_have():
+    suite = simulated_suite(targets=[{"figure": "best", "measure": "displacement", "most": 9.0}])
+    rows = simulated_rows(suite)
+    found = board(suite, rows[: len(rows) // 2 + 2])
+    standings = found.standings["displacement"]
+    assert standings.errors.names == tuple(LEVELS)
+    assert 0 < len(standings.errors.episodes) < len(suite.episodes)
+    # No verdict rests on a part of the cases.
+    assert [check.word for check in found.verdicts] == ["no figure"]
+
+
+def test_rows_of_other_versions_and_unknown_episodes_do_not_count():
+    suite = simulated_suite()
+    rows = simulated_rows(suite)
+    other = [row | {"version": 2} for row in rows] + [row | {"repeat": 7} for row in rows]
+    assert not Record.of(suite, other).rows
+    assert len(Record.of(suite, rows + other).rows) == len(rows)
+
+
+def test_somebody_s_own_controller_is_ranked_with_the_others():
+    suite = simulated_suite()
+    mine = [simulated_row(suite, "Mine", episode, 0.01) for episode in suite.episodes]
+    found = board(suite, simulated_rows(suite) + mine)
+    assert found.standings["rotation III"].rows[0].name == "Mine"
+    assert found.labels["Mine"] == "Mine"
+
+
+def test_verdicts_say_what_was_asked_and_got():
+    targets = [
+        {"figure": "best", "measure": "displacement", "most": 0.03},
+        {"figure": "largest", "measure": "rotation I, II", "most": 1e-3, "controllers": ["pid"]},
+        {"figure": "best_to_bound", "measure": "all tasks", "most": 2.5},
+        {"figure": "to_bound", "measure": "all tasks", "controllers": ["pid"]},
+        {"figure": "above_bound", "measure": "rotation III", "most": 1, "controllers": ["pid"]},
+        {"figure": "half_width", "measure": "displacement", "most": 1e-3},
+        {"figure": "best", "measure": "contraction", "most": 1.0},
+        {"figure": "ratio_half_width", "measure": "displacement", "most": 20.0},
+    ]
+    suite = simulated_suite(targets=targets)
+    found = board(suite, simulated_rows(suite))
+    words = [check.word for check in found.verdicts]
+    assert words == ["met", "missed", "met", "—", "met", "missed", "no figure", "met"]
+    assert "MPC" in found.verdicts[0].what
+    ratio = found.verdicts[3].got
+    assert ratio.low < 2.0 < ratio.high
+    # Of those up to twice the best alone: not the feed-forward, which is far off.
+    assert not found.verdicts[7].what.endswith("IMPROVED_FEEDFORWARD")
+    assert [check.unit for check in found.verdicts[4:]] == ["deg", "%", "", "%"]
+    # The bound is taken off at every pressure.
+    largest = max(
+        np.mean(found.standings["rotation III"].errors.of("pid")[at])
+        for at in _by_pressure(found.standings["rotation III"].errors.episodes)
+    )
+    assert found.verdicts[4].got.estimate == pytest.approx(largest - 0.02)
+
+
+def _by_pressure(episodes):
+    pressures = sorted({episode.pressure_kpa for episode in episodes})
+    return [[i for i, e in enumerate(episodes) if e.pressure_kpa == p] for p in pressures]
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"figure": "smallest", "measure": "displacement"}, "figure must be one of"),
+        ({"figure": "best", "measure": "x", "controllers": ["pid"]}, "must not name controllers"),
+        ({"figure": "largest", "measure": "x"}, "must name controllers"),
+        ({"figure": "best", "measure": "x", "limit": 1.0}, "unknown limit"),
+    ],
+)
+def test_a_target_that_nobody_understands_is_refused(given, words):
+    with pytest.raises(ValueError, match=words):
+        parse_target(given)
+
+
+def test_spending_leaves_failed_cases_out_and_counts_them():
+    suite = simulated_suite()
+    rows = simulated_rows(suite)
+    ours = [row for row in rows if row["controller"] == "pid"]
+    first = next(row for row in ours if row["task"] == "displacement")
+    first["failure"] = "it broke"
+    first["act_us"] = 1e9
+    (found,) = spending(Record.of(suite, rows), Measure("", ("displacement",), "mm"), ["pid"])
+    assert found.failures == 1
+    assert found.act_us == 10.0
+    # 10 ms of control period, 20 us of computing.
+    assert found.real_time_factor == pytest.approx(500.0)
+    assert found.saturated_percent == pytest.approx(1.0)
+
+
+def test_a_bound_is_who_may_see():
+    assert is_bound("oracle")
+    assert not is_bound("pid")
+    assert not is_bound("Mine")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Results of the simulated suite as a run leaves them, with a failed case."""
+    suite = simulated_suite(targets=[{"figure": "best", "measure": "displacement", "most": 1.0}])
+    rows = simulated_rows(suite)
+    rows[3] = simulated_row(
+        suite, "pid", Episode(*(rows[3][f] for f in Episode._fields)), 0.0, "it broke"
+    )
+    with Journal(tmp_path / JOURNAL) as journal:
+        for row in rows:
+            journal.append({"key": f"key-{row['controller']}"} | row)
+    info = INFO | {"suite": {"name": suite.name, "digest": suite.digest, "version": 3}}
+    (tmp_path / RUN).write_text(json.dumps(info))
+    return suite, tmp_path
+
+
+def test_page_and_numbers_are_written(folder, tmp_path):
+    suite, results = folder
+    out = tmp_path / "page"
+    assert run_report(suite, results, out) == out / PAGE
+    written = {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()}
+    names = {"distributions.png", "profiles.png", "pressures.png", "improvement.png"}
+    assert names <= set(written)
+    assert {"loops_displacement.png", "loops_rotation.png", NUMBERS, PAIRS, TEXT} <= set(written)
+    page = written[PAGE].decode()
+    assert 'src="http' not in page
+    assert page.count("data:image/png;base64") == 6
+    assert "it broke" in page
+    assert "digest abc, changed since" in page
+    rows = list(csv.DictReader(written[NUMBERS].decode().splitlines()))
+    assert {row["measure"] for row in rows} >= {"displacement", "rotation III", "all tasks"}
+    pid = next(r for r in rows if (r["measure"], r["controller"]) == ("displacement", "pid"))
+    standing = next(
+        row
+        for row in read_leaderboard(suite, results).standings["displacement"].rows
+        if row.name == "pid"
+    )
+    assert float(pid["mean"]) == standing.mean.estimate
+    assert float(pid["mean_low"]) == standing.mean.low
+
+
+def test_results_of_another_suite_or_of_none_are_refused(folder, tmp_path):
+    suite, results = folder
+    with pytest.raises(SuiteError, match=r"has no results of suite simulated; make some"):
+        read_leaderboard(suite, tmp_path / "nowhere")
+    changed = simulated_suite(stations=17)
+    with pytest.raises(SuiteError, match=r"with other numbers than simulated version 3 has now"):
+        read_leaderboard(changed, results)
+
+
+def test_command_says_what_is_missing():
+    result = CliRunner().invoke(app, ["report", "nominal", "--results", "/nonexistent"])
+    assert result.exit_code == 2
+    assert "has no results of suite nominal" in result.stderr

@@ -1,0 +1,214 @@
+"""A training that was interrupted goes on to what it would have come to, or says why not."""
+
+import errno
+import hashlib
+import os
+import resource
+import subprocess
+import sys
+
+import pytest
+
+pytest.importorskip("stable_baselines3")
+pytest.importorskip("sb3_contrib")
+pytest.importorskip("safetensors")
+
+import torch
+from safetensors.torch import load_file
+
+from benchmarks.training import checkpoint, run
+from benchmarks.training.averaging import WeightAverage
+from benchmarks.training.checkpoint import CheckpointError, latest, save_checkpoint
+from benchmarks.training.learner import learner
+from benchmarks.training.run import Order, train
+
+
+@pytest.fixture(autouse=True)
+def short_legs(monkeypatch):
+    """Legs of two episodes and two validations: what is tested is where they meet."""
+    monkeypatch.setattr(run, "EPISODES", 2)
+    monkeypatch.setattr(run, "EVALUATIONS", 2)
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing catches it."""
+
+
+def killed_after(legs, monkeypatch, order, out):
+    """Train until so many checkpoints are saved."""
+
+    def saved(folder, number, *given):
+        save_checkpoint(folder, number, *given)
+        if number == legs:
+            raise Killed
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run, "save_checkpoint", saved)
+        with pytest.raises(Killed):
+            trained(order, out)
+
+
+def trained(order, out):
+    """Train."""
+    return train(order, out, lambda steps, point: None)
+
+
+def weights(model):
+    return {name: tensor.clone() for name, tensor in model.policy.state_dict().items()}
+
+
+def same(one, other):
+    assert one.keys() == other.keys()
+    return all(torch.equal(one[name], other[name]) for name in one)
+
+
+@pytest.mark.parametrize("algorithm", ["ppo", "sac", "td3", "tqc"])
+def test_a_killed_training_comes_to_the_same_policy(algorithm, preset, monkeypatch, tmp_path):
+    order = Order(preset(algorithm), seed=3)
+    whole = trained(order, tmp_path / "whole")
+    assert whole.course.legs == 2
+    killed_after(1, monkeypatch, order, tmp_path / "killed")
+    resumed = trained(order, tmp_path / "killed")
+    assert same(weights(whole.model), weights(resumed.model))
+    assert whole.final == resumed.final
+    assert [p._replace(wall_s=0.0) for p in whole.course.curve] == [
+        p._replace(wall_s=0.0) for p in resumed.course.curve
+    ]
+    ours, theirs = (
+        load_file(tmp_path / name / "checkpoints" / "000002" / "state.safetensors")
+        for name in ("whole", "killed")
+    )
+    assert same(ours, theirs)
+
+
+def test_a_finished_training_run_again_trains_nothing(preset, monkeypatch, tmp_path):
+    order = Order(preset(), seed=3)
+    first = trained(order, tmp_path)
+
+    def leg(*_):
+        raise AssertionError("there is nothing to train")
+
+    monkeypatch.setattr(run, "_leg", leg)
+    again = trained(order, tmp_path)
+    assert same(weights(first.model), weights(again.model)) and first.final == again.final
+
+
+def test_the_same_seed_gives_the_same_policy_and_another_one_another(preset, tmp_path):
+    one, other, third = (
+        weights(trained(Order(preset(steps=480), seed), tmp_path / name).model)
+        for name, seed in (("a", 3), ("b", 3), ("c", 4))
+    )
+    assert same(one, other) and not same(one, third)
+
+
+PROCESS = """
+import hashlib, sys, pathlib
+from benchmarks.training import environments, run
+from benchmarks.training.configuration.preset import Preset
+from controllers.policies.action_mapping import ActionMapping
+from controllers.policies.observation_spec import ObservationSpec
+environments.VALIDATION = 1
+preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", ObservationSpec("tracking", 2,
+2),
+    ActionMapping("increment", 0.5), "", {"control_rate_hz": 10.0, "pressure_kpa": 300.0}, 4, 480,
+    0.5, {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
+    {"net_arch": [16]})
+run.EPISODES = run.EVALUATIONS = 2
+found = run.train(run.Order(preset, 3), pathlib.Path(sys.argv[1]), lambda steps, point: None)
+sums = hashlib.sha256()
+for tensor in found.model.policy.state_dict().values():
+    sums.update(tensor.numpy().tobytes())
+print(sums.hexdigest())
+"""
+
+
+def test_another_process_gives_the_same_policy(preset, tmp_path):
+    # Another hash seed: no order of a set may matter.
+    told_of = subprocess.run(
+        [sys.executable, "-c", PROCESS, str(tmp_path / "there")],
+        stdout=subprocess.PIPE,
+        check=True,
+        text=True,
+        env=os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
+    )
+    sums = hashlib.sha256()
+    for tensor in weights(trained(Order(preset(steps=480), 3), tmp_path / "here").model).values():
+        sums.update(tensor.numpy().tobytes())
+    assert told_of.stdout.strip() == sums.hexdigest()
+
+
+# -- refused ---------------------------------------------------------------------------------------
+
+
+def test_another_order_in_the_folder_is_refused(preset, monkeypatch, tmp_path):
+    killed_after(1, monkeypatch, Order(preset(), seed=3), tmp_path)
+    with pytest.raises(CheckpointError, match=r"another training: seed was 3, is 4; give another"):
+        trained(Order(preset(), seed=4), tmp_path)
+    with pytest.raises(CheckpointError, match=r"steps was 960, is 1920"):
+        trained(Order(preset(steps=1920), seed=3), tmp_path)
+
+
+DAMAGE = {
+    "cut tensors": ("state.safetensors", lambda content: content[: len(content) // 2]),
+    "no tensors": ("state.safetensors", lambda content: b""),
+    "cut words": ("state.json", lambda content: content[: len(content) // 2]),
+    "other words": ("state.json", lambda content: b"[1, 2]"),
+    "no course": ("state.json", lambda content: content.replace(b'"curve"', b'"curved"')),
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGE)
+def test_a_damaged_checkpoint_is_named_and_the_one_before_serves(damage, preset, capsys, tmp_path):
+    order = Order(preset(), seed=3)
+    whole = trained(order, tmp_path)
+    name, harm = DAMAGE[damage]
+    last = tmp_path / "checkpoints" / "000002"
+    (last / name).write_bytes(harm((last / name).read_bytes()))
+    assert same(weights(whole.model), weights(trained(order, tmp_path).model))
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith("warning: ")]
+    assert len(said) == 1 and "000002 is damaged" in said[0]
+
+
+def test_other_folders_beside_the_checkpoints_are_left_alone(tmp_path):
+    for name in ("000001", "000002 of monday"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "state.json").write_text("{}")
+    assert latest(tmp_path) == (1, tmp_path / "000001")
+
+
+# -- a full disk -----------------------------------------------------------------------------------
+
+
+def _full(*_, **__):
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.mark.parametrize("what", ["save_file", "json"])
+def test_a_full_disk_leaves_the_last_checkpoint(what, preset, monkeypatch, tmp_path):
+    order = Order(preset(), seed=3)
+    whole = trained(order, tmp_path / "whole")
+    killed_after(1, monkeypatch, order, tmp_path / "full")
+    with monkeypatch.context() as patched:
+        if what == "json":
+            patched.setattr("pathlib.Path.write_text", _full)
+        else:
+            patched.setattr(checkpoint, what, _full)
+        with pytest.raises(CheckpointError, match=r"No space left.*leg 1 stays in .*make room"):
+            trained(order, tmp_path / "full")
+    assert [p.name for p in (tmp_path / "full" / "checkpoints").iterdir()] == ["000001"]
+    assert same(weights(whole.model), weights(trained(order, tmp_path / "full").model))
+
+
+def test_a_file_that_may_not_grow_is_told(preset, tmp_path):
+    small = preset()
+    envs = run.training_environments(small)
+    model = learner(small, envs, 0)
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, hard))
+    try:
+        with pytest.raises(CheckpointError, match=r"cannot be saved .* there is none before"):
+            save_checkpoint(tmp_path, 1, model, WeightAverage(0.1, 960), {})
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        envs.close()
+    assert latest(tmp_path) is None

@@ -1,0 +1,199 @@
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery import diagnose
+from pma_gym.discovery.experiments.detectability import chance_to_show, for_blind
+from pma_gym.discovery.experiments.excitation import is_safe, library
+from pma_gym.discovery.experiments.next_experiment import Contest, next_experiment
+from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.free_parameters import Own, prior
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.screening.score_test import SHOWN_GAIN, Baseline, look
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.plant import Plant
+
+FREE = (
+    "contractile_force.slope_n_per_kpa",
+    "contractile_force.intercept_n",
+    "damping.contracting_n_s_per_mm",
+    "drive.gain_n_per_v",
+)
+
+
+NOISY = {
+    "lvdt.noise_mm": 1.2,
+    "load_cell.noise_n": 30.0,
+    "potentiometer.noise_deg": 6.0,
+    "pressure_transducer.noise_kpa": 18.0,
+}
+"""So noisy that a question stays open until a proper experiment is run."""
+
+TRUTHS = {
+    "hysteresis": {"force_n": 20.0, "distance_mm": 1.5},
+    "creep": {"stiffness_n_per_mm": 1.5, "time_constant_s": 2.0},
+}
+
+
+def station() -> Model:
+    model = load_model("serres2008").replace(NOISY)
+    # Without dry friction, whose fits take several times as long.
+    smooth = {k: v for k, v in model.parameters.items() if k != "coulomb_friction"}
+    return Model(model.name, model.title, model.plant, smooth, model.notes)
+
+
+def nearly_constant(model: Model) -> list[Trial]:
+    """Two trials in which the load moves once, and little."""
+    time = np.arange(8 * 128 + 1) / 128
+    plant, found = Plant(model), []
+    for number, pressure in enumerate((280e3, 400e3)):
+        motor = 3.0 + 0.3 * np.clip(np.minimum(time - 1.0, 4.0 - time) / 0.5, 0.0, 1.0)
+        regulator = np.full(len(time), plant.regulator_voltage(pressure))
+        trial = Trial(time, {"motor_voltage": motor, "regulator_voltage": regulator})
+        found.append(plant.simulate(trial, seed=number))
+    return found
+
+
+def bench(trials: list[Trial]) -> Bench:
+    model = station()
+    own = Own(FREE, np.array([prior(model, path) for path in FREE]))
+    noise = tuple(white_noise(float(each)) for each in sensors.noise_levels(model))
+    return Bench(trials, model, own, noise)
+
+
+@cache
+def every() -> dict[str, Suspect]:
+    return {each.name: each for each in suspects(station())}
+
+
+def fitted(on: Bench, name: str) -> Fitted:
+    suspect = every()[name]
+    usual = suspect.probes[len(suspect.probes) // 2]
+    found = on.fit(station(), [suspect], {name: usual})
+    assert found is not None
+    return found
+
+
+@cache
+def case(true: str):
+    truth = station().with_effects({true: TRUTHS[true]})
+    on = bench(nearly_constant(truth))
+    rivals = [(fitted(on, name), (every()[name],)) for name in TRUTHS]
+    return truth, on, rivals, next_experiment(on, rivals, 0)
+
+
+def lead(on: Bench, name: str) -> float:
+    """Log-likelihood of the true one beyond the other's, both fitted to all trials."""
+    other = next(each for each in TRUTHS if each != name)
+    return 0.5 * (fitted(on, other).chi_square - fitted(on, name).chi_square)
+
+
+@pytest.mark.parametrize("true", TRUTHS)
+def test_proposed_trial_tells_what_was_promised(true):
+    truth, on, rivals, found = case(true)
+    assert found is not None and found.separates == tuple(TRUTHS)
+    measured = Plant(truth).simulate(found.trial, seed=7)
+    before, after = lead(on, true), lead(replace(on, trials=[*on.trials, measured]), true)
+    assert after - before >= 0.5 * np.log(found.expected_odds)
+    assert found.minutes == pytest.approx(found.trial.duration / 60.0)
+
+
+def test_it_tells_more_a_minute_than_most_of_the_library():
+    _, on, rivals, found = case("hysteresis")
+    contest = Contest.of(on, rivals, 0)
+    hopes = {
+        each.name: float(np.min(contest.odds([each], contest.pairs()))) / each.minutes
+        for each in library([*contest.models, on.given], 0)
+    }
+    assert found is not None
+    others = [rate for name, rate in hopes.items() if name != found.protocol]
+    assert hopes[found.protocol] > np.median(others)
+
+
+def test_the_same_seed_proposes_the_same_trial():
+    _, on, rivals, found = case("hysteresis")
+    again = next_experiment(on, rivals, 0)
+    assert found is not None and again is not None
+    assert (again.protocol, again.expected_odds) == (found.protocol, found.expected_odds)
+    for name, volts in again.trial.commands.items():
+        np.testing.assert_array_equal(volts, found.trial.commands[name])
+
+
+def test_a_proposal_is_commands_and_nothing_else():
+    _, _, _, found = case("hysteresis")
+    assert found is not None
+    assert set(found.trial.commands) == {"motor_voltage", "regulator_voltage"}
+    assert not found.trial.measurements and not found.trial.truth
+
+
+def test_one_effect_is_asked_about_against_nothing():
+    _, on, rivals, _ = case("hysteresis")
+    plain = on.fit(station())
+    assert plain is not None
+    found = next_experiment(on, [rivals[0], (plain, ())], 0)
+    assert found is not None and found.separates == (rivals[0][0].names[0],)
+    assert found.expected_odds > 20.0
+
+
+def test_one_rival_needs_no_experiment():
+    _, on, rivals, _ = case("hysteresis")
+    assert next_experiment(on, rivals[:1], 0) is None
+
+
+def test_every_protocol_is_safe_and_as_long_as_a_test_may_be():
+    model = station()
+    found = list(library([model]))
+    assert len(found) == 30 and len({each.name for each in found}) == 30
+    for each in found:
+        again = Plant(model).simulate(each.trial, noise=False)
+        assert is_safe(model, again), each.name
+        assert 10.0 <= each.trial.duration <= 60.0
+        np.testing.assert_allclose(np.diff(each.trial.time), 1.0 / 128.0)
+
+
+def test_a_rig_of_narrow_limits_gets_smaller_loads():
+    narrow = station().replace({"limits.tension_n": 700.0, "limits.contraction_mm": 50.0})
+    wide, few = list(library([station()])), list(library([narrow]))
+    assert 0 < len(few) < len(wide)
+    for each in few:
+        assert np.max(each.simulated[0].truth["load"]) <= 0.9 * 700.0
+        assert np.max(each.simulated[0].truth["contraction"]) <= 0.9 * 50e-3
+
+
+def test_effects_that_were_hidden_are_made_to_show():
+    _, on, _, _ = case("hysteresis")
+    fit = on.fit(station())
+    assert fit is not None
+    wanted = [every()[name] for name in ("hysteresis", "creep", "drive_saturation")]
+    baseline = Baseline.at(on.evidence(fit.model), fit.values, fit.steps)
+    looks = look(baseline, wanted, 0, lambda suspect: on.probed(fit.model, suspect))
+    hidden = [each.suspect.name for each in looks if (each.resolvable or np.inf) > 1.0]
+    assert "creep" in hidden
+    found = for_blind(on, fit, wanted, looks)
+    assert found is not None and "creep" in found.separates
+    assert set(found.separates) <= set(hidden)
+    assert found.expected_odds >= np.exp(12.5)
+    assert for_blind(on, fit, wanted, []) is None
+
+
+def test_the_chance_to_show_counts_sizes_in_proportion():
+    """A tenth of the usual size shows with a hundredth of the gain; a third lies half way."""
+    gains = SHOWN_GAIN * np.array([0.0, 1.0, 10.0, 100.0, 1e6])
+    assert chance_to_show(gains) == pytest.approx([0.0, 0.0, 0.5, 1.0, 1.0])
+
+
+def test_who_knows_nothing_is_proposed_what_moves_load_and_pressure():
+    """Of a trial at rest nearly everything is hidden: no protocol of one of both shows as much."""
+    time = np.arange(0.0, 4.0, 1.0 / 64.0)
+    still = Trial(time, {"motor_voltage": 0 * time + 3.0, "regulator_voltage": 0 * time + 6.0})
+    measured = Plant(station()).simulate(still, seed=3)
+    found = diagnose([measured], station())
+    assert found.next_experiment is not None
+    volts = found.next_experiment.trial.commands
+    assert min(np.ptp(volts["motor_voltage"]), np.ptp(volts["regulator_voltage"])) > 1.0

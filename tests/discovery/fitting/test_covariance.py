@@ -1,0 +1,134 @@
+"""Errors of parameters: as the curvature says for noise, wider where a model is wrong; scatter."""
+
+from functools import cache
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.covariance import covariance
+from pma_gym.discovery.preparation.whitened_residuals import Pieces
+from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.verdict.homogeneity_test import newton_step, spreads
+from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import HYSTERESIS, STATION, bench, commanded, measured
+
+LAW = next(each for each in suspects(STATION) if each.name == "hysteresis")
+START = {"hysteresis": np.array([6.0, 1.0])}
+
+
+def widened(trials):
+    """By how much errors exceed those of the curvature, for what the data determine."""
+    shared = bench(trials)
+    fit = shared.fit(STATION)
+    assert fit is not None
+    known = np.isfinite(np.diag(fit.covariance))
+    found = covariance(shared, fit, ())
+    return np.sqrt(np.diag(found)[known] / np.diag(fit.covariance)[known])
+
+
+def test_white_noise_hardly_widens_errors():
+    wider = widened(measured(STATION, 6, noise=True))
+    assert np.all(wider >= 1.0)
+    assert np.median(wider) < 1.3
+
+
+def test_what_is_left_for_seconds_widens_errors():
+    def wandering(trial, seed):
+        white = np.random.default_rng(seed).standard_normal(len(trial))
+        slow = lfilter([0.3], [1.0, -0.95], white) * 1e-4
+        held = trial.measurements["contraction"] + np.asarray(slow)
+        return Trial(trial.time, trial.commands, {**trial.measurements, "contraction": held})
+
+    trials = measured(STATION, 6)
+    slow = [wandering(trial, seed) for seed, trial in enumerate(trials)]
+    assert widened(slow).max() > 2.0
+    assert widened(slow).max() > 1.5 * widened(trials).max()
+
+
+@cache
+def scatter(*forces):
+    """Spread of hysteresis whose force (N) differs from trial to trial."""
+    models = [
+        STATION.with_effects({"hysteresis": HYSTERESIS["hysteresis"] | {"force_n": force}})
+        for force in forces
+    ]
+    trials = [
+        Plant(model).simulate(trial, seed=k, noise=True)
+        for k, (model, trial) in enumerate(
+            zip(models, commanded(len(forces), kinds=(0,)), strict=True)
+        )
+    ]
+    shared = bench(trials)
+    fit = shared.fit(STATION, (LAW,), START)
+    assert fit is not None
+    return spreads(shared, fit, (LAW,), 0)
+
+
+def test_an_effect_of_one_size_does_not_scatter():
+    found = scatter(6.0, 6.0, 6.0, 6.0)
+    assert set(found) == {"trial", "contraction", "load", "pressure"}
+    assert max(found.values()) < 0.05
+
+
+def test_an_effect_of_two_sizes_scatters_by_trial_as_it_was_made():
+    # A third of the mean of 6 N.
+    assert scatter(4.0, 8.0, 4.0, 8.0)["trial"] == pytest.approx(1.0 / 3.0, abs=0.12)
+
+
+def linear(sizes, sharpness, away):
+    """Spread by trial of an effect in linear trials, beside one parameter of the model's own.
+
+    Args:
+        sizes: of the effect in each trial.
+        sharpness: how many times as sharply each trial sees it.
+        away: how many standard errors the fit is from the least chi-square.
+    """
+    generator, rows = np.random.default_rng(4), 200
+    columns = [k * generator.normal(size=(rows, 2)) for k in sharpness]
+    noise = [generator.normal(size=rows) for _ in sizes]
+    measured = [c @ [size, 1.0] + n for c, size, n in zip(columns, sizes, noise, strict=True)]
+    best = np.linalg.lstsq(np.concatenate(columns), np.concatenate(measured), rcond=None)[0]
+    curvature = sum(c.T @ c for c in columns)
+    values = best + away / np.sqrt(np.diag(curvature))
+    stacked = [np.column_stack([c @ values - m, c]) for c, m in zip(columns, measured, strict=True)]
+    trial = np.arange(len(sizes))
+    evidence = SimpleNamespace(
+        pieces=lambda *_: Pieces(np.array([s.T @ s for s in stacked]), trial, 0 * trial + rows),
+        readings=lambda *_: None,
+        prior=np.full(2, np.inf),
+        centre=np.zeros(2),
+        lower=np.full(2, -np.inf),
+        upper=np.full(2, np.inf),
+    )
+    none, one = np.zeros(1), np.ones(1, bool)
+    law = SimpleNamespace(
+        paths=("law.size",), fitted_paths=["law.size"], absent=none, amplitudes=one, fitted=one
+    )
+    fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
+    return spreads(SimpleNamespace(evidence_of=lambda *_: evidence), fit, (law,), 0)["trial"]
+
+
+def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():
+    # A tenth of an error is nothing, but times 1000 it is more than all that the others show.
+    found = [linear((1.0,) * 4, (1.0, 1.0, 1.0, 1e3), away) for away in np.linspace(-0.3, 0.3, 61)]
+    assert max(found) < 0.1
+
+
+def test_what_scatters_does_so_wherever_the_fit_stopped():
+    sizes, sharpness = (0.4, 1.6, 0.4, 1.6), (1.0, 1.0, 1.0, 3.0)
+    found = [linear(sizes, sharpness, away) for away in (0.0, -0.3, 0.3)]
+    assert found[0] > 0.2
+    assert found[1:] == pytest.approx([found[0]] * 2, rel=0.02)
+
+
+def test_the_last_step_ends_where_a_bound_holds_a_parameter():
+    """The first held, the second goes to its own least; none held, both to the joint one."""
+    curvature, gradient = np.array([[2.0, 1.8], [1.8, 2.0]]), np.array([3.0, 1.0])
+    held = newton_step(gradient, curvature, np.array([False, True]))
+    assert held == pytest.approx([0.0, -0.5])
+    joint = newton_step(gradient, curvature, np.array([True, True]))
+    assert curvature @ joint + gradient == pytest.approx([0.0, 0.0])
+    assert not newton_step(gradient, curvature, np.array([False, False])).any()

@@ -1,0 +1,153 @@
+"""An interrupted diagnosis goes on, and ends as if nothing had happened."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.journal import Journal, JournalWarning, digest
+from pma_gym.discovery.workflow import diagnose
+from tests.discovery.laboratory import OFF, STATION, diagnosed, laboratory
+
+
+@pytest.fixture(scope="module")
+def trials():
+    return laboratory("hysteresis")[0]
+
+
+@pytest.fixture(scope="module")
+def written(trials, tmp_path_factory):
+    """The journal of a whole diagnosis, and its text."""
+    folder = tmp_path_factory.mktemp("journal")
+    return folder, diagnose(trials, STATION, journal=folder, propose=False).text()
+
+
+def interrupted_at(step, done):
+    def progress(name, number, total):
+        if name.startswith(step) and number >= done:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_a_journal_changes_no_byte(written):
+    assert written[1] == diagnosed("hysteresis").text()
+
+
+@pytest.mark.parametrize(
+    ("step", "done"),
+    [("fitting effect 1", 3), ("trials left out", 1)],
+)
+def test_an_interrupted_diagnosis_goes_on(trials, written, tmp_path, step, done):
+    with pytest.raises(KeyboardInterrupt):
+        diagnose(trials, STATION, journal=tmp_path, progress=interrupted_at(step, done))
+    left = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    assert left
+    assert diagnose(trials, STATION, journal=tmp_path, propose=False).text() == written[1]
+    # What was finished was not done again.
+    for name, before in left.items():
+        assert (tmp_path / name).read_bytes() == before
+
+
+def test_a_whole_journal_gives_the_same_again(trials, written):
+    folder, text = written
+    times = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    assert diagnose(trials, STATION, journal=folder, jobs=2, propose=False).text() == text
+    assert {path.name: path.stat().st_mtime_ns for path in folder.iterdir()} == times
+
+
+@pytest.mark.parametrize("broken", [b"", b"{", b"[]", b"\xff\xfe", b"null"])
+def test_broken_files_are_passed_over(trials, tmp_path, broken):
+    folder = tmp_path / "broken"
+    journal = Journal(folder, trials, STATION, "")
+    journal.keep("fit", {"chi_square": 1.0})
+    for path in folder.iterdir():
+        path.write_bytes(broken)
+    journal.keep("other", {"chi_square": 2.0})
+    with pytest.warns(JournalWarning, match="broken holds a damaged fit .* computed anew") as said:
+        assert journal.found("fit") is None
+        assert journal.found("fit") is None
+    assert len(said) == 1
+    assert journal.found("other") == {"chi_square": 2.0}
+
+
+def test_a_diagnosis_passes_over_broken_files(trials, written, tmp_path):
+    folder = tmp_path / "broken"
+    shutil.copytree(written[0], folder)
+    for path in sorted(folder.iterdir())[::2]:
+        path.write_bytes(path.read_bytes()[:-5])
+    with pytest.warns(JournalWarning) as said:
+        assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
+    assert len(said) == 1
+
+
+def _first(entry, key, value):
+    return json.dumps(entry | {key: [value, *entry[key][1:]]})
+
+
+OTHER_FORMS = {
+    "empty object": lambda entry: "{}",
+    "text for a number": lambda entry: _first(entry, "values", "1"),
+    "another parameter": lambda entry: _first(entry, "paths", "drive.no_such"),
+    "out of bounds": lambda entry: _first(entry, "values", -1e300),
+    "too few": lambda entry: json.dumps(entry | {"values": entry["values"][1:]}),
+    "flat covariance": lambda entry: json.dumps(entry | {"covariance": entry["values"]}),
+    "no number": lambda entry: json.dumps(entry | {"chi_square": float("nan")}),
+    "null": lambda entry: json.dumps(dict.fromkeys(entry)),
+    "deep": lambda entry: "[" * 100_000,
+}
+
+
+def test_entries_of_other_forms_are_computed_anew(trials, written, tmp_path):
+    folder = tmp_path / "other"
+    shutil.copytree(written[0], folder)
+    paths = sorted(folder.iterdir())
+    for number, path in enumerate(paths):
+        harm = list(OTHER_FORMS.values())[number % len(OTHER_FORMS)]
+        path.write_text(harm(json.loads(path.read_text())))
+    assert len(paths) >= len(OTHER_FORMS)
+    with pytest.warns(JournalWarning) as said:
+        assert diagnose(trials, STATION, journal=folder, propose=False).text() == written[1]
+    assert len(said) == 1
+
+
+def test_another_question_finds_nothing(trials, tmp_path):
+    Journal(tmp_path, trials, STATION, "seed 0").keep("fit", {"chi_square": 1.0})
+    copies = [Trial(each.time, each.commands, each.measurements) for each in trials]
+    assert Journal(tmp_path, copies, STATION, "seed 0").found("fit") == {"chi_square": 1.0}
+    other = trials[0].measurements["load"].copy()
+    other[7] = np.nextafter(other[7], np.inf)
+    touched = Trial(trials[0].time, trials[0].commands, {**trials[0].measurements, "load": other})
+    for asked, model, question in (
+        (trials, STATION, "seed 1"),
+        (trials, STATION.replace(OFF), "seed 0"),
+        (trials[:-1], STATION, "seed 0"),
+        ([*trials[1:], trials[0]], STATION, "seed 0"),
+        ([touched, *trials[1:]], STATION, "seed 0"),
+    ):
+        assert Journal(tmp_path, asked, model, question).found("fit") is None
+
+
+def test_a_missing_reading_is_not_a_missing_signal(trials):
+    trial = trials[0]
+    renamed = Trial(trial.time, trial.commands, {"load": trial.measurements["pressure"]})
+    plain = Trial(trial.time, trial.commands, {"pressure": trial.measurements["pressure"]})
+    assert digest([renamed], STATION, "") != digest([plain], STATION, "")
+
+
+def test_no_folder_keeps_nothing(trials):
+    journal = Journal(None, trials, STATION, "")
+    journal.keep("fit", {"chi_square": 1.0})
+    assert journal.found("fit") is None
+
+
+def test_a_folder_is_made_when_something_is_kept(trials, tmp_path):
+    folder = tmp_path / "deep" / "er"
+    journal = Journal(folder, trials, STATION, "")
+    assert not folder.exists()
+    journal.keep("fit", {"chi_square": 1.0})
+    assert [path.suffix for path in folder.iterdir()] == [".json"]
+    assert journal.found("fit") == {"chi_square": 1.0}
+    assert journal.found("other") is None

@@ -1,0 +1,126 @@
+"""What belongs to each trial: written beside the model, and nothing is lost on the way."""
+
+import subprocess
+import sys
+import tomllib
+
+import pytest
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.files.trial_files import write_trial
+from pma_gym.data.trial_columns import TrialError
+from pma_gym.discovery.diagnosis import TrialState
+from pma_gym.discovery.fitting.trial_states import dump_states, misfits, read_states
+from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.workflow import diagnose, refit
+from pma_gym.plant.model import dump_model, parse_model
+from tests.discovery.laboratory import STATION, diagnosed, laboratory
+from tests.discovery.rig_trials import FROZEN, driven_slide
+
+
+def back(found, trials, folder):
+    """The misfit of what is written and read again."""
+    path = folder / "trials.toml"
+    path.write_text(dump_states(found.states), encoding="utf-8")
+    model = parse_model(tomllib.loads(dump_model(found.model)))
+    named, _ = prepared(
+        [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(trials)], found.given
+    )
+    return misfits(named, model, read_states(path))
+
+
+@pytest.mark.parametrize("case", ["nothing", "parameters", "hysteresis"])
+def test_model_and_trials_read_back_give_the_misfit_that_is_printed(case, tmp_path):
+    found = diagnosed(case, 6)
+    read = back(found, laboratory(case, 6)[0], tmp_path)
+    for signal, judged in found.adequacy.items():
+        assert read[signal] == pytest.approx(found.written[signal], rel=0.01)
+        assert read[signal] == pytest.approx(judged.fitted * judged.floor, rel=0.01)
+    assert set(found.states["trial 1"].zeros) == {"contraction_mm", "rotation_deg"}
+
+
+def test_zeros_are_what_the_trials_were_shifted_by(tmp_path):
+    trials = []
+    for k, trial in enumerate(laboratory("nothing", 3)[0]):
+        shifted = trial.measurements["contraction"] + 1e-3 * k
+        trials.append(
+            trial.__class__(
+                trial.time, trial.commands, {**trial.measurements, "contraction": shifted}
+            )
+        )
+    found = refit(trials, STATION)
+    for k in range(3):
+        zero = found.states[f"trial {k + 1}"].zeros["contraction_mm"]
+        assert zero == pytest.approx(k, abs=0.02)
+
+
+def test_a_free_slide_begins_where_its_trials_say(tmp_path):
+    trials = driven_slide()
+    found = refit(trials, FROZEN / "driven_slide" / "model.toml")
+    read = back(found, trials, tmp_path)
+    assert read["contraction_mm"] == pytest.approx(found.written["contraction_mm"], rel=0.01)
+    states = list(found.states.values())
+    assert all(
+        {"start.contraction_mm", "start.velocity_mm_per_s"} == set(each.parameters)
+        for each in states
+    )
+    # Without its states the model begins every piece at rest in one place.
+    named, _ = prepared(
+        [NamedTrial(f"trial {i + 1}", t) for i, t in enumerate(trials)], found.given
+    )
+    assert misfits(named, found.model, {})["contraction_mm"] > 10.0 * read["contraction_mm"]
+
+
+def test_a_second_diagnosis_of_the_amended_model_changes_nothing_beyond_its_intervals():
+    trials = laboratory("hysteresis", 6)[0]
+    first = diagnosed("hysteresis", 6)
+    second = diagnose(trials, first.model, propose=False)
+    assert second.verdict == "agrees", second.sentence
+    assert second.model == second.given
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("trials = 1", "must be a table"),
+        ('[trials."a.csv"]\nzeros = 1', "must be a table of numbers"),
+        ('[trials."a.csv".zeros]\nload = 1', "takes contraction_mm, rotation_deg, load_n, pres"),
+        ('[trials."a.csv".zeros]\nload_n = "1"', "must be a finite number, got '1'"),
+        ('[trials."a.csv".parameters]\nx = inf', "must be a finite number, got inf"),
+        ('[trials."a.csv".parameters]\nx = true', "must be a finite number, got True"),
+    ],
+)
+def test_states_that_cannot_be_used_are_refused(text, words, tmp_path):
+    path = tmp_path / "trials.toml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(TrialError, match=words):
+        read_states(path)
+
+
+def test_names_of_files_survive():
+    names = ['a "quoted" one.csv', "Stra\u00dfe 1.csv", "tab\there.csv", "bad\udcff.csv"]
+    text = dump_states({name: TrialState({"load_n": 1.5}, {}) for name in names})
+    tables = tomllib.loads(text)["trials"]
+    assert list(tables)[:3] == names[:3] and len(tables) == 4
+
+
+def test_compare_prints_the_misfit(tmp_path):
+    folder = tmp_path / "lab"
+    folder.mkdir()
+    for k, trial in enumerate(laboratory("nothing", 3)[0]):
+        write_trial(trial, folder / f"trial_{k}.csv")
+    (tmp_path / "model.toml").write_text(dump_model(STATION), encoding="utf-8")
+    found = refit(laboratory("nothing", 3)[0], STATION)
+    named = {f"trial_{k}.csv": found.states[f"trial {k + 1}"] for k in range(3)}
+    (tmp_path / "trials.toml").write_text(dump_states(named), encoding="utf-8")
+    done = subprocess.run(
+        [sys.executable, "-m", "pma_gym.cli", "compare", "lab", "--model", "model.toml"]
+        + ["--trials", "trials.toml"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+    )
+    assert done.returncode == 0, done.stderr
+    assert f"{found.written['load_n']:.3f}" in done.stdout and "kPa" in done.stdout
+    assert done.stderr == ""

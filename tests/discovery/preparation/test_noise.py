@@ -1,0 +1,213 @@
+"""Noise: levels, autoregressions, rest, steps, and what is slow."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
+from pma_gym.discovery.preparation.noise import (
+    FIRST_REST_S,
+    REST_S,
+    Whitening,
+    at_rest,
+    autoregression,
+    level_at_rest,
+    rest_segments,
+    slow_part,
+    step_between,
+    white_noise,
+)
+from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant import sensors
+from tests.discovery.laboratory import LEVELS, STATION, measured
+
+CHANNELS = range(4)
+NONE = np.empty(0, np.int64)
+
+
+def coloured(coefficients, innovation, count, seed=0):
+    driven = innovation * np.random.default_rng(seed).standard_normal(count + 1000)
+    return lfilter([1.0], [1.0, *(-np.asarray(coefficients))], driven)[1000:]
+
+
+def logged(motor, time=None, contraction=None):
+    time = np.arange(len(motor)) / 64 if time is None else time
+    contraction = np.zeros(len(time)) if contraction is None else contraction
+    commands = {"motor_voltage": motor, "regulator_voltage": np.full(len(time), 5.0)}
+    return Logged.of(STATION, 0, Trial(time, commands, {"contraction": contraction}))
+
+
+@pytest.mark.parametrize("coefficients", [(0.7,), (-0.4,), (1.2, -0.5), (0.3, 0.4)])
+def test_autoregression_recovers_what_made_the_noise(coefficients):
+    parts = [coloured(coefficients, 2e-3, 5000, seed) for seed in range(4)]
+    found = autoregression(parts, 0.0)
+    assert len(found.coefficients) >= len(coefficients)
+    padded = np.zeros(len(found.coefficients))
+    padded[: len(coefficients)] = coefficients
+    np.testing.assert_allclose(found.coefficients, padded, atol=4 / np.sqrt(20000))
+    assert found.innovation == pytest.approx(2e-3, rel=0.03)
+    assert found.level == pytest.approx(np.std(np.concatenate(parts)), rel=0.03)
+
+
+def test_white_noise_has_no_memory():
+    parts = [coloured((), 3.0, 2000, seed) for seed in range(3)]
+    assert autoregression(parts, 0.0).coefficients == ()
+
+
+def test_a_level_that_is_known_is_kept_as_the_least():
+    found = autoregression([coloured((0.6,), 1.0, 4000)], 5.0)
+    assert found.level == 5.0
+    assert found.innovation == pytest.approx(5.0 * np.sqrt(1 - 0.6**2), rel=0.05)
+
+
+def test_too_few_readings_say_nothing_but_the_level():
+    assert autoregression([coloured((0.6,), 1.0, 50)], 2.0) == white_noise(2.0)
+
+
+@pytest.mark.parametrize("coefficients", [(), (0.8,), (1.2, -0.5)])
+def test_whitened_noise_is_white_and_of_variance_one(coefficients):
+    series = coloured(coefficients, 0.3, 8000, 5)
+    level = float(np.std(coloured(coefficients, 0.3, 200000, 6)))
+    white = Whitening(coefficients, 0.3, level).white(series[None], NONE)[0]
+    assert np.mean(white**2) == pytest.approx(1.0, abs=4 * np.sqrt(2 / 8000))
+    for lag in range(1, 8):
+        assert abs(np.mean(white[:-lag] * white[lag:])) < 4 / np.sqrt(8000)
+
+
+def test_a_learnt_autoregression_whitens():
+    found = autoregression([coloured((0.8,), 0.3, 8000, 7)], 0.0)
+    white = found.white(coloured((0.8,), 0.3, 8000, 8)[None], NONE)[0]
+    assert np.mean(white**2) == pytest.approx(1.0, abs=0.08)
+    assert abs(np.mean(white[:-1] * white[1:])) < 4 / np.sqrt(8000) + 0.03
+
+
+def test_whitening_is_linear_and_missing_readings_leave_no_trace():
+    noise = Whitening((0.9, -0.2), 0.5, 0.8)
+    one, other = coloured((), 1.0, 200, 1), coloured((), 1.0, 200, 2)
+    missing = np.array([0, 17, 18, 199])
+    sums = noise.white((2 * one - other)[None], missing)
+    np.testing.assert_allclose(
+        sums, 2 * noise.white(one[None], missing) - noise.white(other[None], missing), atol=1e-12
+    )
+    touched = one.copy()
+    touched[missing] = 1e6
+    assert np.array_equal(noise.white(one[None], missing), noise.white(touched[None], missing))
+
+
+def test_rest_is_where_commands_have_long_been_constant():
+    motor = np.ones(10 * 64)
+    motor[128:256] = 2.0 + np.arange(128) / 128
+    found = rest_segments(logged(motor))
+    time = np.arange(len(motor)) / 64
+    assert len(found) == 2
+    assert time[found[0].start] == pytest.approx(FIRST_REST_S, abs=2 / 64)
+    assert found[0].stop == 128
+    # Index 256 is where the last value begins.
+    assert time[found[1].start] == pytest.approx(4.0 + REST_S, abs=2 / 64)
+    assert found[1].stop == len(motor)
+    for part in found:
+        assert np.ptp(motor[part]) == 0.0
+
+
+def test_what_always_moves_never_rests():
+    assert rest_segments(logged(1.0 + np.arange(640) / 640)) == []
+    assert level_at_rest([]) is None
+
+
+def test_noise_at_rest_is_the_sensors():
+    found = measured(STATION, 4, rate=128.0)
+    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(found)]
+    for channel in CHANNELS:
+        level = level_at_rest(at_rest(trials, channel))
+        assert level == pytest.approx(LEVELS[channel], rel=0.2)
+
+
+def test_gaps_do_not_leak():
+    contraction = 1e-3 + 1e-5 * np.random.default_rng(1).standard_normal(640)
+    contraction[::7] = np.nan
+    trial = logged(np.ones(640), contraction=contraction)
+    segments = at_rest([trial], 0)
+    assert level_at_rest(segments) == pytest.approx(1e-5, rel=0.15)
+    assert at_rest([trial], 2) == []
+    found = autoregression(segments, 0.0)
+    assert np.isfinite([found.level, found.innovation, *found.coefficients]).all()
+    assert np.isfinite(slow_part(segments, 64.0))
+    assert np.isfinite(found.white(trial.measured[0][None], trial.missing[0])).all()
+
+
+@pytest.mark.parametrize(("step", "digits"), [(1.234e-5, 7), (3.217e-4, 6), (3.217e-4, 12)])
+def test_the_step_of_readings_is_found(step, digits):
+    generator = np.random.default_rng(2)
+    values = step * np.round(generator.normal(0.02, 20 * step, 640) / step)
+    # As a file with some digits has them.
+    values = np.round(values, digits)
+    found = step_between([logged(np.ones(640), contraction=values)], 0)
+    assert found == pytest.approx(step, rel=0.01)
+
+
+def test_continuous_readings_have_no_step():
+    values = np.random.default_rng(3).normal(0.02, 1e-4, 640)
+    trial = logged(np.ones(640), contraction=values)
+    assert step_between([trial], 0) == 0.0
+    assert step_between([trial], 3) == 0.0
+
+
+def test_the_daq_shows_its_step():
+    found = measured(STATION, 2, rate=128.0)
+    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(found)]
+    for channel, (_, line) in enumerate(sensors.SENSORS.values()):
+        assert step_between(trials, channel) == pytest.approx(line.resolution, rel=1e-3)
+
+
+def test_white_noise_has_no_slow_part_and_a_slow_sine_is_all_slow():
+    white = [coloured((), 1.0, 4000, seed) for seed in range(4)]
+    assert slow_part(white, 128.0) < 4 / np.sqrt(16000)
+    time = np.arange(4000) / 128
+    slow = [2.0 * np.sin(2 * np.pi * 0.2 * time)]
+    assert slow_part(slow, 128.0) == pytest.approx(2.0, rel=0.03)
+    both = [2.0 * np.sin(2 * np.pi * 0.2 * time) + part for part in white]
+    assert slow_part(both, 128.0) == pytest.approx(2.0, rel=0.06)
+    assert slow_part([], 128.0) == 0.0
+
+
+def test_a_signal_read_a_few_times_a_trial_is_no_series():
+    """Readings seconds apart: whitened by their level alone, and all misfit beyond it is slow."""
+    rng = np.random.default_rng(3)
+    # Within a trial all readings share what a wrong model misses: neighbours are not noise.
+    parts = [rng.normal(0.0, 5.0) + rng.normal(0.0, 1.0, 4) for _ in range(200)]
+    found = autoregression(parts, 1.0)
+    assert found.coefficients == ()
+    assert found.level == pytest.approx(np.sqrt(26.0), rel=0.2)
+    assert slow_part(parts, 0.2, 1.0) == pytest.approx(25.0, rel=0.3)
+
+
+def test_noise_of_a_few_readings_comes_from_repeats():
+    """No segment rests long enough; the model's sensor says far less than repeats scatter."""
+    rng = np.random.default_rng(4)
+    named = []
+    for load in range(60):
+        for repeat in range(3):
+            read = np.array([30e-3, np.nan, 20e-3, 29e-3]) + rng.normal(0.0, 0.6e-3, 4)
+            trial = Trial(
+                np.array([0.0, 5.0, 10.0, 15.0]),
+                {"motor_voltage": np.zeros(4), "regulator_voltage": np.full(4, 5.0)},
+                {"contraction": read},
+            )
+            first = None if repeat == 0 else f"{load} 0"
+            named.append(NamedTrial(f"{load} {repeat}", trial, float(repeat), first))
+    read = [Logged.of(STATION, i, each.trial) for i, each in enumerate(named)]
+    level = initial_floors(STATION, read, named)[0]
+    assert level.source == "repeats"
+    assert level.level == pytest.approx(0.6e-3, rel=0.1)
+
+
+@pytest.mark.parametrize(("level", "coarse"), [(0.3e3, True), (2.3e3, False)])
+def test_a_step_that_noise_hides_makes_no_sensor_coarse(level, coarse):
+    """Whole kPa in a file are nothing to a signal that scatters by more."""
+    known = Level(level, "repeats", {}, 1e3, 0.479e3, 40)
+    fine = Level(1.0, "rest segments", {}, 0.0, 1.0, 40)
+    found = coarse_sensors([fine, fine, fine, known])
+    assert [each.name for each in found] == (["sensor_quantisation"] if coarse else [])

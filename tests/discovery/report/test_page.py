@@ -1,0 +1,110 @@
+"""The page of a diagnosis: whole, self-contained, in words, for every verdict."""
+
+import re
+from functools import cache
+from html.parser import HTMLParser
+
+import pytest
+
+from pma_gym.discovery.report.curves import worst_trial
+from pma_gym.discovery.report.page import report_blocks, report_page, report_pictures
+from pma_gym.discovery.report.text import effect_equation, effect_summary
+from pma_gym.effects import CATALOGUE
+from pma_gym.pages.document import Heading, Picture, to_markdown
+
+VERDICTS = ("effect", "parameters", "agrees", "unknown", "undecidable")
+
+
+class Tags(HTMLParser):
+    """Checks that tags nest, and gathers what the page loads."""
+
+    def __init__(self):
+        super().__init__()
+        self.open, self.loaded = [], []
+
+    def handle_starttag(self, tag, attributes):
+        self.loaded += [value for name, value in attributes if name in ("src", "href")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+
+@pytest.fixture(scope="module")
+def page_of(diagnoses):
+    """The page of a verdict's diagnosis; its pictures take most of a second, so it is kept."""
+    return cache(lambda verdict: report_page(diagnoses[verdict], "Rig 2", {"Seed": "3"}))
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_the_page_needs_nothing_else_and_says_the_verdict_first(diagnoses, page_of, verdict):
+    diagnosis, page = diagnoses[verdict], page_of(verdict)
+    tags = Tags()
+    tags.feed(page)
+    assert not tags.open
+    assert all(each.startswith("data:image/png;base64,") for each in tags.loaded)
+    text = re.sub(r"<[^>]+>", " ", page.partition("<body>")[2])
+    assert text.index(diagnosis.sentence) < text.index("What to do now")
+    assert not re.search(r"\bnan\b|None|\{|_friction", re.sub(r"[\w.]+_n_\w+", "", text))
+    assert "Seed" in text
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_picture_stands_on_the_page(diagnoses, verdict):
+    diagnosis = diagnoses[verdict]
+    drawn = report_pictures(diagnosis)
+    blocks = report_blocks(diagnosis, "", {})
+    assert set(drawn) <= {block.name for block in blocks if isinstance(block, Picture)}
+    markdown = to_markdown(blocks, drawn, "pictures")
+    assert markdown.count("![") == len(drawn)
+    assert markdown.startswith(f"# {blocks[0].text}")
+
+
+def test_the_order_of_the_page(found):
+    named = [block.text for block in report_blocks(found, "", {}) if isinstance(block, Heading)]
+    assert named[:8] == [
+        "An effect is missing",
+        "What to do now",
+        "Where they disagree",
+        "Before and after",
+        "The worst trial",
+        "The effect: Coulomb friction",
+        "What else it could be",
+        "The next experiment",
+    ]
+    assert named[8] == "How it was decided"
+
+
+def test_the_effect_comes_with_equation_size_and_rivals(page_of):
+    page = page_of("effect")
+    assert "F = -f(v) z" in page and "Dry friction of the slide" in page
+    for text in ("19.1 to 21.4", "below 22", "hysteresis", "p &lt; 0.001", "about 40 to 1"):
+        assert text in page
+
+
+def test_the_worst_trial_is_the_one_missed_by_most(found):
+    worst = worst_trial(found)
+    ratios = {
+        each.name: max(g.before / g.floor for g in each.gaps.values()) for each in found.trials
+    }
+    assert worst.name == max(ratios, key=ratios.get)
+
+
+def test_the_same_diagnosis_gives_the_same_page(found, page_of):
+    assert report_page(found, "Rig 2", {"Seed": "3"}) == page_of("effect")
+
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_effect_has_words(name):
+    if CATALOGUE[name].law is not None:
+        assert effect_summary(name).endswith(".")
+        effect_equation(name)
+
+
+def test_the_page_is_found_at_its_old_place_with_a_warning():
+    with pytest.warns(DeprecationWarning, match="is now in pma_gym.discovery.report.page"):
+        from pma_gym.discovery.report import report_page as old
+    assert old is report_page
+    with pytest.raises(ImportError, match="nothing_such"):
+        from pma_gym.discovery.report import nothing_such  # noqa: F401

@@ -1,0 +1,358 @@
+"""The contract: what a verdict needs before it denies missing structure."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pma_gym.data.datasets.dataset import Dataset, NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.diagnosis import Judgement
+from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors, is_summary
+from pma_gym.discovery.preparation.splits import fold_of_rows, folds
+from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, Residual, adequacy
+from pma_gym.discovery.verdict.flexible_regression import Explained, explained, variables
+from pma_gym.discovery.verdict.worsened import worsened
+from pma_gym.discovery.workflow import diagnose, refit
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.plant import Plant
+from tests.discovery.laboratory import LEVELS, OFF, STATION, commanded, diagnosed, measured
+
+TRUE = dict(zip(OUTPUTS, LEVELS, strict=True))
+
+
+def logs(trials):
+    return [Logged.of(STATION, i, trial) for i, trial in enumerate(trials)]
+
+
+def named(trials, **about):
+    return [NamedTrial(f"{i}.csv", trial, **about) for i, trial in enumerate(trials)]
+
+
+def floors(trials, stated=None):
+    return acceptance_floors(logs(trials), named(trials), stated or Stated())
+
+
+def moving(number):
+    """Triangles that begin settled and go on until the log ends: nothing rests in them."""
+    found = []
+    for trial in measured(STATION, number, kinds=(0,)):
+        rows = (trial.time >= 0.5) & (trial.time < 4.0)
+        commands = {name: row[rows] for name, row in trial.commands.items()}
+        readings = {name: row[rows] for name, row in trial.measurements.items()}
+        found.append(Trial(trial.time[rows], commands, readings))
+    return found
+
+
+# -- floors ----------------------------------------------------------------------------------------
+
+
+def test_rest_segments_give_the_noise_of_the_sensors():
+    found = floors(measured(STATION, 6))
+    for name, floor in found.items():
+        assert floor.source == "rest segments"
+        assert floor.level == pytest.approx(TRUE[name], rel=0.25)
+
+
+def test_a_tolerance_comes_before_rest_and_repeats_before_a_tolerance():
+    trials = measured(STATION, 3)
+    stated = Stated({"contraction": 2e-4})
+    found = floors(trials, stated)
+    assert (found["contraction"].source, found["contraction"].level) == ("tolerance", 2e-4)
+    assert found["load"].source == "rest segments"
+    plant = Plant(STATION)
+    repeats = [plant.simulate(commanded(1)[0], seed=seed) for seed in (1, 2, 3)]
+    found = floors(repeats, stated)
+    for name in OUTPUTS:
+        assert found[name].source == "repeats"
+        assert found[name].level == pytest.approx(TRUE[name], rel=0.15)
+
+
+def test_the_scatter_of_repeats_holds_what_the_rig_does_not_repeat():
+    """A rig whose drive pulls 2 % harder every other day scatters by more than its sensors."""
+    strong = STATION.replace({"drive.gain_n_per_v": 100.0})
+    trial = commanded(1)[0]
+    repeats = [Plant(each).simulate(trial, seed=k) for k, each in enumerate((STATION, strong))]
+    found = floors(repeats)
+    assert found["load"].level > 5.0 * TRUE["load"]
+    assert found["pressure"].level == pytest.approx(TRUE["pressure"], rel=0.1)
+
+
+def test_a_file_that_was_copied_is_no_repeat():
+    trial = measured(STATION, 1)[0]
+    assert floors([trial, trial])["load"].source == "rest segments"
+
+
+def test_an_encoder_that_stands_still_at_rest_has_no_floor():
+    silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(3)]
+    assert floors(silent) == {}
+
+
+def test_what_never_rests_has_no_floor():
+    assert floors(moving(3)) == {}
+
+
+def test_of_a_summary_the_printed_standard_errors_count():
+    trial = measured(STATION, 1)[0]
+    few = np.arange(len(trial)) % 40 == 0
+    rows = {name: np.where(few, row, np.nan) for name, row in trial.measurements.items()}
+    trials = [replace(trial, measurements=rows)]
+    assert is_summary([rows["load"]]) and not is_summary([trial.measurements["load"]])
+    found = floors(trials, Stated(standard_error={"load": 3.0}))
+    assert (found["load"].source, found["load"].level) == ("standard errors", 3.0)
+
+
+# -- regression ------------------------------------------------------------------------------------
+
+
+def regressed(made, number=6, seconds=5.0):
+    """What is explained of residuals that `made` makes of a trial's rows and its number."""
+    trials = logs(commanded_readings(number, seconds))
+    generator = np.random.default_rng(7)
+    parts = [generator.normal(size=len(each.time)) + made(each, k) for k, each in enumerate(trials)]
+    given = [variables(each, each.measured) for each in trials]
+    blocks = [100 * k + each.time.astype(int) for k, each in enumerate(trials)]
+    return explained(
+        parts, given, [np.full(len(e.time), k) for k, e in enumerate(trials)], blocks, 1
+    )
+
+
+def commanded_readings(number, seconds):
+    return [
+        Plant(STATION).simulate(each, seed=k)
+        for k, each in enumerate(commanded(number, seconds=seconds, kpa=(300.0, 330.0)))
+    ]
+
+
+def test_of_noise_nothing_is_explained():
+    found = regressed(lambda logged, k: 0.0)
+    assert abs(found.mean) < 0.02
+    assert found.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
+
+
+def late(logged):
+    """The command 40 ms late, less the command: what a delay leaves."""
+    off = np.interp(logged.time - 0.04, logged.time, logged.motor) - logged.motor
+    return off / max(off.std(), 1e-12)
+
+
+STRUCTURE = {
+    "of the state": lambda logged, k: np.sin(logged.measured[0] / 4e-3),
+    "of the speed": lambda logged, k: np.sign(np.gradient(logged.measured[0])),
+    "of the command": lambda logged, k: np.cos(3.0 * logged.motor),
+    "of its history": lambda logged, k: late(logged),
+}
+
+
+@pytest.mark.parametrize("law", STRUCTURE)
+def test_what_follows_state_command_or_its_history_is_explained(law):
+    found = regressed(STRUCTURE[law])
+    whole = np.mean([np.mean(STRUCTURE[law](e, 0) ** 2) for e in logs(commanded_readings(6, 5.0))])
+    assert found.mean > 0.5 * whole, (found.mean, whole)
+
+
+def test_what_differs_from_trial_to_trial_is_not():
+    """A slow drift, another in every trial, repeats with nothing."""
+    waves = np.random.default_rng(3).uniform(0.0, 6.0, 6)
+    found = regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k]))
+    assert found.mean < 0.2
+
+
+def test_the_bound_is_an_upper_one_that_narrows_with_data():
+    generator = np.random.default_rng(5)
+    above, widths = 0, []
+    for blocks in (10, 1000):
+        for _ in range(100):
+            share = generator.normal(0.1, 1.0, blocks) * 50.0
+            found = Explained(share, np.full(blocks, 50.0))
+            bound = found.bound(0.05, generator, 400)
+            above += bound >= 0.1
+            widths.append(bound - found.mean)
+    assert 170 <= above <= 200
+    assert np.mean(widths[:100]) > 5.0 * np.mean(widths[100:])
+
+
+# -- adequacy --------------------------------------------------------------------------------------
+
+
+def judged(scale=1.0, unseen=1.0, seen=True, number=6, stated=None, law=None):
+    """Of true trials, with residuals of so many floors: in fitted readings and in others."""
+    trials = commanded_readings(number, 5.0)
+    logged, known = logs(trials), floors(trials, stated)
+    generator = np.random.default_rng(11)
+
+    def left(size):
+        rows = [generator.normal(size=each.measured.shape) * LEVELS[:, None] for each in logged]
+        if law is not None:
+            rows = [r + law(e) * LEVELS[:, None] for r, e in zip(rows, logged, strict=True)]
+        return Residual([each.measured for each in logged], [size * row for row in rows])
+
+    return adequacy(
+        logged, left(unseen) if seen else None, left(scale), known, fold_of_rows(trials), 0
+    )
+
+
+def test_noise_is_adequate():
+    found = judged()
+    assert found.structure is None and found.undecided is None
+    assert all(0.8 < each.misfit < 1.3 for each in found.signals.values())
+
+
+@pytest.mark.parametrize(
+    ("case", "fault"),
+    [
+        ({"scale": 2.0, "unseen": 2.0}, "misfit"),
+        ({"unseen": 2.0}, "not predicted"),
+        ({"seen": False}, "not left out"),
+        ({"number": 1}, "wide"),
+    ],
+)
+def test_what_is_too_large_or_not_known_is_a_fault(case, fault):
+    found = judged(**case)
+    assert {each.fault for each in found.signals.values()} == {fault}
+    assert (found.structure is not None) == (fault == "misfit")
+
+
+def test_structure_of_the_size_of_the_noise_is_seen_below_the_limit_of_the_misfit():
+    law = STRUCTURE["of the speed"]
+    found = judged(law=lambda logged: 0.9 * law(logged, 0))
+    assert {each.fault for each in found.signals.values()} == {"explained"}
+    assert all(each.misfit < 1.5 for each in found.signals.values())
+
+
+def test_a_tolerance_makes_the_same_structure_good_enough():
+    law = STRUCTURE["of the speed"]
+    wide = Stated({name: 3.0 * level for name, level in TRUE.items()})
+    found = judged(law=lambda logged: 0.9 * law(logged, 0), stated=wide)
+    assert all(each.fault is None for each in found.signals.values())
+
+
+# -- verdicts --------------------------------------------------------------------------------------
+
+
+def in_data_set(trials, **stated):
+    return Dataset("lab", None, tuple(named(trials)), **stated)
+
+
+def test_without_repeat_rest_or_tolerance_nothing_agrees():
+    trials = moving(6)
+    found = refit(trials, STATION)
+    assert found.verdict == "undecidable"
+    assert "neither a repeat, a rest segment nor a tolerance" in found.sentence
+    assert "[tolerance], " in found.sentence and "_mm = a number in mm" in found.sentence
+    stated = {name: 2.0 * level for name, level in TRUE.items()}
+    found = refit(in_data_set(trials, tolerance=stated), STATION)
+    assert found.verdict == "agrees"
+    assert "within 0.0493 mm in contraction" in found.sentence
+
+
+def test_an_exact_sensor_agrees_by_a_tolerance_alone():
+    silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(4)]
+    assert refit(silent, STATION).verdict == "undecidable"
+    found = refit(
+        in_data_set(silent, tolerance={name: 2 * TRUE[name] for name in OUTPUTS}), STATION
+    )
+    assert found.verdict == "agrees"
+
+
+@pytest.mark.parametrize("case", ["hysteresis", "bump"])
+def test_a_refit_alone_does_not_call_a_wrong_structure_right(case):
+    trials = measured(
+        STATION.with_effects({"hysteresis": {"force_n": 12.0, "distance_mm": 1.0}})
+        if case == "hysteresis"
+        else STATION.with_effects(
+            {
+                "residual_force_of_contraction": {"first_mm": 0.0, "reach_mm": 64.0}
+                | {f"h{k}_n": 20.0 * (k == 3) for k in range(9)}
+            }
+        ),
+        6,
+    )
+    found = refit(trials, STATION)
+    assert found.verdict == "unknown"
+    assert "parameters alone do not explain that" in found.sentence
+    assert "noise floors" in found.sentence
+
+
+def test_trials_that_do_not_hold_the_parameters_cannot_tell():
+    found = diagnose(measured(STATION.replace(OFF), 3), STATION, propose=False)
+    assert found.verdict == "undecidable"
+    assert "do not determine the parameters" in found.sentence
+    assert diagnose(measured(STATION.replace(OFF), 6), STATION, propose=False).verdict == (
+        "parameters"
+    )
+
+
+def test_the_answer_says_how_many_floors_are_left():
+    found = diagnosed("nothing")
+    assert set(found.adequacy) == set(found.gap)
+    for judgement in found.adequacy.values():
+        assert isinstance(judgement, Judgement) and judgement.fault is None
+        assert judgement.misfit == pytest.approx(1.0, abs=0.3)
+    assert found.document()["adequacy"]["load_n"]["source"] == "rest segments"
+
+
+# -- folds, words ----------------------------------------------------------------------------------
+
+
+def test_pieces_are_left_out_by_whole_files_or_in_contiguous_blocks():
+    two = ["a"] * 5 + ["b"] * 4
+    assert folds(9, two) == [[0, 1, 2, 3, 4], [5, 6, 7, 8]]
+    one = folds(12, ["a"] * 12)
+    assert one == [[0, 1], [2, 3], [4, 5], [6, 7], [8, 9], [10, 11]]
+    assert folds(9, [str(k) for k in range(9)]) == folds(9)
+
+
+def test_pieces_are_not_called_trials():
+    found = diagnosed("nothing")
+    pieces = replace(found, trials=tuple(replace(each, file="long.csv") for each in found.trials))
+    assert "this trial (in 3 pieces)" in sentence(pieces)
+
+
+def test_the_headline_names_a_limit_a_rough_fit_and_what_got_worse():
+    found = diagnosed("hysteresis")
+    (effect,) = found.effects
+    known = {
+        name: replace(each, limit="upper" if name == "force_n" else "")
+        for name, each in effect.parameters.items()
+    }
+    said = sentence(
+        replace(
+            found,
+            effects=(replace(effect, parameters=known),),
+            converged=False,
+            worsened=(("load_n",), ("run_2.csv",)),
+        )
+    )
+    assert "N (at its upper limit)" in said
+    assert "the fit did not converge, so its values are rough" in said
+    assert "but it fits load (" in said and "and run_2.csv worse than the model as given" in said
+
+
+def test_intervals_stay_within_what_the_fit_allows():
+    for name in ("hysteresis", "parameters"):
+        found = diagnosed(name)
+        for effect in found.effects:
+            for path, each in effect.parameters.items():
+                if each.low is not None:
+                    assert each.low >= 0.0, path
+
+
+def test_a_signal_that_got_worse_is_named_and_noise_is_not():
+    records = diagnosed("nothing").trials
+    sizes = {f"{name}": 1.0 for name in ()} | {
+        column: level
+        for column, level in zip(
+            ("contraction_mm", "rotation_deg", "load_n", "pressure_kpa"), LEVELS, strict=True
+        )
+    }
+    assert worsened(records, sizes, 0) == ((), ())
+    worse = []
+    for record in records:
+        after = record.after.copy()
+        after[:, 2] += 2.0 * LEVELS[2]
+        worse.append(replace(record, after=after))
+    signals, trials = worsened(worse, sizes, 0)
+    assert signals == ("load_n",) and set(trials) == {record.name for record in records}
