@@ -10,8 +10,10 @@ BENCH_ARGS ?=
 EXAMPLES ?= 100000
 NAMES ?=
 
-EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways,docs,dev
-BIN = $(VENV)/bin
+EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines,docs,dev
+# Windows has its programs elsewhere, with another ending.
+BIN = $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
+PIP = $(BIN)/pip$(if $(filter Windows_NT,$(OS)),.exe)
 CORE = $(VENV)/.core-installed
 FULL = $(VENV)/.all-installed
 REQUIREMENTS = pyproject.toml constraints.txt
@@ -24,7 +26,7 @@ export NO_MKDOCS_2_WARNING = 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help bench peers test examples fuzz test-integrations test-lower-bounds kills lint style types layers
-.PHONY: pages docs clean distclean
+.PHONY: pages forms docs clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -46,13 +48,13 @@ examples: $(FULL) ## Run the examples of README and the pages, and with Ray, PyT
 fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
 	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
 
-test-integrations: | $(BIN)/pip ## Train shortly with other libraries (.integrations/, NAMES='skrl zoo'; 10 GB).
+test-integrations: | $(PIP) ## Train shortly with other libraries (.integrations/, NAMES='skrl zoo'; 10 GB).
 	$(BIN)/python tests/integrations/run.py $(NAMES)
 
 # The extras of what the project runs with, each requirement at its lower bound, all of them together.
 # Old releases announce deprecations of what newer ones of theirs left: those are no fault here.
 LOWER = .lower-bounds
-LOWER_EXTRAS = rl,rllib,discovery,mpc,policies,onnx,view,files,symbolic,ways
+LOWER_EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines
 LOWER_TESTS = tests/test_requirements.py tests/test_cli.py tests/data tests/codegen \
     tests/integrator tests/plant tests/estimation tests/controllers tests/engine tests/envs tests/sb3
 # It changes PyTorch's number of threads many times, and old PyTorch starts threads anew each time.
@@ -74,7 +76,7 @@ KILLS ?= 200
 kills: $(FULL) ## Kill long commands at random moments, resume them, count losses (KILLS=200).
 	$(BIN)/python -m tests.kills.kill_and_resume --kills $(KILLS)
 
-lint: style types layers pages ## Check style, types, layers and documentation (-k: all, whatever fails).
+lint: style types layers pages forms ## Check style, types, layers and documentation (-k: all, whatever fails).
 
 style: $(FULL)
 	$(BIN)/ruff check .
@@ -89,6 +91,14 @@ layers: $(FULL)
 pages: $(FULL)
 	$(BIN)/mkdocs build --strict --quiet
 
+FORMS = $(BIN)/check-jsonschema --builtin-schema
+
+forms: $(FULL)
+	$(FORMS) vendor.github-workflows .github/workflows/*.yml
+	$(FORMS) vendor.github-issue-forms $(filter-out %/config.yml,$(wildcard .github/ISSUE_TEMPLATE/*.yml))
+	$(FORMS) vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(FORMS) vendor.citation-file-format --force-filetype yaml CITATION.cff
+
 docs: $(FULL) ## Build the documentation into site/.
 	$(BIN)/mkdocs build --strict
 
@@ -100,7 +110,7 @@ distclean: clean ## Remove .venv, .peers, .integrations and .lower-bounds too.
 	rm -rf $(VENV) .peers .integrations $(LOWER)
 
 # pip is the last thing that venv writes, so an interrupted attempt is made again.
-$(BIN)/pip:
+$(PIP):
 	@command -v "$(PYTHON)" >/dev/null || { \
 	    echo "make: '$(PYTHON)' not found; install Python 3.11 or newer," \
 	         "or name it: make PYTHON=python3.12" >&2; exit 1; }
@@ -113,9 +123,9 @@ $(BIN)/pip:
 	@echo "Making $(VENV) with $$("$(PYTHON)" -V)"
 	@"$(PYTHON)" -m venv "$(VENV)"
 
-$(CORE): $(REQUIREMENTS) | $(BIN)/pip
+$(CORE): $(REQUIREMENTS) | $(PIP)
 	@echo "Installing the core into $(VENV) (about a minute)"
-	@$(INSTALL) -e '.[mpc,policies]' || $(EXPLAIN)
+	@$(INSTALL) -e '.[bench,mpc,policies]' || $(EXPLAIN)
 	@touch $@
 
 $(FULL): $(REQUIREMENTS) | $(CORE)

@@ -23,6 +23,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.envs.reward_function": "pma_gym.engine.reward_function",
     "pma_gym.envs.cuda": "pma_gym.engine.cuda.engine",
     "pma_gym.envs.knowledge": "pma_gym.envs.station_info",
+    "pma_gym.tasks.human": "pma_gym.tasks.operator",
     "pma_gym.envs.sb3": "pma_gym.sb3.vec_env",
     "pma_gym.envs.sb3_network": "pma_gym.sb3.network",
     "pma_gym.envs.sb3_policy": "pma_gym.sb3.policy",
@@ -73,17 +74,29 @@ class _RenamedLoader(Loader):
 
 
 class _RenamedFinder(MetaPathFinder):
-    """Finds modules by their old names, where nothing else has."""
+    """Finds modules by their old names, where nothing else has.
+
+    Args:
+        names: new names by old ones.
+    """
+
+    def __init__(self, names: Mapping[str, str]) -> None:
+        self.names = names
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """The spec of an old name, None of any other."""
-        new = RENAMED_MODULES.get(fullname)
+        new = self.names.get(fullname)
         return None if new is None else ModuleSpec(fullname, _RenamedLoader(new))
 
 
-def find_renamed_modules() -> None:
-    """Let old module names be imported; once a process."""
-    if not any(isinstance(finder, _RenamedFinder) for finder in sys.meta_path):
-        sys.meta_path.append(_RenamedFinder())
+def find_renamed_modules(names: Mapping[str, str] = RENAMED_MODULES) -> None:
+    """Let old module names be imported; once a process.
+
+    Args:
+        names: new names by old ones.
+    """
+    finders = (finder for finder in sys.meta_path if isinstance(finder, _RenamedFinder))
+    if not any(finder.names is names for finder in finders):
+        sys.meta_path.append(_RenamedFinder(names))

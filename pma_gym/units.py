@@ -1,4 +1,4 @@
-"""Units at the door: SI inside, a unit in every name outside.
+"""Units in files: SI inside, a unit in every name outside.
 
 Files, plots and messages use the units that people of this field read (mm, N, kPa, s, deg, V);
 the code computes in SI. `Quantity` joins the two for one physical parameter.
@@ -87,7 +87,7 @@ class Quantity:
     """Unit, bounds, neutral value, usual value and source of one physical parameter.
 
     Attributes:
-        unit: unit at the door (a key of `SI_FACTORS`); bounds, neutral and usual value are in it.
+        unit: unit in files (a key of `SI_FACTORS`); bounds, neutral and usual value are in it.
         lower: smallest value that makes physical sense.
         upper: largest value that makes physical sense.
         source: where the bounds and the usual value come from; says "assumption" for one.
@@ -116,11 +116,11 @@ class Quantity:
 
     @property
     def factor(self) -> float:
-        """Value in SI of one unit at the door."""
+        """Value in SI of one unit in files."""
         return SI_FACTORS[self.unit]
 
     def name(self, stem: str) -> str:
-        """The name at the door of the parameter that the code calls `stem`.
+        """The name in files of the parameter that the code calls `stem`.
 
         >>> Quantity("N/kPa", 0, 10, "example").name("slope")
         'slope_n_per_kpa'
@@ -129,15 +129,15 @@ class Quantity:
         return f"{stem}_{ending}" if ending else stem
 
     def to_si(self, value: float) -> float:
-        """The value in SI of one given in the unit at the door."""
+        """The value in SI of one given in the unit in files."""
         return value * self.factor
 
     def from_si(self, value: float) -> float:
-        """The value in the unit at the door of one given in SI."""
+        """The value in the unit in files of one given in SI."""
         return value / self.factor
 
     def check(self, name: str, value: float) -> None:
-        """Refuse a value at the door outside the bounds.
+        """Refuse a value in file units outside the bounds.
 
         Raises:
             ValueError: names the parameter, the range, the unit, what came and the mend.

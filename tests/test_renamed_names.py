@@ -6,6 +6,7 @@ import warnings
 import pytest
 
 from pma_gym.envs import Measurement, PMAEnv, PMAVectorEnv, StationInfo
+from pma_gym.tasks import MomentProfile, Operator, OperatorState
 
 
 @pytest.mark.parametrize("module", ["pma_gym.envs", "pma_gym.envs.station_info"])
@@ -14,6 +15,14 @@ def test_an_old_class_name_is_the_new_class(module, old, new):
     with pytest.warns(DeprecationWarning, match=f"{module}.{old} is now {new.__name__}") as said:
         assert getattr(importlib.import_module(module), old) is new
     assert len(said) == 1 and said[0].filename == __file__
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("Human", Operator), ("Plan", MomentProfile), ("Mind", OperatorState)]
+)
+def test_an_old_name_of_the_tasks_is_the_new_class(old, new):
+    with pytest.warns(DeprecationWarning, match=f"pma_gym.tasks.{old} is now {new.__name__}"):
+        assert getattr(importlib.import_module("pma_gym.tasks"), old) is new
 
 
 def test_a_name_that_never_was_is_missing():

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.accuracy.convergence import SIZES_S, orders
 from benchmarks.accuracy.limits import (
     energy_drift,
     mass_effect,
@@ -33,7 +34,6 @@ from benchmarks.accuracy.reference import (
     shares,
     simulated,
 )
-from benchmarks.convergence import SIZES_S, orders
 from benchmarks.files import write_text
 from benchmarks.speed.rows import EVALUATIONS
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
@@ -132,7 +132,7 @@ def _timed(
 
     def once() -> tuple[Run, int, float]:
         columns = (commands.time, commands.motor, commands.regulator)
-        run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+        run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
         begin = time.perf_counter()
         made = simulate_all(plant.program, [run])
         return run, made, time.perf_counter() - begin

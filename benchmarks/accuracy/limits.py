@@ -173,7 +173,7 @@ def rotor_inertia_effect(factor: float, model: str = "station", pressure: float 
 
 
 def with_effect(model: Model, effect: str, values: dict[str, float]) -> Model:
-    """The model with one more effect, given at the door."""
+    """The model with one more effect, given in file units."""
     parameters = {**model.parameters, effect: CATALOGUE[effect].parse(values)}
     return Model(model.name, model.title, model.plant, parameters, model.notes)
 

@@ -162,7 +162,7 @@ def _event(factors: NDArray, rate: Rate, state: NDArray) -> Callable[[float, NDA
 def simulated(plant: Plant, start: Condition, commands: Commands) -> NDArray[np.float64]:
     """The same by the plant's own integrator."""
     when, motor, regulator = commands.time, commands.motor, commands.regulator
-    return plant.run(when, motor, regulator, joined=False, condition=start)[0]
+    return plant.run(when, motor, regulator, interpolation="zoh", condition=start)[0]
 
 
 def shares(states: NDArray[np.float64], truth: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -10,8 +10,8 @@ from types import TracebackType
 
 from benchmarks.bounds import achievable, open_loop
 from benchmarks.bounds.achievable import achievable_bound
+from benchmarks.executors.local import Background
 from benchmarks.files import write_text
-from benchmarks.runner.background import Background
 from benchmarks.runner.fingerprint import code_digest_with
 from pma_gym.plant.model import dump_model, load_model
 

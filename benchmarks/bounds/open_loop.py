@@ -42,7 +42,7 @@ def open_loop_positions(
             time,
             np.clip(own, 0.0, VOLTAGE_LIMIT)[row],
             np.full(len(time), plant.regulator_voltage(station.pressure)),
-            False,
+            "zoh",
             plant.table,
             rests[id(plant)].state,
             rests[id(plant)].zero_contraction,

@@ -5,7 +5,14 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import RESULTS, refuse
+from benchmarks.commands.options import (
+    LOCAL,
+    RESULTS,
+    ExecutorOption,
+    Jobs,
+    chosen_executor,
+    refuse,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -64,15 +71,17 @@ def safety(
     bare: Annotated[int, typer.Option(help="Without it, to be compared with.")] = 1_000,
     seed: Annotated[int, typer.Option(help="Of operators, stations and agents.")] = 1,
     out: Annotated[Path, typer.Option(help="Folder of the figures.")] = RESULTS / "safety",
+    jobs: Jobs = 1,
+    executor: ExecutorOption = LOCAL,
 ) -> None:
-    """Count how often wild commands hurt the operator of the exercise device; a minute or two."""
+    """Count how often adversarial commands hurt the exercise's operator; a minute or two."""
     from benchmarks.exercise.safety_layer.job import SafetyError, run_safety
     from pma_gym.terminal import SafeConsole
 
     try:
         if out.exists() and not out.is_dir():
             raise SafetyError(f"--out {out} is a file; name a folder for the results")
-        run_safety(episodes, bare, seed, out, SafeConsole())
+        run_safety(episodes, bare, seed, out, SafeConsole(), chosen_executor(executor, jobs))
     except SafetyError as error:
         refuse(error)
 

@@ -5,7 +5,16 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import RESULTS, Jobs, refuse, require_writable, writable_out
+from benchmarks.commands.options import (
+    LOCAL,
+    RESULTS,
+    ExecutorOption,
+    Jobs,
+    chosen_executor,
+    refuse,
+    require_writable,
+    writable_out,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -24,6 +33,7 @@ def hidden_effects(
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same cases.")] = 0,
     jobs: Jobs = 1,
+    executor: ExecutorOption = LOCAL,
     out: Annotated[
         Path | None,
         typer.Option(help="Folder; results/hidden_effects/BLOCK-SEED if not given."),
@@ -41,12 +51,13 @@ def hidden_effects(
     from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
 
     require_writable(json_file, "--json")
+    places = chosen_executor(executor, jobs)
     try:
         blocks, orders = ordered(block, rounds), []
         for each in blocks:
             usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
             folder = usual if out is None or len(blocks) > 1 else out
-            orders.append(Order(each, n, seed, folder, jobs, keep, again))
+            orders.append(Order(each, n, seed, folder, places, keep, again))
         code = run_hidden_effects(orders, json_file)
     except JobError as error:
         refuse(error)

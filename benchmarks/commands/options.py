@@ -6,6 +6,8 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from benchmarks.executors.choice import ExecutorName
+from benchmarks.executors.executor import Executor, ExecutorMissing
 from benchmarks.files import RESULTS  # noqa: F401 (the commands take it from here)
 
 INTERRUPTED = 130
@@ -16,6 +18,16 @@ def refuse(error: Exception) -> NoReturn:
     """One message and exit code 2."""
     print(f"error: {error}", file=sys.stderr)
     raise typer.Exit(2)
+
+
+def chosen_executor(name: ExecutorName, jobs: int) -> Executor:
+    """The executor of `--executor`; refuses one that is not installed."""
+    from benchmarks.executors.choice import executor_named
+
+    try:
+        return executor_named(name, jobs)
+    except ExecutorMissing as error:
+        refuse(error)
 
 
 def require_writable(path: Path | None, option: str) -> None:
@@ -49,3 +61,10 @@ _OUT = typer.Option(help="File to write, in a folder that exists.", callback=wri
 Out = Annotated[Path, _OUT]
 OptionalOut = Annotated[Path | None, _OUT]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
+ExecutorOption = Annotated[
+    ExecutorName,
+    typer.Option(
+        "--executor", help="local: processes here; ray: the cluster at RAY_ADDRESS, else one here."
+    ),
+]
+LOCAL = ExecutorName.LOCAL

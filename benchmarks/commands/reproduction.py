@@ -6,7 +6,17 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, listed, refuse
+from benchmarks.commands.options import (
+    INTERRUPTED,
+    LOCAL,
+    RESULTS,
+    ExecutorOption,
+    Jobs,
+    chosen_executor,
+    listed,
+    refuse,
+)
+from benchmarks.executors.executor import Executor
 
 
 def register(app: typer.Typer) -> None:
@@ -27,19 +37,22 @@ def reproduction(
     task: Annotated[str, typer.Option(help="displacement or rotation; both if empty.")] = "",
     pressures: Annotated[str, typer.Option(help="Pressures in kPa by commas; all if empty.")] = "",
     jobs: Jobs = 2,
+    executor: ExecutorOption = LOCAL,
 ) -> None:
     """Run every controller through every trial and write the report (the main job)."""
     if context.invoked_subcommand is not None:
         return
     try:
-        code = reproduce(out, controllers, model, task, pressures, jobs)
+        code = reproduce(out, controllers, model, task, pressures, chosen_executor(executor, jobs))
     except KeyboardInterrupt:
         print("Interrupted before the first case: nothing is measured or written", file=sys.stderr)
         code = INTERRUPTED
     raise typer.Exit(code)
 
 
-def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str, jobs: int) -> int:
+def reproduce(
+    out: Path, controllers: str, model: str, task: str, pressures: str, executor: Executor
+) -> int:
     """The main job; its exit code."""
     from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError, parse_contenders
@@ -58,7 +71,7 @@ def reproduce(out: Path, controllers: str, model: str, task: str, pressures: str
             raise SuiteError(f"--out {out} is a file; name a folder for the results")
     except (ControllerError, ModelError, SuiteError) as error:
         refuse(error)
-    return run_job(suite, out, jobs, SafeConsole())
+    return run_job(suite, out, executor, SafeConsole())
 
 
 def _pressures(text: str) -> list[float]:

@@ -1,4 +1,4 @@
-"""The commands about the simulator: `accuracy`, `integrators` and `speed`."""
+"""The commands about the simulator: `accuracy` and `speed`."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,7 +11,6 @@ from benchmarks.commands.options import OptionalOut, refuse
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
     app.command()(accuracy)
-    app.command()(integrators)
     app.command()(speed)
 
 
@@ -20,13 +19,6 @@ def accuracy(out: OptionalOut = None) -> None:
     from benchmarks.accuracy.job import run_accuracy
 
     raise typer.Exit(0 if run_accuracy(out=out) else 1)
-
-
-def integrators(out: OptionalOut = None) -> None:
-    """Compare methods of integration at equal error; --out takes their curves as CSV."""
-    from benchmarks.integrators import run_integrators
-
-    run_integrators(out=out)
 
 
 def speed(

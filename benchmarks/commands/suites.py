@@ -6,7 +6,16 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, listed, refuse
+from benchmarks.commands.options import (
+    INTERRUPTED,
+    LOCAL,
+    RESULTS,
+    ExecutorOption,
+    Jobs,
+    chosen_executor,
+    listed,
+    refuse,
+)
 from benchmarks.commands.reproduction import reproduce
 
 
@@ -28,6 +37,7 @@ def run(
     out: Annotated[
         Path | None, typer.Option(help="Folder of the results; results/SUITE if not given.")
     ] = None,
+    executor: ExecutorOption = LOCAL,
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
@@ -36,13 +46,14 @@ def run(
     from benchmarks.suites.reproduction import SuiteError
     from pma_gym.terminal import SafeConsole
 
+    places = chosen_executor(executor, jobs)
     try:
         if suite == "reproduction":
             every = "" if controllers == "all" else controllers
-            raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", jobs))
+            raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", places))
         frozen = frozen_suite(suite)
         entries = chosen(frozen, controllers)
-        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, jobs, SafeConsole())
+        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, places, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:

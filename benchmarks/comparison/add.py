@@ -10,14 +10,15 @@ from rich.progress import Progress
 
 from benchmarks.comparison.command_lines import remove_command, run_command
 from benchmarks.comparison.scores import print_clipping, print_failures
+from benchmarks.executors.executor import run_all
+from benchmarks.executors.local import LocalProcesses
 from benchmarks.report.leaderboard import read_leaderboard
 from benchmarks.report.standings import Standings
 from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import Contender, ControllerError
 from benchmarks.runner.execution import Plan, compile_kernels, execute, plan
-from benchmarks.runner.processes import run_all
 from benchmarks.runner.provenance import check_folder, run_info, write_run
-from benchmarks.runner.user_controller import probe
+from benchmarks.runner.user_controller import MAKE_S, probe
 from benchmarks.suites.frozen import FrozenSuite
 from controllers import CONTROLLERS
 
@@ -49,11 +50,12 @@ def own_contender(text: str) -> Contender:
     contender = Contender(name, path=str(Path(path).resolve()))
     if not Path(path).is_file():
         raise ControllerError(f"there is no file {path}; check the name and the folder")
-    found: list[object] = []
+    results: list[object] = []
+    process = LocalProcesses(1, MAKE_S, f"importing and making {name}")
     works = [partial(probe, contender)]
-    if not run_all(works, 1, lambda index, result: found.append(result), wary=True):
+    if not run_all(works, process, lambda _, result: results.append(result), untrusted=True):
         raise KeyboardInterrupt
-    (result,) = found
+    (result,) = results
     if isinstance(result, ControllerError):
         raise result
     if isinstance(result, BaseException):
@@ -128,7 +130,7 @@ def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) ->
                 raise _EnoughError
 
         try:
-            done = execute(todo, jobs, out, on_done, wary=True)
+            done = execute(todo, LocalProcesses(jobs), out, on_done, untrusted=True)
         except _EnoughError:
             (contender,) = {case.contender for case in todo.cases}
             suite = todo.suite

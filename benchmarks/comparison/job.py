@@ -10,6 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from benchmarks.comparison.command_lines import report_command
 from benchmarks.comparison.scores import print_scores, write_scores
+from benchmarks.executors.executor import Executor
 from benchmarks.report.leaderboard import keep_bounds
 from benchmarks.runner.case import Row
 from benchmarks.runner.controller_spec import ControllerError, parse_contenders
@@ -44,7 +45,7 @@ def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
 
 
 def run_comparison(
-    suite: FrozenSuite, entries: Sequence[Entry], out: Path, jobs: int, console: Console
+    suite: FrozenSuite, entries: Sequence[Entry], out: Path, executor: Executor, console: Console
 ) -> int:
     """Run what is missing of a suite and write its scores.
 
@@ -52,7 +53,7 @@ def run_comparison(
         suite: the suite.
         entries: controllers to run.
         out: folder of the results; made if need be.
-        jobs: processes.
+        executor: where the cases run.
         console: where to print.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
@@ -62,12 +63,12 @@ def run_comparison(
     began = time.perf_counter()
     check_folder(suite, out)
     todo = plan(suite, entries, out)
-    console.print(_greeting(todo, entries, out, jobs), highlight=False)
-    info = run_info(todo, entries, out, jobs)
+    console.print(_greeting(todo, entries, out, executor.jobs), highlight=False)
+    info = run_info(todo, entries, out, executor.jobs)
     write_run(out, info, complete=False)
     rows = list(todo.known.values())
     try:
-        complete = _run(todo, entries, out, jobs, rows, console)
+        complete = _run(todo, entries, out, executor, rows, console)
     except KeyboardInterrupt:
         complete = False
     finally:
@@ -90,7 +91,7 @@ def _run(
     todo: Plan,
     entries: Sequence[Entry],
     out: Path,
-    jobs: int,
+    executor: Executor,
     rows: list[Row],
     console: Console,
 ) -> bool:
@@ -107,7 +108,7 @@ def _run(
             rows.append(row)
             advance(row)
 
-        return execute(todo, jobs, out, on_done)
+        return execute(todo, executor, out, on_done)
 
 
 def _greeting(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> str:

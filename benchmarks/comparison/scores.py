@@ -9,12 +9,12 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
+from benchmarks.executors.failures import ProcessDied, TookTooLong
 from benchmarks.files import write_text
 from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError
 from benchmarks.runner.execution import Plan, identity, row_identity
 from benchmarks.runner.user_controller import LateError
-from benchmarks.runner.worker import ProcessDied, TookTooLong
 from benchmarks.suites.frozen import Entry
 
 SCORES = "scores.csv"

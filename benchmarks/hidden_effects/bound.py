@@ -14,15 +14,18 @@ proportion to r, which holds near the case's own r alone: what a delay and a lag
 the square of their size.
 """
 
+import itertools
 import json
 import os
 import sys
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.runner.damaged_results import say_damaged
 from pma_gym.cli.options import StrictTyper
 from pma_gym.document_shape import check_shape
@@ -49,12 +52,12 @@ from benchmarks.hidden_effects.physics.rig import (  # noqa: E402
 from benchmarks.hidden_effects.physics.simulation import Commands  # noqa: E402
 from pma_gym.data.datasets.dataset import Dataset, read_dataset  # noqa: E402
 from pma_gym.data.trial import Trial  # noqa: E402
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted  # noqa: E402
-from pma_gym.discovery.fitting.free_parameters import own_parameters  # noqa: E402
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted  # noqa: E402
+from pma_gym.discovery.fitting.free_parameters import free_parameters  # noqa: E402
 from pma_gym.discovery.preparation.noise import Whitening  # noqa: E402
-from pma_gym.discovery.screening.candidates import suspects  # noqa: E402
-from pma_gym.discovery.screening.score_test import Baseline, beginnings, look  # noqa: E402
+from pma_gym.discovery.screening.candidates import candidate_effects  # noqa: E402
+from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points  # noqa: E402
 from pma_gym.files import replace_file  # noqa: E402
 from pma_gym.plant.model import Model, load_model  # noqa: E402
 
@@ -113,13 +116,13 @@ def true_noise(truth: Mapping[str, Any]) -> tuple[Whitening, ...]:
     return tuple(found)
 
 
-def left_by(bench: Bench, fit: Fitted, extra: Sequence[Suspect] = ()) -> float:
+def left_by(problem: FitProblem, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> float:
     """Distance that a fit leaves to readings without noise, what is assumed beforehand apart."""
-    pieces = bench.evidence(fit.model, extra).pieces(fit.values, np.empty(0))
+    pieces = problem.whitened_residuals(fit.model, extra).pieces(fit.values, np.empty(0))
     return float("inf") if pieces is None else float(np.sqrt(pieces.total()[0, 0]))
 
 
-def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple[Bench, Model]:
+def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple[FitProblem, Model]:
     """Trials without noise, and the lab's model at the true rig's parameters.
 
     What the effect changes comes from the generator, and is added to what our own plant gives
@@ -134,18 +137,18 @@ def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple
     hidden = {effect["name"]: effect["parameters"] for effect in truth["effects"]}
     base, with_it = simulate_variants(commands, [(truth["base"], {}), (truth["base"], hidden)])
     noise = true_noise(truth)
-    plain = Bench([_read(t, r) for t, r in zip(trials, base, strict=True)], given,
-                  own_parameters(given), noise)  # fmt: skip
+    plain = FitProblem([_read(t, r) for t, r in zip(trials, base, strict=True)], given,
+                  free_parameters(given), noise)  # fmt: skip
     found = plain.careful_fit(given)
     if found is None:
         raise ValueError(f"model {given.name} cannot be simulated on {dataset.title}")
-    readings = plain.evidence(found.model).readings(found.values)
+    readings = plain.whitened_residuals(found.model).readings(found.values)
     assert readings is not None
     changed = [
         _read(trial, held.T + after - before)
         for trial, held, before, after in zip(trials, readings, base, with_it, strict=True)
     ]
-    return Bench(changed, found.model, own_parameters(found.model), noise), found.model
+    return FitProblem(changed, found.model, free_parameters(found.model), noise), found.model
 
 
 def _read(trial: Trial, readings: Array) -> Trial:
@@ -153,34 +156,41 @@ def _read(trial: Trial, readings: Array) -> Trial:
     return Trial(trial.time, trial.commands, dict(zip(SIGNALS, readings.T, strict=True)))
 
 
-def distances(bench: Bench, model: Model, orders: Sequence[float], name: str) -> dict[str, Any]:
+def distances(
+    problem: FitProblem, model: Model, orders: Sequence[float], name: str
+) -> dict[str, Any]:
     """How far a hidden effect is from nothing, from its likeness in the catalogue, from rivals.
 
     Args:
-        bench: trials without noise, and the true noise.
+        problem: trials without noise, and the true noise.
         model: where the base parameters are true.
         orders: which repeat each trial is.
         name: of the effect, in the catalogue.
     """
-    refitted = bench.fit(model)
+    refitted = problem.fit(model)
     if refitted is None:
         raise ValueError(f"model {model.name} cannot be simulated")
-    whole = left_by(bench, refitted)
-    baseline = Baseline.at(bench.evidence(refitted.model), refitted.values, refitted.steps)
-    catalogue = suspects(model, orders)
-    looks = look(baseline, catalogue, 0, lambda each: bench.probed(refitted.model, each))
-    looks.sort(key=lambda each: -each.gain)
+    whole = left_by(problem, refitted)
+    baseline = Baseline.at(
+        problem.whitened_residuals(refitted.model), refitted.values, refitted.steps
+    )
+    catalogue = candidate_effects(model, orders)
+    scores = screen(baseline, catalogue, 0, lambda each: problem.probed(refitted.model, each))
+    scores.sort(key=lambda each: -each.gain)
     found = {
-        each.suspect.name: float(np.sqrt(max(whole**2 - each.gain, 0.0))) for each in looks
+        each.candidate.name: float(np.sqrt(max(whole**2 - each.gain, 0.0))) for each in scores
     }  # fmt: skip
-    rivals = [each for each in looks if each.suspect.name != name and each.starts][:FITTED]
-    for each in [*rivals, *(each for each in looks if each.suspect.name == name and each.starts)]:
-        evidence = bench.probed(refitted.model, each.suspect)
-        begun = beginnings(baseline, evidence, each)[0]
-        fit = bench.fit(refitted.model, (each.suspect,), {each.suspect.name: begun})
+    rivals = [each for each in scores if each.candidate.name != name and each.starts][:FITTED]
+    for each in [
+        *rivals,
+        *(each for each in scores if each.candidate.name == name and each.starts),
+    ]:
+        whitened = problem.probed(refitted.model, each.candidate)
+        begun = starting_points(baseline, whitened, each)[0]
+        fit = problem.fit(refitted.model, (each.candidate,), {each.candidate.name: begun})
         if fit is not None:
-            left = left_by(bench, fit, (each.suspect,))
-            found[each.suspect.name] = min(found[each.suspect.name], left)
+            left = left_by(problem, fit, (each.candidate,))
+            found[each.candidate.name] = min(found[each.candidate.name], left)
     others = {other: d for other, d in found.items() if other != name}
     apart = {other: d for other, d in others.items() if other not in group(name)}
     return {
@@ -197,10 +207,10 @@ def bounded(folder: Path, case: str) -> dict[str, Any]:
     """Distances of one drawn case that hides one effect."""
     truth = json.loads((folder / "truth" / f"{case}.json").read_text("utf-8"))
     dataset = read_dataset(folder / "cases" / case)
-    bench, model = noiseless(dataset, truth, load_model(dataset.model or "station"))
+    problem, model = noiseless(dataset, truth, load_model(dataset.model or "station"))
     effect = truth["effects"][0]
     orders = [float(named.order or 0.0) for named in dataset.trials]
-    found = distances(bench, model, orders, effect["name"])
+    found = distances(problem, model, orders, effect["name"])
     return {"case": case, "effect": effect["name"], "r": effect["r"], **found}
 
 
@@ -260,9 +270,13 @@ def main(
     missing = [name for name in names if not _is_kept(kept / f"{name}.json")]
     begun = time.monotonic()
     print(f"{len(names) - len(missing)} of {len(names)} cases are bounded", file=sys.stderr)
-    for done, name in enumerate(_bounds(cases, missing, jobs), 1):
+    done = itertools.count(1)
+
+    def tell(_: int, name: str) -> None:
         took = time.monotonic() - begun
-        print(f"{done}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
+        print(f"{next(done)}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
+
+    run_or_raise([partial(_bound_one, cases, name) for name in missing], local(jobs), tell)
     found = [json.loads((kept / f"{name}.json").read_text("utf-8")) for name in names]
     by_effect = {
         effect: curves([each for each in found if each["effect"] == effect])
@@ -295,15 +309,6 @@ def _bound_one(folder: Path, case: str) -> str:
     text = json.dumps(bounded(folder, case), indent=1) + "\n"
     replace_file(folder / "bounds" / f"{case}.json", text.encode())
     return case
-
-
-def _bounds(folder: Path, missing: Sequence[str], jobs: int):  # noqa: ANN202
-    if jobs == 1:
-        yield from (_bound_one(folder, name) for name in missing)
-        return
-    with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(_bound_one, folder, name) for name in missing]
-        yield from (future.result() for future in as_completed(futures))
 
 
 if __name__ == "__main__":

@@ -5,10 +5,11 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from benchmarks.executors.executor import Executor, ThisProcess, run_all
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Judge, diagnosed
@@ -21,7 +22,6 @@ from benchmarks.hidden_effects.generation.blocks import Block
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.runner.damaged_results import UNREADABLE, reason, say_damaged
 from benchmarks.runner.fingerprint import code_digest_with
-from benchmarks.runner.processes import run_all
 from pma_gym.document_shape import Whole, check_shape
 from pma_gym.documents import read_json
 
@@ -48,7 +48,7 @@ class Order:
         count: how many cases.
         seed: of the set.
         folder: of its records.
-        jobs: processes.
+        executor: where cases are drawn and diagnosed.
         keep: keep the trials too.
         again: anew what other code made.
         judge: makes the answers.
@@ -58,7 +58,7 @@ class Order:
     count: int
     seed: int
     folder: Path
-    jobs: int = 1
+    executor: Executor = field(default_factory=ThisProcess)
     keep: bool = False
     again: bool = False
     judge: Judge = diagnosed
@@ -108,13 +108,14 @@ def run_block(order: Order) -> dict[str, Any] | None:
 
     def on_done(index: int, result: object) -> None:
         if isinstance(result, Record):
+            records.write(result, order.folder)
             done[result.number] = result
             progress.tell(result)
         else:
             failures.append(f"case {missing[index]}: {type(result).__name__}: {result}")
             _tell(failures[-1])
 
-    if not run_all(works, order.jobs, on_done):
+    if not run_all(works, order.executor, on_done):
         _tell(
             f"Interrupted: {len(done)} of {order.count} cases of {order.block.name} are done and "
             f"stay in {order.folder}; the same command goes on from there."
@@ -264,7 +265,8 @@ def _claimed(path: Path) -> dict[str, Any] | None:
 
 def _greeting(order: Order, done: dict[int, Record], code: str) -> str:
     words = (
-        f"Block {order.block.name}, seed {order.seed}: {order.count} cases, {order.jobs} at a time"
+        f"Block {order.block.name}, seed {order.seed}: {order.count} cases, "
+        f"{order.executor.jobs} at a time"
     )
     if done:
         words += f"; {len(done)} are done in {order.folder}"

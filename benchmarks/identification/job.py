@@ -4,19 +4,19 @@ import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 from rich.table import Table
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
 from benchmarks.identification import judge
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
-from benchmarks.runner.processes import run_all
 from pma_gym.plant.model import Model, Note, dump_model
 from pma_gym.terminal import SafeConsole
 
@@ -63,14 +63,11 @@ def _all_folds(works: Sequence[partial[Fold]], jobs: int, console: Console) -> l
     with Progress(console=console) as progress:
         bar = progress.add_task("pressures left out", total=len(works))
 
-        def keep(index: int, result: object) -> None:
-            if isinstance(result, BaseException):
-                raise result
-            folds[index] = cast("Fold", result)
+        def keep(index: int, fold: Fold) -> None:
+            folds[index] = fold
             progress.update(bar, advance=1)
 
-        if not run_all(works, jobs, keep):
-            raise KeyboardInterrupt
+        run_or_raise(works, local(jobs), keep)
     return [folds[index] for index in range(len(works))]
 
 

@@ -79,7 +79,7 @@ def fit_pulley(data: StationLimits) -> Pulley:
 
 
 def pulley_parameters(pulley: Pulley) -> dict[str, float]:
-    """A pulley's numbers as model parameters at the door."""
+    """A pulley's numbers as model parameters in file units."""
     return {
         "rotor.radius_mm": pulley.radius * 1e3,
         "cable.stiffness_n_per_mm": pulley.stiffness / 1e3,

@@ -68,7 +68,7 @@ def cable_damping(model: Model) -> float:
 
 
 def fitted_parameters(model: Model) -> dict[str, float]:
-    """The values that the tables determine, by parameter, at the door."""
+    """The values that the tables determine, by parameter, in file units."""
     names = [*statics.PARAMETERS, *_LINES]
     return {name: _value(model, name) for name in names}
 

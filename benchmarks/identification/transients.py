@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.muscle.damping import symmetric_damping
 from pma_gym.plant.model import Model
@@ -113,7 +113,7 @@ def _minimum(cost: np.ndarray) -> np.ndarray:
 
 def damping_of(model: Model, pressure: np.ndarray) -> np.ndarray:
     """Damping of a model's muscle (N s/m) at pressures (Pa), shape (n,)."""
-    return lanes(symmetric_damping)(pressure, model.parameters["symmetric_damping"])
+    return as_numpy(symmetric_damping)(pressure, model.parameters["symmetric_damping"])
 
 
 def step_residuals(model: Model, steps: PressureSteps, filling: bool) -> np.ndarray:

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 from benchmarks.measured.held_out import Rig
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.experiments.detectability import for_blind
-from pma_gym.discovery.screening.score_test import Baseline, Look, look
+from pma_gym.discovery.experiments.detectability import experiment_to_detect
+from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, screen
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
@@ -67,28 +67,28 @@ def undecidable(
     if fit is None:
         raise ValueError(f"{model.name} cannot be simulated on tables I2 and I3")
     every = list(rig.known.values())
-    baseline = Baseline.at(rig.bench.evidence(fit.model), fit.values, fit.steps)
-    looks = look(
+    baseline = Baseline.at(rig.problem.whitened_residuals(fit.model), fit.values, fit.steps)
+    scores = screen(
         baseline,
         every,
         seed,
-        lambda suspect: rig.bench.probed(fit.model, suspect),
+        lambda candidate: rig.problem.probed(fit.model, candidate),
         None if progress is None else lambda done: progress(done, len(every) + MOST),
     )
-    dim = [each for each in looks if each.resolvable is None or each.resolvable > 1.0]
+    dim = [each for each in scores if each.resolvable is None or each.resolvable > 1.0]
     proposals: list[Proposal] = []
-    left = [each.suspect for each in dim]
+    left = [each.candidate for each in dim]
     while left and len(proposals) < MOST:
-        found = for_blind(rig.bench, fit, left, looks, seed)
+        found = experiment_to_detect(rig.problem, fit, left, scores, seed)
         if found is None:
             break
-        proposals.append(Proposal(found.protocol, tuple(found.separates), found.minutes))
-        left = [suspect for suspect in left if suspect.name not in found.separates]
+        proposals.append(Proposal(found.excitation, tuple(found.separates), found.minutes))
+        left = [candidate for candidate in left if candidate.name not in found.separates]
     return [_entry(each, proposals) for each in dim], proposals
 
 
-def _entry(each: Look, proposals: list[Proposal]) -> Undecidable:
-    name = each.suspect.name
+def _entry(each: ScreeningScore, proposals: list[Proposal]) -> Undecidable:
+    name = each.candidate.name
     places = [k for k, proposal in enumerate(proposals, 1) if name in proposal.shows]
-    port = CATALOGUE[each.suspect.effect].port
+    port = CATALOGUE[each.candidate.effect].port
     return Undecidable(name, port, each.resolvable, places[0] if places else None)

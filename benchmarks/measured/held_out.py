@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.free_parameters import Own, own_parameters, values
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, free_parameters, values
 from pma_gym.discovery.preparation.initial_floors import initial_floors
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
-from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
@@ -48,14 +48,14 @@ class Rig:
     Attributes:
         data: the trials.
         given: the model.
-        bench: trials and noise, ready for fits; its own parameters about the given model's.
+        problem: trials and noise, ready for fits; its own parameters about the given model's.
         known: every effect that may be added, by name.
     """
 
     data: Dataset
     given: Model
-    bench: Bench
-    known: dict[str, Suspect]
+    problem: FitProblem
+    known: dict[str, CandidateEffect]
 
     @classmethod
     def of(cls, data: Dataset, given: Model, threads: int = 1) -> "Rig":
@@ -64,10 +64,14 @@ class Rig:
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         levels = initial_floors(given, logged, data.trials)
         noise = tuple(white_noise(each.level) for each in levels)
-        own = own_parameters(given)
-        bench = Bench(trials, given, Own(own.free, WIDER * own.prior), noise, threads)
+        own = free_parameters(given)
+        problem = FitProblem(
+            trials, given, FreeParameters(own.free, WIDER * own.prior), noise, threads
+        )
         orders = [float(each.order or 0.0) for each in data.trials]
-        return cls(data, given, bench, {each.name: each for each in suspects(given, orders)})
+        return cls(
+            data, given, problem, {each.name: each for each in candidate_effects(given, orders)}
+        )
 
     def fit(self, effects: Sequence[str], begun: Model) -> Fitted | None:
         """The given model with effects in it, fitted to the trials.
@@ -83,9 +87,9 @@ class Rig:
             else each.probes[len(each.probes) // 2]
             for each in chosen
         }
-        free = self.bench.own.free
+        free = self.problem.own.free
         own = dict(zip(free, values(begun, free).tolist(), strict=True))
-        return self.bench.fit(self.given.replace(own), chosen, starts)
+        return self.problem.fit(self.given.replace(own), chosen, starts)
 
 
 AT_LOAD = "extension_at_load_mm"
@@ -129,9 +133,9 @@ def _at_measured_load(trial: Trial, model: Model) -> Trial:
 def _errors(
     model: Model, loaded: Sequence[NamedTrial], trials: Sequence[Trial]
 ) -> dict[str, Array]:
-    """Predicted less measured, at the door, by `FIGURES`."""
+    """Predicted less measured, in file units, by `FIGURES`."""
     some = ("drive.offset_n",)
-    evidence = Evidence(
+    whitened = WhitenedResiduals(
         model,
         trials,
         some,
@@ -139,10 +143,10 @@ def _errors(
         np.array([np.inf]),
         own={path: [float(each.order or 0.0) for each in loaded] for path in _repeats(model)},
     )
-    held = evidence.readings(values(model, some))
+    held = whitened.readings(values(model, some))
     if held is None:
         return {name: np.array([np.nan]) for name in FIGURES}
-    return _compared(held, evidence.logged)
+    return _compared(held, whitened.logged)
 
 
 def _repeats(model: Model) -> list[str]:
@@ -161,7 +165,7 @@ def rms(errors: Array) -> float:
 
 
 def repeat_scatter(data: Dataset) -> dict[str, float]:
-    """Rms of I3's rows about the mean of their repeats, at the door, by `FIGURES`."""
+    """Rms of I3's rows about the mean of their repeats, in file units, by `FIGURES`."""
     groups: dict[str, list[int]] = {}
     loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
     for i, each in enumerate(loaded):

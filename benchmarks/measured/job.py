@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,16 +13,17 @@ from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
 from rich.progress import Progress as Bar
 
 from benchmarks.files import write_text
-from benchmarks.measured.detectability import Proposal, Undecidable, undecidable
+from benchmarks.measured.detectability import undecidable
 from benchmarks.measured.pages import measured_page
+from benchmarks.measured.result import Measured
 from benchmarks.measured.reverse import Explanation, searched
-from benchmarks.measured.rounds import MOST_ROUNDS, Round, rounds
+from benchmarks.measured.rounds import MOST_ROUNDS, rounds
 from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.stages import Stages
-from benchmarks.measured.steps import Step, folds, steps
+from benchmarks.measured.steps import folds, steps
 from benchmarks.measured.tables import print_measured
 from benchmarks.measured.trials import measured_dataset
-from benchmarks.measured.triangles import Held, held_against
+from benchmarks.measured.triangles import held_against
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.data.files.trial_files import encode_trial
 from pma_gym.discovery.fitting.journal import digest
@@ -60,37 +61,6 @@ I2_EVERY = 12
 
 FOLDS = ((150.0, 275.0, 400.0, 550.0), (200.0, 300.0, 450.0, 575.0), (250.0, 350.0, 500.0))
 """All pressures, each left out once from a fit of all effects."""
-
-
-@dataclass(frozen=True)
-class Measured:
-    """What the job finds.
-
-    Attributes:
-        rounds: the diagnoses.
-        steps: models with one effect more at a time.
-        folds: rms errors of all effects with every pressure left out once, by figure.
-        floors: scatter between repeats, by figure.
-        smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
-        blind: effects that I2 and I3 cannot tell beside the amended model.
-        proposals: experiments that would show them.
-        reverse: what explains the misfit of the identified station in tables 21-30, round by round.
-        held: models against the validation under triangular pressure.
-        seconds: how long this run took (s), without stages kept from an earlier one.
-        settings: what was diagnosed, and how many stages which code made.
-    """
-
-    rounds: list[Round]
-    steps: list[Step]
-    folds: dict[str, float]
-    floors: dict[str, float]
-    smooth: dict[str, float]
-    blind: list[Undecidable]
-    proposals: list[Proposal]
-    reverse: list[list[Explanation]]
-    held: list[Held]
-    seconds: float
-    settings: dict[str, Any]
 
 
 def run_measured(
@@ -213,7 +183,7 @@ def _without(pressures_kpa: Sequence[float]) -> tuple[Dataset, Dataset]:
 
 
 def floors() -> dict[str, float]:
-    """Scatter of I3's rows about the mean of their repeats (rms, at the door), by figure."""
+    """Scatter of I3's rows about the mean of their repeats (rms, in file units), by figure."""
     from benchmarks.measured.held_out import repeat_scatter
 
     return repeat_scatter(measured_dataset(steps=0))

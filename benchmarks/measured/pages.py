@@ -1,10 +1,9 @@
 """The page of the job: what was found first, then by how much each effect helps."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from benchmarks.measured.replays import PHASE_NAMES
+from benchmarks.measured.result import Measured
 from benchmarks.measured.tables import (
     BLIND_HEADER,
     COLUMNS,
@@ -27,20 +26,17 @@ from pma_gym.discovery.report.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
 from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture, TextTable, to_html
 from pma_gym.pages.figures import legend_below, picture, png
 
-if TYPE_CHECKING:
-    from benchmarks.measured.job import Measured
-
 _SHOWN = (("extension_mm", "extension, rms error (mm)"), ("rotation_deg", "rotation, rms (deg)"))
 _REPLAYS = (("displacement", "mm"), ("I", "deg"), ("II", "deg"), ("III", "deg"))
 
 
-def measured_page(result: "Measured") -> str:
+def measured_page(result: Measured) -> str:
     """All of it as one page of HTML that needs nothing else."""
     pictures = {"errors": errors_picture(result), "replays": replays_picture(result)}
     return to_html(_blocks(result), pictures)
 
 
-def _blocks(result: "Measured") -> list[Block]:
+def _blocks(result: Measured) -> list[Block]:
     effects = [readable(name) for name in result.steps[-1].effects]
     names = tuple(label for _, label in COLUMNS)
     blocks: list[Block] = [
@@ -93,7 +89,7 @@ def _blocks(result: "Measured") -> list[Block]:
     return blocks
 
 
-def _reverse_blocks(result: "Measured") -> list[Block]:
+def _reverse_blocks(result: Measured) -> list[Block]:
     """What the identified station misses."""
     blocks: list[Block] = [
         Heading("The reverse: what the identified station misses in tables 21-30"),
@@ -119,7 +115,7 @@ def _reverse_blocks(result: "Measured") -> list[Block]:
     return blocks
 
 
-def errors_picture(result: "Measured") -> bytes:
+def errors_picture(result: Measured) -> bytes:
     """Errors before and after each effect, seen and unseen pressures, with the floor."""
     labels = [readable(step.name) for step in result.steps]
     at = np.arange(len(labels))
@@ -145,7 +141,7 @@ def errors_picture(result: "Measured") -> bytes:
         return png(drawn)
 
 
-def replays_picture(result: "Measured") -> bytes:
+def replays_picture(result: Measured) -> bytes:
     """Error of the mean position in each phase, model after model."""
     labels = [readable(step.name) for step in result.steps]
     at = np.arange(len(labels))

@@ -3,7 +3,7 @@
 Each measured phase of each trial is known by three numbers: slope and intercept of a line, and the
 mean square about it. Beside a simulation under the printed voltages they leave three residuals, in
 what they make of the position (rms, mm at the muscle): the slope's, the mid-phase position's and
-the roughness's. Every suspect of the station is fitted to all of them at once; what is left at a
+the roughness's. Every candidate of the station is fitted to all of them at once; what is left at a
 pressure is then foretold from the others, by the fit's own derivatives.
 """
 
@@ -18,11 +18,11 @@ from scipy.optimize import OptimizeResult, least_squares
 from benchmarks.reproduction.score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.free_parameters import prior, values
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
-from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.metrics import PHASE_DURATION, regression
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, load_model
@@ -64,7 +64,7 @@ class Explanation:
 
     Attributes:
         name: the effect, or the parameter.
-        values: fitted values at the door, by path.
+        values: fitted values in file units, by path.
         fitted_mm: rms left where all pressures were fitted (mm at the muscle).
         left_out_mm: at pressures left out.
         displacement_mm: of that, in the displacement trials.
@@ -87,19 +87,19 @@ def explanations(
     The first in the list that adds nothing is the model as it is.
     """
     summary = Summary.measured(model)
-    every = [each for each in suspects(model) if _reaches(each)]
+    every = [each for each in candidate_effects(model) if _reaches(each)]
     found = [summary.explained(NOTHING, model, (), np.empty((1, 0)))]
     total = len(every) + len(PARAMETERS)
-    for number, suspect in enumerate(every):
+    for number, candidate in enumerate(every):
         if progress is not None:
             progress(number, total)
-        free = np.flatnonzero(suspect.fitted)
-        some = suspect.probes[_spread(len(suspect.probes))]
-        switched = suspect.model.replace(
-            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        free = np.flatnonzero(candidate.fitted)
+        some = candidate.probes[_spread(len(candidate.probes))]
+        switched = candidate.model.replace(
+            dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
-        paths = tuple(np.array(suspect.paths)[free].tolist())
-        found.append(summary.explained(suspect.name, switched, paths, some[:, free]))
+        paths = tuple(np.array(candidate.paths)[free].tolist())
+        found.append(summary.explained(candidate.name, switched, paths, some[:, free]))
     for number, path in enumerate(PARAMETERS):
         if progress is not None:
             progress(len(every) + number, total)
@@ -128,11 +128,11 @@ def searched(
 
 def _with(model: Model, found: Explanation) -> Model:
     """The model with an explanation in it."""
-    lacking = {each.name: each for each in suspects(model)}
+    lacking = {each.name: each for each in candidate_effects(model)}
     if found.name in lacking:
-        suspect = lacking[found.name]
-        model = suspect.model.replace(
-            dict(zip(suspect.paths, suspect.probes[0].tolist(), strict=True))
+        candidate = lacking[found.name]
+        model = candidate.model.replace(
+            dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
     return model.replace(found.values)
 
@@ -143,11 +143,11 @@ def alike(found: Sequence[Explanation]) -> list[Explanation]:
     return [each for each in found if each.left_out_mm <= LIKE * least]
 
 
-def _reaches(suspect: Suspect) -> bool:
+def _reaches(candidate: CandidateEffect) -> bool:
     """Whether an effect is in the true motion, which alone is known, and has a size."""
-    sensed = suspect.model.effects[suspect.effect].port.startswith(("sensor", "part"))
-    lag = suspect.name.endswith("_lag") and suspect.effect != "drive_lag"
-    return bool(suspect.fitted.any()) and not sensed and not lag
+    sensed = candidate.model.effects[candidate.effect].port.startswith(("sensor", "part"))
+    lag = candidate.name.endswith("_lag") and candidate.effect != "drive_lag"
+    return bool(candidate.fitted.any()) and not sensed and not lag
 
 
 def _spread(count: int) -> list[int]:
@@ -205,9 +205,9 @@ class Summary:
                 rotation += 3 * [task == "rotation"]
         return cls(trials, tasks, np.array(pressures), np.array(rotation), np.array(figures))
 
-    def residuals(self, evidence: Evidence, at: Array) -> Array:
+    def residuals(self, whitened: WhitenedResiduals, at: Array) -> Array:
         """Simulated less measured at parameters, shape (n,) in mm; infinite where it is lost."""
-        held = evidence.readings(at)
+        held = whitened.readings(at)
         if held is None or not all(np.isfinite(part).all() for part in held):
             return np.full(self.figures.shape, 1e3)
         found = []
@@ -233,7 +233,7 @@ class Summary:
         """Fit parameters of a model, from the best of some beginnings, shape (starts, p)."""
         # A reading of every parameter keeps the zero free; one that does nothing is always there.
         free = tuple(paths) or ("drive.offset_n",)
-        evidence = Evidence(
+        whitened = WhitenedResiduals(
             model,
             self.trials,
             free,
@@ -241,13 +241,13 @@ class Summary:
             np.full(len(free), np.inf),
         )
         if not paths:
-            left = self.residuals(evidence, values(model, free))
+            left = self.residuals(whitened, values(model, free))
             return self._explanation(name, {}, left, left)
-        first = min(begun, key=lambda row: float(np.sum(self.residuals(evidence, row) ** 2)))
+        first = min(begun, key=lambda row: float(np.sum(self.residuals(whitened, row) ** 2)))
         lower, upper = bounds(paths)
         inside = np.clip(first, lower + 1e-9, upper - 1e-9)
         fit = least_squares(
-            lambda at: self.residuals(evidence, at),
+            lambda at: self.residuals(whitened, at),
             inside,
             bounds=(lower, upper),
             x_scale=np.maximum(np.abs(inside), 1e-3),
@@ -255,9 +255,9 @@ class Summary:
             max_nfev=25,
         )
         fitted = dict(zip(paths, map(float, fit.x), strict=True))
-        return self._explanation(name, fitted, fit.fun, self._foretold(evidence, fit))
+        return self._explanation(name, fitted, fit.fun, self._foretold(whitened, fit))
 
-    def _foretold(self, evidence: Evidence, fit: OptimizeResult) -> Array:
+    def _foretold(self, whitened: WhitenedResiduals, fit: OptimizeResult) -> Array:
         """What is left at each pressure by a fit to the others: one step from the fit of all.
 
         The step is simulated, and not taken where it does not help at the others.
@@ -266,8 +266,8 @@ class Summary:
         for pressure in np.unique(self.pressure):
             there = self.pressure == pressure
             step, *_ = np.linalg.lstsq(fit.jac[~there], -left[~there], rcond=1e-8)
-            at = np.clip(fit.x + step, evidence.lower, evidence.upper)
-            moved = self.residuals(evidence, at)
+            at = np.clip(fit.x + step, whitened.lower, whitened.upper)
+            moved = self.residuals(whitened, at)
             if np.sum(moved[~there] ** 2) <= np.sum(left[~there] ** 2):
                 found[there] = moved[there]
         return found

@@ -137,11 +137,11 @@ def round_of(diagnosis: Diagnosis, trials: int) -> Round:
             (each.name, each.delta_log_likelihood, each.p_value, each.why)
             for each in diagnosis.candidates[:MOST_RIVALS]
         ],
-        blind=tuple(diagnosis.blind),
+        blind=tuple(diagnosis.not_detectable),
         next_experiment=None
         if experiment is None
         else {
-            "protocol": experiment.protocol,
+            "protocol": experiment.excitation,
             "separates": list(experiment.separates),
             "expected_odds": experiment.expected_odds,
         },

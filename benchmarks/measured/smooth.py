@@ -35,7 +35,7 @@ def smooth_errors(seen: Dataset, unseen: Dataset) -> dict[str, float]:
         seen: trials of I3 that it is fitted to.
         unseen: trials of I3 that it is judged on.
     Returns:
-        Rms errors at the door (mm, deg) by `FIGURES`, as functions of the two voltages; and
+        Rms errors in file units (mm, deg) by `FIGURES`, as functions of the two voltages; and
         `AT_LOAD`, the extension as a function of regulator voltage and measured load.
     """
     found = {name: _error(seen, unseen, name, at_load=False) for name in FIGURES}
@@ -58,7 +58,7 @@ def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:
 
 
 def _rows(data: Dataset, figure: str, at_load: bool) -> tuple[Array, Array]:
-    """What is known of each row, shape (rows, 2), and its figure at the door, shape (rows,)."""
+    """What is known of each row, shape (rows, 2), and its figure in file units, shape (rows,)."""
     trials: Sequence[Trial] = [
         each.trial for each in data.trials if "rotation" in each.trial.measurements
     ]

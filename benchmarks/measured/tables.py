@@ -1,18 +1,16 @@
 """What the job found, as rows of text: for the terminal and for the page."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from benchmarks.measured.replays import PHASE_NAMES
+from benchmarks.measured.result import Measured
 from benchmarks.measured.reverse import GAIN, NOTHING, Explanation, alike
 from benchmarks.measured.rounds import Round
 from pma_gym.terminal import SafeConsole
-
-if TYPE_CHECKING:
-    from benchmarks.measured.job import Measured
 
 TARGET_MM = 1.0
 """Extension that is aimed at, on pressures that took no part (mm)."""
@@ -58,7 +56,7 @@ def equals(found: Round, name: str) -> list[str]:
     return [other for other, _, _, why in found.rivals if why == words]
 
 
-def error_rows(result: "Measured") -> Rows:
+def error_rows(result: Measured) -> Rows:
     """Errors on pressures that took no part, model after model, and what they may be held to."""
     rows = [
         (_label(step.name), *(f"{step.unseen[key]:.2f}" for key, _ in COLUMNS))
@@ -72,7 +70,7 @@ def error_rows(result: "Measured") -> Rows:
     return rows
 
 
-def replay_rows(result: "Measured", phase: str) -> Rows:
+def replay_rows(result: Measured, phase: str) -> Rows:
     """Errors of the replay in a phase, model after model."""
     return [
         (
@@ -114,7 +112,7 @@ MOST_SHOWN = 8
 """Explanations that are listed."""
 
 
-def reverse_words(result: "Measured") -> Iterator[str]:
+def reverse_words(result: Measured) -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
     for found in result.reverse:
         plain = next(each for each in found if each.name == NOTHING)
@@ -139,7 +137,7 @@ def _costs(each: Explanation, plain: Explanation) -> str:
     return readable(each.name) + (" (but worse in displacement)" if spoils else "")
 
 
-def held_rows(result: "Measured") -> Rows:
+def held_rows(result: Measured) -> Rows:
     """Models against the validation under triangular pressure."""
     return [
         (
@@ -162,7 +160,7 @@ HELD_HEADER = (
 REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
 
 
-def experiment_words(result: "Measured") -> list[str]:
+def experiment_words(result: Measured) -> list[str]:
     """What to measure next, in words."""
     words = []
     for number, each in enumerate(result.rounds, 1):
@@ -181,7 +179,7 @@ def experiment_words(result: "Measured") -> list[str]:
     return words
 
 
-def blind_rows(result: "Measured") -> Rows:
+def blind_rows(result: Measured) -> Rows:
     """Effects that these tables cannot tell, and which experiment would."""
     return [
         (
@@ -197,7 +195,7 @@ def blind_rows(result: "Measured") -> Rows:
 BLIND_HEADER = ("effect", "verdict", "shows from, times its usual size", "shown by experiment")
 
 
-def print_measured(result: "Measured", console: Console) -> None:
+def print_measured(result: Measured, console: Console) -> None:
     """All of it as tables."""
     console = console if console.is_terminal else SafeConsole(file=console.file, width=WIDTH)
     header = ("round", "trials", "verdict", "added", "p", "explains as much")
@@ -221,7 +219,7 @@ def print_measured(result: "Measured", console: Console) -> None:
         console.print(line, highlight=False)
 
 
-def verdict_words(result: "Measured") -> Iterator[str]:
+def verdict_words(result: Measured) -> Iterator[str]:
     """What was aimed at, and what was reached."""
     first, last = result.steps[0], result.steps[-1]
     got = last.unseen["extension_mm"]

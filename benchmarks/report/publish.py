@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.bounds.cache import Bounds
+from benchmarks.executors.local import Background
 from benchmarks.files import write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import loop_pictures, page_blocks, score_pictures
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
-from benchmarks.runner.background import Background
 from benchmarks.suites.frozen import FrozenSuite
 from pma_gym.cli.progress import StepProgress
 from pma_gym.pages.document import to_html, to_markdown

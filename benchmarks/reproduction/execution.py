@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from benchmarks.bounds.achievable import achievable_bound
+from benchmarks.executors.executor import Executor, run_all
 from benchmarks.reproduction.score import Score, score_trial
 from benchmarks.runner.isolated_controller import driver
-from benchmarks.runner.processes import run_all
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.reproduction import Case, Suite
 from pma_gym.data.trial import Trial
@@ -64,13 +64,13 @@ class Execution:
 
 
 def execute(
-    suite: Suite, jobs: int, on_done: Callable[[str, bool], None] | None = None
+    suite: Suite, executor: Executor, on_done: Callable[[str, bool], None] | None = None
 ) -> Execution:
     """Run every case of a suite, and compute its bounds.
 
     Args:
         suite: what to run.
-        jobs: number of processes; 1 runs in this one.
+        executor: where the cases run.
         on_done: called with the name of each piece as it is done, and whether it failed.
     Returns:
         What was run: all of it, unless Ctrl-C ended it.
@@ -93,7 +93,7 @@ def execute(
         if on_done is not None:
             on_done(name, bool(failure))
 
-    complete = run_all(works, jobs, keep)
+    complete = run_all(works, executor, keep)
     in_order = {pressure: bounds[pressure] for pressure in pressures if pressure in bounds}
     return Execution(tuple(outcomes[index] for index in sorted(outcomes)), in_order, complete)
 

@@ -18,6 +18,7 @@ from rich.progress import (
     TimeElapsedColumn,
 )
 
+from benchmarks.executors.executor import Executor
 from benchmarks.files import write_bytes, write_text
 from benchmarks.reproduction.execution import Execution, compile_models, execute
 from benchmarks.reproduction.page import report_blocks, report_pictures
@@ -35,7 +36,7 @@ FAILED, INTERRUPTED = 1, 130
 """Exit codes."""
 
 
-def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
+def run_job(suite: Suite, out: Path, executor: Executor, console: Console) -> int:
     """Run every case of a suite and write scores and report.
 
     Files of an earlier run stay whole until this one ends and replaces them. Ctrl-C drops the cases
@@ -44,7 +45,7 @@ def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
     Args:
         suite: what to run.
         out: folder of the results; made if need be.
-        jobs: processes.
+        executor: where the cases run.
         console: where to print.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
@@ -55,15 +56,15 @@ def run_job(suite: Suite, out: Path, jobs: int, console: Console) -> int:
     info = environment_info() | {
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
-        "jobs": jobs,
+        "jobs": executor.jobs,
     }
     # Now, so that a folder that cannot be made ends the job before it has run.
     out.mkdir(parents=True, exist_ok=True)
-    console.print(_greeting(suite, out, jobs), highlight=False)
+    console.print(_greeting(suite, out, executor.jobs), highlight=False)
     with console.status("compiling the models"):
         compile_models(suite)
     with _progress(console) as progress:
-        execution = execute(suite, jobs, _advance(progress, suite))
+        execution = execute(suite, executor, _advance(progress, suite))
     info |= _speed(execution)
     if not execution.complete:
         info["wall_time_s"] = time.perf_counter() - began

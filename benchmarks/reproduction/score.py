@@ -21,7 +21,7 @@ PHASES = {
 """Phases of each task, as the tables call them."""
 
 UNITS = {task: protocol.unit for task, protocol in PROTOCOLS.items()}
-"""Unit of each task's position at the door."""
+"""Unit of each task's position in file units."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""One case: a controller drives one episode of a suite, and a row says what came of it."""
+"""One case: a controller drives one episode of a suite, and a row has its figures."""
 
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from benchmarks.executors.executor import Executor, run_all
+from benchmarks.executors.failures import ProcessDied
 from benchmarks.runner.case import Case, Row, cases, failed_row, run_case
 from benchmarks.runner.fingerprint import key
 from benchmarks.runner.journal import JOURNAL, Journal, case_rows
-from benchmarks.runner.processes import run_all
-from benchmarks.runner.worker import ProcessDied
 from benchmarks.suites.frozen import Entry, Episode, FrozenSuite
 from pma_gym.envs import PMAEnv
 
@@ -73,16 +73,20 @@ def plan(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Plan:
 
 
 def execute(
-    plan: Plan, jobs: int, out: Path, on_done: Callable[[Row], None], wary: bool = False
+    plan: Plan,
+    executor: Executor,
+    out: Path,
+    on_done: Callable[[Row], None],
+    untrusted: bool = False,
 ) -> bool:
-    """Run what a plan lacks; each row is in the folder's journal before `on_done` hears of it.
+    """Run what a plan lacks; each row is in the folder's journal before `on_done` is called.
 
     Args:
         plan: what is to be run.
-        jobs: number of processes; 1 runs in this one.
+        executor: where the cases run.
         out: folder of the journal.
         on_done: called with each row.
-        wary: run every case in another process, and none twice, see `run_all`.
+        untrusted: run no case twice, see `run_all`.
     Returns:
         Whether all of it was run; Ctrl-C ends the run at once, and what is done stays.
     """
@@ -97,7 +101,7 @@ def execute(
             journal.append(row)
             on_done(row)
 
-        return run_all([_work(case, plan.suite) for case in missing], jobs, keep, wary)
+        return run_all([_work(case, plan.suite) for case in missing], executor, keep, untrusted)
 
 
 def _work(case: Case, suite: FrozenSuite) -> partial[Row]:

@@ -6,20 +6,16 @@ station and the readings as copies, and returns volts. That is no sandbox: the p
 user's rights, as any program that the user starts.
 """
 
-import os
-import pickle
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from multiprocessing import connection, parent_process
 from multiprocessing.util import Finalize
 from typing import Any
 
+from benchmarks.runner.controller_process import ControllerProcess
 from benchmarks.runner.controller_spec import Contender
 from benchmarks.runner.rollout import checked_volts
-from benchmarks.runner.user_controller import Guarded
-from benchmarks.runner.worker import Worker, deaf_to_interrupt
+from benchmarks.runner.user_controller import ACT_S, MAKE_S, RESET_S, Guarded
 from controllers.controller import Controller, Reference
 from pma_gym.envs import Measurement, StationInfo
 
@@ -62,20 +58,22 @@ class Isolated:
     def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
         self._source = contender.source
         self.act_seconds: list[float] = []
-        self.name, self.repetitions = self._ask(partial(_make, contender, period, keep_pace))
+        make = partial(_make, contender, period, keep_pace)
+        making = f"importing and making {contender.name}"
+        self.name, self.repetitions = self._ask(make, making, MAKE_S)
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
         """Its `reset`."""
         self.act_seconds.clear()
-        self._ask(partial(_reset, reference, station))
+        self._ask(partial(_reset, reference, station), "reset", RESET_S)
 
     def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`."""
-        volts, seconds = self._ask(partial(_act, measurement, time))
+        volts, seconds = self._ask(partial(_act, measurement, time), "act", ACT_S)
         self.act_seconds.append(seconds)
         return volts
 
-    def _ask(self, work: Callable[[], object]) -> Any:  # noqa: ANN401
+    def _ask(self, work: Callable[[], object], what: str, limit_s: float) -> Any:  # noqa: ANN401
         """What a call returns there.
 
         Raises:
@@ -83,27 +81,26 @@ class Isolated:
             TookTooLong: it passed its limit; the process is ended.
             ProcessDied: the process ended.
         """
-        worker = _process_of(self._source)
+        process = _process_of(self._source)
         try:
-            found = worker.ask(pickle.dumps(work))
+            answer = process.ask(work, what, limit_s)
         except BaseException:
             _processes.pop(self._source).end()
             raise
-        if isinstance(found, BaseException):
-            raise found
-        return found
+        if isinstance(answer, BaseException):
+            raise answer
+        return answer
 
 
-_processes: dict[str, Worker] = {}
+_processes: dict[str, ControllerProcess] = {}
 """Of this process's controllers, by source."""
 
 
-def _process_of(source: str) -> Worker:
+def _process_of(source: str) -> ControllerProcess:
     if source not in _processes:
-        with deaf_to_interrupt():
-            worker = _processes[source] = Worker()
+        process = _processes[source] = ControllerProcess()
         # Before this process waits for its children to end.
-        Finalize(None, worker.end, exitpriority=10)
+        Finalize(None, process.end, exitpriority=10)
     return _processes[source]
 
 
@@ -113,7 +110,6 @@ _controller: Guarded
 
 def _make(contender: Contender, period: float, keep_pace: bool) -> tuple[str, int]:
     global _controller
-    _end_with_parent()
     _controller = Guarded(contender, period, keep_pace)
     return _controller.name, int(getattr(_controller, "repetitions", 1))
 
@@ -126,16 +122,3 @@ def _act(measurement: Measurement, now: float) -> tuple[float, float]:
     began = time.perf_counter()
     answer = _controller.act(measurement, now)
     return checked_volts(answer, now), time.perf_counter() - began
-
-
-def _end_with_parent() -> None:
-    """End this process when the one that made it is gone, whatever the controller is at."""
-    parent = parent_process()
-    if parent is None or any(t.name == _end_with_parent.__name__ for t in threading.enumerate()):
-        return
-
-    def watch() -> None:
-        connection.wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch, name=_end_with_parent.__name__, daemon=True).start()

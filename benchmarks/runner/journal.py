@@ -1,8 +1,14 @@
-"""The journal of a run: one line a case, appended whole, so that a killed run loses nothing."""
+"""The journal of a run: one line a case, appended whole, so that a killed run loses nothing.
+
+A line is a JSON object whose last member is a CRC-32 of the line without it; lines of older
+journals have none and are read as they are.
+"""
 
 import json
 import os
+import re
 import time
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -58,6 +64,33 @@ SYNC_S = 2.0
 """How much of the work a crash of the machine may cost (s); a killed process costs none."""
 
 
+_CHECKSUM = re.compile(rb', "crc32": "([0-9a-f]{8})"}\s*$')
+
+
+def checked_line(row: bytes) -> bytes:
+    """A line of a journal.
+
+    Args:
+        row: a JSON object that has members.
+    """
+    return b'%s, "crc32": "%08x"}\n' % (row[:-1], zlib.crc32(row))
+
+
+def verified(line: bytes, number: int) -> bytes:
+    """The row of a line, without its checksum; that of an older journal as it is.
+
+    Raises:
+        ValueError: it is not what was written.
+    """
+    checksum = _CHECKSUM.search(line)
+    if checksum is None:
+        return line
+    row = line[: checksum.start()] + b"}"
+    if zlib.crc32(row) != int(checksum[1], 16):
+        raise ValueError(f"line {number} is not what was written: its checksum does not fit")
+    return row
+
+
 class Journal:
     """Appends rows to a file, each by one write.
 
@@ -82,7 +115,7 @@ class Journal:
         Raises:
             OSError: it could not be written whole, as on a full disk.
         """
-        line = (json.dumps(row, allow_nan=False) + "\n").encode()
+        line = checked_line(json.dumps(row, allow_nan=False).encode())
         written = os.write(self._file, line)
         if written != len(line):
             raise OSError(f"only {written} of {len(line)} bytes of a row could be written")
@@ -179,7 +212,7 @@ def read_rows(path: Path) -> Iterator[Row]:
     damaged: list[str] = []
     for number, line in _lines(path):
         try:
-            row = parse_json(line, f"line {number}", own=True)
+            row = parse_json(verified(line, number), f"line {number}", own=True)
         except ValueError as error:
             damaged.append(str(error))
             continue

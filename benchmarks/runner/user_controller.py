@@ -5,13 +5,13 @@ from collections import deque
 from pathlib import Path
 
 from benchmarks.runner.controller_spec import Contender, ControllerError, raised_at
-from benchmarks.runner.worker import begin_limited, end_limited
-from controllers.controller import Controller, Reference
+from controllers.controller import Reference
 from pma_gym.envs import Measurement, StationInfo
 
 MAKE_S, RESET_S, ACT_S = 60.0, 60.0, 2.0
-"""How long importing and making a controller, its `reset` and its `act` may take before the
-process is ended (s). A control period is far shorter: one late answer is forgiven, many are not."""
+"""How long importing and making a controller, its `reset` and its `act` may take before its
+process is ended (s); for classes from files, see `isolated_controller`. A control period is far
+shorter: one late answer is forgiven, many are not."""
 
 LATE_S = 1.0
 """Length of the part of a trial over which `act` must on average keep up with the clock (s)."""
@@ -38,7 +38,7 @@ class Guarded:
     """
 
     def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
-        self._controller = _made(contender)
+        self._controller = contender.make()
         self.name = str(getattr(self._controller, "name", contender.name))
         self._file, self._period, self._keep_pace = contender.path, period, keep_pace
         self._latest: deque[float] = deque(maxlen=max(1, round(LATE_S / period)))
@@ -53,15 +53,11 @@ class Guarded:
             ControllerError: it raised something; says what and where.
         """
         self._latest.clear()
-        begin_limited("reset", RESET_S)
         try:
             self._controller.reset(reference, station)
         except (Exception, SystemExit) as error:
-            raise self._told("reset", error, "before the trial") from error
-        finally:
-            end_limited()
+            raise self._error("reset", error, "before the trial") from error
 
-    # Written out: a context manager would cost as much as a simple controller takes.
     def act(self, measurement: Measurement, time: float) -> float:
         """Its `act`.
 
@@ -70,13 +66,10 @@ class Guarded:
             LateError: it cannot keep up with the clock.
         """
         began = _clock()
-        begin_limited("act", ACT_S)
         try:
             answer = self._controller.act(measurement, time)
         except (Exception, SystemExit) as error:
-            raise self._told("act", error, f"at {time:.4g} s") from error
-        finally:
-            end_limited()
+            raise self._error("act", error, f"at {time:.4g} s") from error
         self._latest.append(_clock() - began)
         if self._keep_pace and len(self._latest) == self._latest.maxlen:
             self._check_pace(sum(self._latest) / len(self._latest))
@@ -90,18 +83,10 @@ class Guarded:
                 "in reset what is known ahead, and less in act"
             )
 
-    def _told(self, method: str, error: BaseException, when: str) -> ControllerError:
-        """What it raised, in words that say where to mend it."""
+    def _error(self, method: str, error: BaseException, when: str) -> ControllerError:
+        """What it raised, in words that say where to fix it."""
         where = raised_at(error, Path(self._file)) or "outside its file"
         return ControllerError(f"{method} raised {type(error).__name__}: {error} ({where}, {when})")
-
-
-def _made(contender: Contender) -> Controller:
-    begin_limited(f"importing and making {contender.name}", MAKE_S)
-    try:
-        return contender.make()
-    finally:
-        end_limited()
 
 
 def probe(contender: Contender) -> str:
@@ -112,6 +97,6 @@ def probe(contender: Contender) -> str:
     Raises:
         ControllerError: it cannot be made.
     """
-    made = _made(contender)
+    made = contender.make()
     name = getattr(made, "name", "")
     return name.strip() if isinstance(name, str) else ""

@@ -30,7 +30,7 @@ from pma_gym.codegen.machine.control import (
     offset,
 )
 from pma_gym.codegen.machine.native import compiled, simd_lanes
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.engine.cpu.step_writer import Writer
 from pma_gym.integrator.integration import FUSED, memory
 
@@ -80,7 +80,7 @@ def core(operation: str) -> Prepared:
 
 
 def _module(operation: str) -> ir.Module:
-    module, lanes = ir.Module(), Lanes(simd_lanes())
+    module, lanes = ir.Module(), SimdEmitter(simd_lanes())
     b, (count, numbers) = function(module, "run", [("count", INTEGER), ("numbers", POINTER)])
     loaded = [lanes.load(b, numbers, i) for i in range(CHAINS + 2)]
     chains = [memory(b, lanes.real) for _ in range(CHAINS)]
@@ -112,7 +112,7 @@ def counted() -> tuple[Counter[str], int]:
         value.id: b.load(offset(b, given, i), typ=DOUBLE)
         for i, value in enumerate(writer.layout.slots)
     }
-    Lanes(1, fused=FUSED).emit(b, [*writer.layout.outputs, *writer.extra], known)
+    SimdEmitter(1, fused=FUSED).emit(b, [*writer.layout.outputs, *writer.extra], known)
     names = Counter(_name(instruction) for instruction in b.block.instructions)
     found: Counter[str] = Counter()
     for name, number in names.items():

@@ -18,9 +18,9 @@ class Occasional(NamedTuple):
     Attributes:
         name: the effect's, in the catalogue.
         share: probability that a station has it.
-        ranges: lowest and highest value of each of its parameters by name at the door; drawn
+        ranges: lowest and highest value of each of its parameters by name in files; drawn
             evenly between them, evenly in the logarithm if the highest is over 3 times the lowest.
-        tied: parameters that are another one times a factor, by name at the door.
+        tied: parameters that are another one times a factor, by name in files.
     """
 
     name: str

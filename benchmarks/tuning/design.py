@@ -35,8 +35,9 @@ from rich.progress import Progress
 from scipy.optimize import minimize
 from scipy.stats.qmc import LatinHypercube, scale
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_all
 from benchmarks.files import write_text
-from benchmarks.runner.processes import run_all
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.frozen import FrozenSuite, frozen_suite
 from benchmarks.suites.stations import draw_station
@@ -163,7 +164,7 @@ def run_design(
                 f"{search.name}: cost {result.first_cost:.3f} -> {result.cost:.3f}, {result.values}"
             )
 
-        complete = run_all([partial(design, search) for search in searches], jobs, keep)
+        complete = run_all([partial(design, search) for search in searches], local(jobs), keep)
     if not complete:
         print(f"Interrupted; {out} has what is done, run again to go on.", file=sys.stderr)
     return complete

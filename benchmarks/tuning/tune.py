@@ -41,9 +41,10 @@ import numpy as np
 from rich.progress import Progress
 from scipy.optimize import minimize
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_all
+from benchmarks.executors.failures import ProcessDied
 from benchmarks.files import write_text
-from benchmarks.runner.processes import run_all
-from benchmarks.runner.worker import ProcessDied
 from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import Cost
 from benchmarks.tuning.finished_rows import KeptRows, name_of
@@ -177,14 +178,14 @@ def _all_tuned(rows: list[Job], jobs: int, kept: KeptRows) -> bool:
                 if isinstance(result, ProcessDied):
                     raise TuneError(
                         f"row {name_of(order[index])}: {result}; the rows that are done are kept "
-                        f"in {kept.path}: mend it and run again to go on"
+                        f"in {kept.path}: fix it and run again to go on"
                     )
                 if isinstance(result, BaseException):
                     raise result
                 kept.keep(order[index], cast("tuple[Gains, float]", result))
                 progress.update(bar, advance=1)
 
-            return run_all([partial(tuned, row) for row in order], jobs, keep)
+            return run_all([partial(tuned, row) for row in order], local(jobs), keep)
     except KeyboardInterrupt:
         return False
 
@@ -221,7 +222,7 @@ def _rounded(value: float) -> float:
 
 
 def _tables(jobs: list[Job], results: list[tuple[Gains, float]]) -> dict[str, Any]:
-    """Gains at the door by loop, kind of task and controller."""
+    """Gains in file units by loop, kind of task and controller."""
     tables: dict[str, Any] = {}
     for job, (gains, cost) in zip(jobs, results, strict=True):
         kinds = tables.setdefault(job.loop, {}).setdefault(job.kind, {})

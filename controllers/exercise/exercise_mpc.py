@@ -194,7 +194,7 @@ def expected_moment(station: StationInfo, device: Resistance, times: Array) -> A
         K theta_i(t - reaction) + plan(theta_i(t - reaction - rise))
 
     theta_i is the ideal angle and the plan the moment that the exercise takes, as
-    `pma_gym.tasks.human` has them.
+    `pma_gym.tasks.operator` has them.
     """
     exercise = station.task.exercise
     assert exercise is not None

@@ -24,7 +24,7 @@ import numpy as np
 from controllers.models.contraction_inverse import ContractionInverse
 from controllers.models.muscle import Muscle
 from controllers.models.voltage import VOLTAGE_LIMIT
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.effects.drive.position_map import mapped_displacement
 from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model
@@ -207,7 +207,7 @@ class CascadeInverse:
     def _mapped(self, displacement: np.ndarray, pressure: float) -> np.ndarray:
         """Voltage of the static map at displacements (m); the edge of its dead zone at 0."""
         volts = np.linspace(0.0, VOLTAGE_LIMIT, 20001)
-        reached = lanes(mapped_displacement)(volts, pressure, self.parameters["position_map"])
+        reached = as_numpy(mapped_displacement)(volts, pressure, self.parameters["position_map"])
         first = max(0, int(np.argmax(reached > 0.0)) - 1)
         last = int(np.argmax(reached))
         return np.interp(displacement, reached[first : last + 1], volts[first : last + 1])

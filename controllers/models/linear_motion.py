@@ -97,7 +97,7 @@ def linear_motion(
     rest = plant.settle(held[0], regulator_voltage=held[1])
     times = station.period * np.arange(len(volts) + 1)
     states, zero = plant.run(
-        times, *(np.append(one, one[-1]) for one in commands), joined=False, condition=rest
+        times, *(np.append(one, one[-1]) for one in commands), interpolation="zoh", condition=rest
     )
     truth = plant.observe(states, zero)
     start = truth["contraction"][0]

@@ -28,9 +28,12 @@ class Muscle:
         effects = plant.model.effects
         # Memories of the way travelled are known exactly after it; the others have rates.
         self._paths = {
-            states.index(f"memory_{name}"): (effect.path, plant.model.parameters[name])
+            states.index(f"memory_{name}"): (
+                effect.rate_independent_law,
+                plant.model.parameters[name],
+            )
             for name, effect in effects.items()
-            if effect.path
+            if effect.rate_independent_law
         }
         memories = (i for i, name in enumerate(states) if name.startswith("memory_"))
         self._memories = [i for i in memories if i not in self._paths]

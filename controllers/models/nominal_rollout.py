@@ -39,7 +39,7 @@ def nominal_rollout(station: StationInfo, volts: np.ndarray) -> np.ndarray:
     commands = (other, held) if moves_regulator else (held, other)
     start = plant.settle(motor, regulator_voltage=regulator)
     times = station.period * np.arange(len(held))
-    states, zero = plant.run(times, *commands, joined=False, condition=start)
+    states, zero = plant.run(times, *commands, interpolation="zoh", condition=start)
     said = plant.lagged(states, plant.observe(states, zero))
     measured = said[:, [plant.outputs.index(n) for n in ("contraction", "rotation", "load")]].T
     measured[:2] -= measured[:2, :1]

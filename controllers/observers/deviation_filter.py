@@ -105,7 +105,7 @@ class DeviationFilter:
         self._stroke, self.cable = motion.stroke, Cable(motion.station)
         self.order = n = len(self._stroke.models[0].b)
         self.estimate, self._taken, self._seen = np.zeros(n + 2), 0, -1
-        self._plan = _Plan(motion)
+        self._plan = _NominalTrajectory(motion)
         self._pressure, self._line = PressureFilter(self._station), None
         if self._station.task.actuator == "regulator":
             self._line = self._station.model.parameters["regulator_line"]
@@ -301,7 +301,7 @@ class DeviationFilter:
             self.estimate[n] += beyond * self.held(self._taken)
 
 
-class _Plan:
+class _NominalTrajectory:
     """The nominal motion by the number of the control period: where, and by which voltage."""
 
     def __init__(self, motion: NominalMotion) -> None:

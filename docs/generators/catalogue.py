@@ -48,14 +48,14 @@ def _effect(effect: Effect, common: str) -> str:
     if effect.rate:
         label = "Its memory" if effect.law else "Its lag"
         parts.append(f"{label}: {_law(effect.rate)}")
-    if effect.path:
-        parts.append(f"Its memory, by the way travelled: {_law(effect.path)}")
-    if effect.switch:
-        parts.append(f"Steps end where this is 0: {_law(effect.switch)}")
-    if effect.bend:
-        parts.append(f"Steps end about where this is 0: {_law(effect.bend)}")
-    if effect.path_bend:
-        parts.append(f"Steps end about this far on: {_law(effect.path_bend)}")
+    if effect.rate_independent_law:
+        parts.append(f"Its memory, by the way travelled: {_law(effect.rate_independent_law)}")
+    if effect.event:
+        parts.append(f"Steps end where this is 0: {_law(effect.event)}")
+    if effect.breakpoint:
+        parts.append(f"Steps end about where this is 0: {_law(effect.breakpoint)}")
+    if effect.path_breakpoint:
+        parts.append(f"Steps end about this far on: {_law(effect.path_breakpoint)}")
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]

@@ -107,7 +107,7 @@ class _Words(Notation):
 
     def path(self, name: str, effect: Effect) -> str:
         """A memory of the way travelled, from where a step began."""
-        law = effect.path
+        law = effect.rate_independent_law
         assert law is not None
         way = self.travelled[0].text
         start = {"memory": f"{name}_0", "travel": f"{way} - {way}_0", "p": effect.name}

@@ -10,7 +10,7 @@ from generators.text import table
 from pma_gym.pages.document import TextTable, to_markdown
 from pma_gym.plant.model import load_model
 from pma_gym.studies.moment_ranges import check_moments
-from pma_gym.tasks import HUMAN_BOUNDS, PACED, PACING, Human, Population
+from pma_gym.tasks import OPERATOR_BOUNDS, PACED, PACING, Operator, Population
 
 
 def exercise_check() -> str:
@@ -46,8 +46,8 @@ def exercise_makers() -> str:
 def exercise_people() -> str:
     """What operators are drawn from, in the two sorts of exercise."""
     rows = [
-        [name, *(_between(people, name) for people in (PACED, PACING)), HUMAN_BOUNDS[name][2]]
-        for name in Human._fields
+        [name, *(_between(people, name) for people in (PACED, PACING)), OPERATOR_BOUNDS[name][2]]
+        for name in Operator._fields
         if name != "tremor_phase"
     ]
     return table(["Of the operator", "Speed prescribed", "Moment prescribed", "Unit"], rows)

@@ -15,6 +15,7 @@ from pma_gym.cli.discovery import diagnose, fit
 from pma_gym.cli.information import print_installation, print_model
 from pma_gym.cli.options import StrictTyper
 from pma_gym.cli.terminal import console, read, say
+from pma_gym.cli.watch import watch
 from pma_gym.data.files.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.data.trial_columns import SampleError
@@ -66,7 +67,9 @@ def simulate(
     plant = Plant(load_model(model))
     given = read(commands)
     try:
-        trial = plant.simulate(given, noise, seed, joined=hold is Hold.LINEAR)
+        trial = plant.simulate(
+            given, noise, seed, interpolation="foh" if hold is Hold.LINEAR else "zoh"
+        )
     except SampleError as error:
         raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:
@@ -105,6 +108,7 @@ app.command()(convert)
 app.command()(diagnose)
 app.command()(fit)
 app.command()(compare)
+app.command()(watch)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -11,7 +11,7 @@ in SIMD lanes; `native` compiles those for the processor and keeps the result, `
     >>> from pma_gym.effects.cable.cable import Cable, tension
     >>> from pma_gym.codegen.machine.control import INTEGER, POINTER, function, loop
     >>> from pma_gym.codegen.graph import CHANGING, Graph
-    >>> from pma_gym.codegen.machine.simd import Lanes
+    >>> from pma_gym.codegen.machine.simd import SimdEmitter
     >>> from pma_gym.codegen.machine.native import compiled
     >>> from pma_gym.codegen.trace import live_inputs, trace
 
@@ -22,7 +22,7 @@ in SIMD lanes; `native` compiles those for the processor and keeps the result, `
     ['stretch', 'rate', 'cable.stiffness', 'cable.damping', 'cable.slack']
 
     >>> def build():
-    ...     module, lanes = ir.Module(), Lanes(8)
+    ...     module, lanes = ir.Module(), SimdEmitter(8)
     ...     arguments = [("blocks", INTEGER), ("table", POINTER), ("data", POINTER)]
     ...     builder, (blocks, table, data) = function(module, "tension", arguments)
     ...     inputs = live_inputs([force])

@@ -42,11 +42,11 @@ def _rebind(
     return fresh
 
 
-def lanes(function: Callable) -> Callable:
+def as_numpy(function: Callable) -> Callable:
     """The same law for NumPy arrays.
 
     >>> from pma_gym.effects.arithmetic import clip
-    >>> lanes(clip)(np.array([-1.0, 0.5, 2.0]), 0.0, 1.0).tolist()
+    >>> as_numpy(clip)(np.array([-1.0, 0.5, 2.0]), 0.0, 1.0).tolist()
     [0.0, 0.5, 1.0]
     """
     return rebind(function, {"where": np.where, "exponential": np.exp})

@@ -115,7 +115,7 @@ class Trial:
             for quantity, values in group.items():
                 column = BY_QUANTITY.get(quantity)
                 name = column.name if column else quantity
-                # Only voltages have limits, and a volt at the door is a volt inside.
+                # Only voltages have limits, and a volt in a file is a volt inside.
                 check_values(name, values, column, place, "clip the command to that range")
 
     def _measured(self, quantity: str) -> NDArray[np.float64]:
@@ -157,5 +157,5 @@ def _frozen_group(
 
 
 def _names(quantities: Mapping[str, object]) -> str:
-    """Names at the door of what a mapping holds."""
+    """Names in files of what a mapping holds."""
     return ", ".join(BY_QUANTITY[quantity].name for quantity in quantities) or "no measurements"

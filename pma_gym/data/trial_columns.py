@@ -1,4 +1,4 @@
-"""The columns of a trial's file: name and unit at the door, kind and name inside."""
+"""The columns of a trial's file: name and unit in files, kind and name inside."""
 
 import difflib
 import reprlib
@@ -50,11 +50,11 @@ class Column:
     """One column.
 
     Attributes:
-        name: at the door, with unit.
-        unit: at the door.
+        name: in files, with unit.
+        unit: in files.
         kind: "time", "command" or "measurement".
         quantity: what a `Trial` calls it; in SI there.
-        limits: smallest and largest value at the door, where there are any.
+        limits: smallest and largest value in file units, where there are any.
         calibration: for a sensor's raw voltage, the line that decodes it.
     """
 
@@ -66,7 +66,7 @@ class Column:
     calibration: Calibration | None = None
 
     def to_si(self, door: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values in SI of values at the door."""
+        """Values in SI of values in file units."""
         if self.calibration is None:
             return door * SI_FACTORS[self.unit]
         values = self.calibration.from_volts(door)
@@ -74,7 +74,7 @@ class Column:
         return values - _first_measured(values) if self.quantity == "rotation" else values
 
     def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values at the door that `to_si` takes back to the same bits, where such values exist.
+        """Values in file units that `to_si` takes back to the same bits, where such values exist.
 
         The one with fewest digits is chosen, so that 25.3 mm is written 25.3; where no double at
         the door stands for exactly this one in SI, the result reads back 1 ulp off.

@@ -1,6 +1,7 @@
 """What a diagnosis says: verdict, where, which effects, how large, what gap they close."""
 
 import json
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -15,6 +16,16 @@ SCHEMA = 1
 """Version of `diagnosis.json`."""
 
 Array = NDArray[np.float64]
+
+
+def _renamed(of: object, old: str, new: str) -> Any:  # noqa: ANN401 - whatever it is
+    """The attribute by its new name, with a warning that says it."""
+    warnings.warn(
+        f"{type(of).__name__}.{old} is now {new}; read it by that name",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    return getattr(of, new)
 
 
 @dataclass(frozen=True)
@@ -213,18 +224,23 @@ class NextExperiment:
     """What to measure next.
 
     Attributes:
-        protocol: its name and settings in words.
+        excitation: its name and settings in words.
         separates: candidates that it tells apart.
         expected_odds: likelihood ratio to expect between the two that are hardest to tell.
         minutes: how long it takes.
         trial: its commands.
     """
 
-    protocol: str
+    excitation: str
     separates: tuple[str, ...]
     expected_odds: float
     minutes: float
     trial: Trial
+
+    @property
+    def protocol(self) -> str:
+        """Old name of `excitation`."""
+        return _renamed(self, "protocol", "excitation")
 
 
 @dataclass(frozen=True)
@@ -358,7 +374,7 @@ class Diagnosis:
         model: the amended model.
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
-        blind: effects that would not have shown in these data even at their usual size.
+        not_detectable: effects that these data would not have shown at their usual size.
         approximate: effects whose law is only approximate, and what they leave; None where there
             are none, or where they leave too much for their size to mean anything.
         law: the residual law, where the verdict is `unknown` or the law of an effect approximate,
@@ -391,7 +407,7 @@ class Diagnosis:
     model: Model
     given: Model
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
-    blind: tuple[str, ...] = ()
+    not_detectable: tuple[str, ...] = ()
     approximate: Approximate | None = None
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
@@ -406,6 +422,11 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     converged: bool = True
     worsened: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Old name of `not_detectable`."""
+        return _renamed(self, "blind", "not_detectable")
 
     def document(self) -> dict[str, Any]:
         """The content of `diagnosis.json`."""
@@ -440,14 +461,14 @@ class Diagnosis:
             "candidates": [vars(candidate) for candidate in self.candidates],
             "next_experiment": following
             and {
-                "protocol": following.protocol,
+                "protocol": following.excitation,
                 "separates": list(following.separates),
                 "expected_odds": following.expected_odds,
                 "minutes": following.minutes,
                 "file": "next.csv",
             },
             "not_identifiable": dict(self.not_identifiable),
-            "blind": list(self.blind),
+            "blind": list(self.not_detectable),
             "written": dict(self.written),
             "converged": self.converged,
             "worsened": {"signals": list(self.worsened[0]), "trials": list(self.worsened[1])},

@@ -11,9 +11,9 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.answer import answer
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.free_parameters import own_parameters
-from pma_gym.discovery.fitting.held_out import unseen
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors
 from pma_gym.discovery.preparation.data_checks import check_dataset
@@ -22,9 +22,13 @@ from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
 from pma_gym.discovery.preparation.splits import fold_of_rows
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.screening.residuals import left_over, relearnt
-from pma_gym.discovery.selection.backward_elimination import Fewest, as_given, fewest
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.residuals import reestimated_noise, simulated_less_measured
+from pma_gym.discovery.selection.backward_elimination import (
+    Elimination,
+    as_given,
+    backward_elimination,
+)
 from pma_gym.discovery.selection.forward_selection import Selection, select
 from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.rivals import rivals
@@ -79,7 +83,7 @@ def diagnose(
         >>> volts = 1.0 + np.clip(time - 0.5, 0.0, 2.0)
         >>> asked = Trial(time, {"motor_voltage": volts, "regulator_voltage": 0 * time + 6.0})
         >>> found = diagnose([Plant("serres2008").simulate(asked)], "serres2008", propose=False)
-        >>> found.verdict, "regulator_delay" in found.blind
+        >>> found.verdict, "regulator_delay" in found.not_detectable
         ('undecidable', True)
     """
     with linear_algebra_alone():
@@ -128,10 +132,10 @@ class _Work:
         journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named))
-        own = own_parameters(given)
+        own = free_parameters(given)
         _check_size(logged, own.free)
         noise = tuple(white_noise(floor.level) for floor in floors)
-        bench = Bench(
+        problem = FitProblem(
             trials,
             given,
             own,
@@ -141,16 +145,16 @@ class _Work:
             tuple(each.file or each.name for each in named),
         )
         self._tell("refitting parameters", 0, 1)
-        refitted = self._timed("parameters", lambda: self._refitted(bench, journal))
+        refitted = self._timed("parameters", lambda: self._refitted(problem, journal))
         orders = [each.order for each in named]
         known = None if None in orders else [float(order or 0.0) for order in orders]
-        every = suspects(given, known) if search else []
+        every = candidate_effects(given, known) if search else []
         selection = self._timed(
             "selection",
             lambda: (
-                select(bench, refitted, every, self.seed, journal, self._tell)
+                select(problem, refitted, every, self.seed, journal, self._tell)
                 if search
-                else _nothing(bench, refitted)
+                else _nothing(problem, refitted)
             ),
         )
         selection = self._timed("nested laws", lambda: self._nested(selection))
@@ -158,14 +162,16 @@ class _Work:
             named=tuple(named),
             given=given,
             floors=floors,
-            bench=bench,
+            problem=problem,
             refitted=selection.refitted,
             selection=selection,
-            suspects=tuple(every),
+            candidates=tuple(every),
             searched=search,
             seed=self.seed,
         )
-        found = replace(found, fewest=self._timed("fewest", lambda: _fewest(found)))
+        found = replace(
+            found, elimination=self._timed("fewest", lambda: _backward_elimination(found))
+        )
         found = _without_worse(found)
         found = self._timed("confirmation", lambda: self._confirmed(found))
         found = self._timed("adequacy", lambda: self._judged(found, logged))
@@ -192,11 +198,11 @@ class _Work:
             asked = check_dataset(asked, model, self.checks)
         return list(asked.trials), model, asked.checked or ()
 
-    def _refitted(self, bench: Bench, journal: Journal) -> Fitted:
-        found = bench.careful_fit(bench.given)
+    def _refitted(self, problem: FitProblem, journal: Journal) -> Fitted:
+        found = problem.careful_fit(problem.given)
         if found is None:
             raise ModelError(
-                f"model {bench.given.name} cannot be simulated on these trials: its muscle does "
+                f"model {problem.given.name} cannot be simulated on these trials: its muscle does "
                 "not balance the load where one begins, or it runs away; check the units of the "
                 "commands and the model's drive and force"
             )
@@ -207,55 +213,58 @@ class _Work:
         if not selection.chosen:
             return selection
         # Where all is determined it takes milliseconds, else a few fits: no step of its own.
-        less = nested(selection.bench, selection.fit, selection.chosen)
+        less = nested(selection.problem, selection.fit, selection.chosen)
         return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
 
-    def _confirmed(self, found: Findings) -> Findings:
+    def _confirmed(self, findings: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""
-        selection = found.selection
+        selection = findings.selection
         nearest = [
             tuple(
                 rivals(
-                    selection.bench,
+                    selection.problem,
                     selection.fit,
                     selection.chosen,
                     selection.stages[min(place, len(selection.stages) - 1)],
                     place,
-                    found.suspects,
+                    findings.candidates,
                 )
             )
             for place in range(len(selection.chosen))
         ]
-        left_out = unseen(
-            *found.proposed,
+        left_out = held_out_misfit(
+            *findings.proposed,
             selection.chosen,
             lambda done, total: self._tell("trials left out", done, total),
             judged=bool(selection.chosen),
         )
         without = (
-            unseen(selection.bench, found.refitted, (), judged=True)
+            held_out_misfit(selection.problem, findings.refitted, (), judged=True)
             if selection.chosen and left_out is not None
             else left_out
         )
-        return replace(found, rivals=tuple(nearest), unseen=left_out, unseen_without=without)
+        return replace(findings, rivals=tuple(nearest), unseen=left_out, unseen_without=without)
 
-    def _judged(self, found: Findings, logged: Sequence[Logged]) -> Findings:
+    def _judged(self, findings: Findings, logged: Sequence[Logged]) -> Findings:
         """With whether what the proposed model leaves of readings left out is noise."""
-        bench, fit = found.proposed
+        problem, fit = findings.proposed
         stated = Stated()
         if isinstance(self.asked, Dataset):
             stated = Stated(self.asked.tolerance, self.asked.standard_error)
-        floors = acceptance_floors(logged, found.named, stated)
-        evidence = bench.evidence(fit.model, found.selection.chosen)
-        held = evidence.readings(fit.values)
+        floors = acceptance_floors(logged, findings.named, stated)
+        whitened = problem.whitened_residuals(fit.model, findings.selection.chosen)
+        held = whitened.readings(fit.values)
         assert held is not None
-        fitted = Residual(held, left_over(evidence, held))
+        fitted = Residual(held, simulated_less_measured(whitened, held))
         unseen_ = None
-        if found.unseen is not None:
-            unseen_ = Residual(found.unseen.readings, left_over(evidence, found.unseen.readings))
-        folds = fold_of_rows(bench.trials, bench.files)
+        if findings.unseen is not None:
+            unseen_ = Residual(
+                findings.unseen.readings,
+                simulated_less_measured(whitened, findings.unseen.readings),
+            )
+        folds = fold_of_rows(problem.trials, problem.files)
         judged = adequacy(logged, unseen_, fitted, floors, folds, self.seed)
-        return replace(found, adequacy=judged)
+        return replace(findings, adequacy=judged)
 
     def _timed(self, step: str, work: Callable):  # noqa: ANN202
         begun = time.perf_counter()
@@ -268,33 +277,35 @@ class _Work:
             self.watcher(step, done, total)
 
 
-def _nothing(bench: Bench, refitted: Fitted) -> Selection:
-    """A selection from no suspects."""
-    noise = relearnt(bench, refitted, ())
-    return Selection((), (), refitted, replace(bench, noise=noise), refitted)
+def _nothing(problem: FitProblem, refitted: Fitted) -> Selection:
+    """A selection from no candidates."""
+    noise = reestimated_noise(problem, refitted, ())
+    return Selection((), (), refitted, replace(problem, noise=noise), refitted)
 
 
-def _without_worse(found: Findings) -> Findings:
+def _without_worse(findings: Findings) -> Findings:
     """With the model as it was given in place of a refit that fits its own readings worse."""
-    if found.selection.chosen:
-        return found
-    fit = found.proposed[1]
-    given = found.bench.sum_of_squares(found.given)
-    refitted = found.bench.sum_of_squares(fit.model)
+    if findings.selection.chosen:
+        return findings
+    fit = findings.proposed[1]
+    given = findings.problem.sum_of_squares(findings.given)
+    refitted = findings.problem.sum_of_squares(fit.model)
     if not refitted > given * (1.0 + 1e-9):
-        return found
-    return replace(found, fewest=as_given(found.selection.bench), discarded=(given, refitted))
+        return findings
+    return replace(
+        findings, elimination=as_given(findings.selection.problem), discarded=(given, refitted)
+    )
 
 
-def _fewest(found: Findings) -> Fewest | None:
+def _backward_elimination(findings: Findings) -> Elimination | None:
     """The parameters that are off, where effects were looked for and nothing speaks for one."""
-    selection = found.selection
+    selection = findings.selection
     if not selection.stages or selection.chosen:
         return None
     first = selection.stages[0]
-    if first.gate or first.missing or suspicious(found):
+    if first.gate or first.missing or suspicious(findings):
         return None
-    return fewest(selection.bench, selection.fit)
+    return backward_elimination(selection.problem, selection.fit)
 
 
 def _check_size(logged: Sequence[Logged], free: Sequence[str]) -> None:

@@ -8,6 +8,7 @@ from itertools import pairwise
 from types import MappingProxyType
 from typing import Any, get_type_hints
 
+from pma_gym.renamed_keywords import old_keywords
 from pma_gym.units import Quantity
 
 Value = float | tuple[float, ...]
@@ -16,6 +17,14 @@ Parameters = Any
 """An effect's parameters in SI: its own NamedTuple, which no annotation can name here."""
 
 
+@old_keywords(
+    {
+        "path": "rate_independent_law",
+        "path_bend": "path_breakpoint",
+        "switch": "event",
+        "bend": "breakpoint",
+    }
+)
 @dataclass(frozen=True)
 class Effect:
     """One phenomenon that a plant can have.
@@ -32,14 +41,14 @@ class Effect:
         law: what the effect contributes at its port; None for a part that the plant reads.
         rate: rate law of the memory, returning (source, decay) for memory' = source - decay *
             memory; None without memory. It may be fast: the integrator is implicit.
-        path: law of a memory that depends on the way travelled alone, not on time: its value after
-            `travel` without turning, from `memory`, `travel`, `direction` and `p`. Exact, so it
-            costs the integrator nothing; instead of `rate`.
-        path_bend: way (m) from where a travel begins, by `memory`, `direction` and `p`, to where
-            the path law curves otherwise; not above 0 where it does so nowhere. Steps end about
-            there.
-        switch: a signal at whose zero the law has a kink; steps end there.
-        bend: a signal at whose zero the law curves otherwise; steps end about there.
+        rate_independent_law: law of a memory that depends on the distance travelled alone, not on
+            time: its value after `travel` without turning, from `memory`, `travel`, `direction`
+            and `p`. Exact, so it costs the integrator nothing; instead of `rate`.
+        path_breakpoint: distance (m) from where a travel begins, by `memory`, `direction` and `p`,
+            to where the rate-independent law changes form; not above 0 where it does so nowhere.
+            Steps end close to it.
+        event: event function: a signal at whose zero the law has a kink; steps end there.
+        breakpoint: a signal at whose zero the law changes form smoothly; steps end close to it.
         signature: what sets the effect apart in measured data.
         memories: how many numbers the memory has. Of more than one, laws get `memory` as a tuple,
             and the rate law returns a (source, decay) for each.
@@ -56,10 +65,10 @@ class Effect:
     parameters: Any
     law: Callable | None = None
     rate: Callable | None = None
-    path: Callable | None = None
-    path_bend: Callable | None = None
-    switch: Callable | None = None
-    bend: Callable | None = None
+    rate_independent_law: Callable | None = None
+    path_breakpoint: Callable | None = None
+    event: Callable | None = None
+    breakpoint: Callable | None = None
     signature: str = ""
     memory_scale: float = 1.0
     memories: int = 1
@@ -119,7 +128,7 @@ class Effect:
 
     @cached_property
     def defaults(self) -> Mapping[str, float]:
-        """Values at the door of the parameters that need not be named, by their names there.
+        """Values in file units of the parameters that need not be named, by their names there.
 
         >>> from pma_gym.effects import CATALOGUE
         >>> dict(CATALOGUE["drive_dead_zone"].defaults)
@@ -132,7 +141,7 @@ class Effect:
         )
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:
-        """Parameters in SI from values by their names at the door; defaults for what has one.
+        """Parameters in SI from values by their names in files; defaults for what has one.
 
         Raises:
             ValueError: an unknown, missing or out-of-bounds parameter, naming all of it.
@@ -152,7 +161,7 @@ class Effect:
         return self.checked(self.parameters(**given))
 
     def changed(self, parameters: Parameters, values: Mapping[str, Value]) -> Parameters:
-        """The parameters, some of them given anew by their names at the door.
+        """The parameters, some of them given anew by their names in files.
 
         Raises:
             ValueError: an unknown or out-of-bounds parameter.
@@ -194,7 +203,7 @@ class Effect:
         return converted if many else converted[0]
 
     def at_the_door(self, parameters: Parameters) -> dict[str, Value]:
-        """Values by their names at the door: the inverse of `parse`."""
+        """Values by their names in files: the inverse of `parse`."""
         out: dict[str, Value] = {}
         for door, stem in self.names_at_the_door().items():
             value, quantity = getattr(parameters, stem), self.quantities[stem]
@@ -205,7 +214,7 @@ class Effect:
     @property
     def memory_names(self) -> tuple[str, ...]:
         """Names of the states that hold its memory: `memory_creep`, `memory_drive_delay_1`."""
-        if not (self.rate or self.path):
+        if not (self.rate or self.rate_independent_law):
             return ()
         name = f"memory_{self.name}"
         return (
@@ -216,7 +225,8 @@ class Effect:
 
     def laws(self) -> Iterator[Callable]:
         """The law and those beside it, where there are any."""
-        every = (self.law, self.rate, self.path, self.path_bend, self.switch, self.bend)
+        of_memory = (self.rate, self.rate_independent_law, self.path_breakpoint)
+        every = (self.law, *of_memory, self.event, self.breakpoint)
         yield from (law for law in every if law is not None)
 
 

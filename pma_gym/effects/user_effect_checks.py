@@ -66,8 +66,8 @@ def _parameters(effect: Effect, _module: ModuleType) -> str:
 def _functions(effect: Effect, module: ModuleType) -> str:
     if effect.law is None:
         return "has no law; give law=, a function"
-    if effect.rate and effect.path:
-        return "has a rate and a path; its memory can have one of them"
+    if effect.rate and effect.rate_independent_law:
+        return "has a rate and a rate_independent_law; its memory can have one of them"
     for law in effect.laws():
         if not isinstance(law, FunctionType):
             return f"has {law!r} for a law; write a plain function with def"
@@ -83,15 +83,15 @@ def _functions(effect: Effect, module: ModuleType) -> str:
 
 
 def _arguments(effect: Effect, _module: ModuleType) -> str:
-    memory = ("memory",) if effect.rate or effect.path else ()
+    memory = ("memory",) if effect.rate or effect.rate_independent_law else ()
     place, path = PLACES[effect.port].signals, ("memory", "travel", "direction")
     known = [
         (effect.law, (*place, *memory)),
         (effect.rate, (*EVERYTHING, "memory")),
-        (effect.path, path),
-        (effect.path_bend, ("memory", "direction")),
-        (effect.switch, (*STATES, "stretch")),
-        (effect.bend, (*STATES, "stretch")),
+        (effect.rate_independent_law, path),
+        (effect.path_breakpoint, ("memory", "direction")),
+        (effect.event, (*STATES, "stretch")),
+        (effect.breakpoint, (*STATES, "stretch")),
     ]
     for law, names in known:
         unknown = [name for name in signals(law) if name not in (*names, "p")] if law else []

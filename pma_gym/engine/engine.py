@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pma_gym.codegen.machine import arrays
 from pma_gym.codegen.machine.builtin import builtin
-from pma_gym.codegen.threads.thread_pool import Crew
+from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
 from pma_gym.engine.options import Options, Pressure
@@ -29,7 +29,7 @@ BEGUN_PARTS = 8
 """Parts of a thread's share of these."""
 
 _BEGINNING = 1
-"""The crew's second work; the first is a step."""
+"""The pool's second work; the first is a step."""
 
 
 class ActionError(ValueError):
@@ -47,7 +47,7 @@ class Engine(Episodes):
         options: the options, the same for all.
         count: how many environments.
         threads: how many threads step them.
-        single: march in single precision: faster, see `PMAVectorEnv`.
+        single: integrate in single precision: faster, see `PMAVectorEnv`.
         pressures: pressure of each, if they differ: as the option `pressure_kpa`, one each.
 
     Attributes:
@@ -88,7 +88,7 @@ class Engine(Episodes):
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._steps = self._parts(threads)
-        self._crew = Crew((address("step"), self._steps), (address("begin"), shares))
+        self._crew = ThreadPool((address("step"), self._steps), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:

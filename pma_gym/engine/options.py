@@ -6,7 +6,7 @@ import numbers
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, TypeGuard
+from typing import Any, Self, TypedDict, TypeGuard
 
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
@@ -17,12 +17,12 @@ from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,
-    HUMAN_BOUNDS,
     LOWEST_RATE_HZ,
+    OPERATOR_BOUNDS,
     RANDOMISATIONS,
     REWARDS,
     Disturbances,
-    Human,
+    Operator,
     Randomisation,
     Task,
     named_task,
@@ -37,7 +37,7 @@ class DefaultSteps(int):
     """A number of steps that follows from the options, not one that a user asked for."""
 
 
-HUMANS = ("random", "typical")
+OPERATORS = ("random", "typical")
 """Operators by name."""
 
 Pressure = float | Sequence[float] | str
@@ -72,7 +72,7 @@ class Options:
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
         human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
-            `pma_gym.tasks.Human` (which does not survive JSON).
+            `pma_gym.tasks.Operator` (which does not survive JSON).
         safety: whether an exercise has its safety layer between agent and regulator.
         tolerance: largest error of an internal step of the integrator, as a share of what the
             plant's states are counted against (`Plant`); a larger one is faster, a smaller one
@@ -94,7 +94,7 @@ class Options:
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
-    human: str | Human = "random"
+    human: str | Operator = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
     max_episode_steps: int | None = None
@@ -149,6 +149,28 @@ class Options:
         return whole if self.max_episode_steps is None else min(whole, self.max_episode_steps)
 
 
+class EnvironmentOptions(TypedDict, total=False):
+    """Types of the keyword arguments of environments, for editors; see `Options` for each."""
+
+    pressure_kpa: Pressure
+    model: str | Path | Model
+    control_rate_hz: float
+    preview: int
+    noise: bool
+    action_delay_s: float
+    observation_delay_s: float
+    history: int
+    reward: str | RewardFunction
+    reward_scale: float
+    randomisation: str | Randomisation
+    regulator_action: bool
+    disturbances: str
+    human: str | Operator
+    safety: bool
+    tolerance: float
+    max_episode_steps: int | None
+
+
 def parse_options(
     given: Mapping[str, Any], caller: str = "the environment", others: Sequence[str] = ()
 ) -> Options:
@@ -188,11 +210,11 @@ def parse_options(
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
-    if isinstance(options.human, Human):
-        check_human(options.human)
-    elif options.human not in HUMANS:
+    if isinstance(options.human, Operator):
+        check_operator(options.human)
+    elif options.human not in OPERATORS:
         raise ValueError(
-            f"human must be one of {', '.join(HUMANS)} or a pma_gym.tasks.Human, got "
+            f"human must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
             f"{options.human!r}"
         )
     check_pressure(options.pressure_kpa)
@@ -354,14 +376,14 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
         raise _unknown(what, value, names)
 
 
-def check_human(human: Human) -> None:
+def check_operator(human: Operator) -> None:
     """Refuse an operator whom nobody could be.
 
     Raises:
         ValueError: names the number, its range and unit, and what came.
     """
     for name, value in human._asdict().items():
-        lower, upper, unit = HUMAN_BOUNDS[name]
+        lower, upper, unit = OPERATOR_BOUNDS[name]
         _check_number(f"human.{name}", value, lower, upper, unit)
 
 

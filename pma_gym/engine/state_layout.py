@@ -7,7 +7,7 @@ from typing import Literal
 
 from pma_gym.codegen.graph import Kind, Value
 from pma_gym.engine.options import Options
-from pma_gym.tasks import PACE, Exercise, Human, MomentProfile, OperatorState, Task
+from pma_gym.tasks import PACE, Exercise, MomentProfile, Operator, OperatorState, Task
 
 Part = Literal["extension", "rotation", "load", "pressure"]
 PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
@@ -108,7 +108,7 @@ class StateLayout:
 
     @property
     def held(self) -> list[str]:
-        """What the march needs that stays during a control step."""
+        """What the integration needs that stays during a control step."""
         own = [START] if self.task.actuator == "regulator" else []
         return ["motor_voltage", "regulator_voltage", "zero_contraction", *own, *self.prescribed]
 
@@ -136,7 +136,7 @@ class StateLayout:
         if self.task.exercise is None:
             return []
         return [
-            *(f"human_{name}" for name in Human._fields),
+            *(f"human_{name}" for name in Operator._fields),
             "human_share",
             *self.plan,
             *NOMINAL_STATION,

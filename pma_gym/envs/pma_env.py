@@ -4,7 +4,7 @@ import copy
 import math
 from collections.abc import Callable, Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -16,6 +16,7 @@ from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.cpu.step_writer import BAD_ACTION
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import (
+    EnvironmentOptions,
     Pressure,
     check_known,
     check_named,
@@ -29,6 +30,8 @@ from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
 from pma_gym.envs.rendering.history import History
+from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
+from pma_gym.envs.rendering.window import Window
 from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
@@ -39,10 +42,13 @@ from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
 from pma_gym.renamed_names import renamed_attribute
-from pma_gym.tasks import Events, Human, Task
+from pma_gym.tasks import Events, Operator, Task
 
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
+
+OWN = ("task", "render_mode", "render_width")
+"""Keyword arguments of an environment beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa",)
 NOT_BEGUN = "no episode has begun"
@@ -71,8 +77,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     The motor's tasks begin with no load at a pressure that the regulator holds. The regulator's
     begin under a load that the motor holds (200, 150 and 400 N), by the voltage that the nominal
     drive needs for it; contraction counts from there. In an exercise the motor plays an operator
-    (`pma_gym.tasks.human`) with a leg on the lever, and the regulator resists him; a moment other
-    than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
+    (`pma_gym.tasks.operator`) with a leg on the lever, and the regulator resists him; a moment
+    other than 8 N m comes by name: `isotonic_exercise_6.5`. Drawn references come by number too:
     `displacement_speeds_17` is that of seed 17. A `Task` of one's own, such as
     `pma_gym.tasks.following` makes of a function, can be given instead of a name.
 
@@ -190,7 +196,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     Args:
         task: name of a task, or a Task.
-        render_mode: None or `rgb_array`.
+        render_mode: None; `rgb_array`: `render` returns a picture; or `human`: a window (pygame,
+            extra `view`) shows `reset` and every step at real time, until its user closes it.
+        render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: keyword arguments, see `Options`.
 
     Attributes:
@@ -212,19 +220,25 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         (0.01, 2.0, 0.91)
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 100}
+    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
 
+    _window: Window | None = None
     _index = 0
     """Its number in the engine."""
 
     def __init__(
-        self, task: str | Task = "displacement", render_mode: str | None = None, **options: Any
+        self,
+        task: str | Task = "displacement",
+        render_mode: str | None = None,
+        render_width: int = USUAL_WIDTH,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
         """Check the options and compile the plant."""
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
-        self.options = parse_options(options, "PMAEnv.__init__()", ("task", "render_mode"))
+        self.render_width = check_render_width(render_width)
+        self.options = parse_options(options, "PMAEnv.__init__()", OWN)
         self.task = parse_task(task, self.options)
         self._engine = Engine(self.task, self.options)
         self.observation_space = self._engine.table.space
@@ -238,7 +252,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     _ATTACHED = frozenset(
         {"nominal_plant", "table", "plant", "_offsets", "_row", "_measured", "_observed", "_given"}
-        | {"_made", "_datum", "_picture", "_advance"}
+        | {"_made", "_datum", "_picture", "_window", "_advance"}
     )
 
     def _attach(self) -> None:
@@ -253,6 +267,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         if callable(self.options.reward):
             self._made = self._rewarded(self._made)
         self._picture: Picture | None = None
+        self._window = None
+        if self.render_mode == "human":
+            self._window = Window(self.task.title)
+            self._made = self._watched(self._made)
         self._wait(self._idle)
 
     def _find_offsets(self) -> None:
@@ -287,6 +305,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(None)
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
+        if self._window is not None:
+            self._show(self._window)
+            # Drawing for the first time takes a while.
+            self._window.start()
         return self._observed.copy(), self._info()
 
     def step(
@@ -317,6 +339,30 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
         return advance
 
+    def _watched(self, made: Callable[[Any], Any]) -> Callable[[Any], Any]:
+        """A step that the window shows; that of an episode's end `_last` shows."""
+        window = self._window
+        assert window is not None
+
+        def advance(action: object) -> Any:  # noqa: ANN401 - as `Engine.advance` has it
+            result = made(action)
+            if type(result) is tuple and window.wait(self.time):
+                self._show(window)
+            return result
+
+        return advance
+
+    def _show(self, window: Window) -> None:
+        """Draw in the window, once the clock has come to the simulated time."""
+        window.wait(self.time)
+        if not window.closed:
+            window.show(self.picture())
+
+    @property
+    def window_closed(self) -> bool:
+        """Whether the window of `render_mode="human"` was closed, by its user or by `close`."""
+        return self._window is not None and self._window.closed
+
     def _otherwise(
         self, action: NDArray[np.floating], code: int
     ) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -340,6 +386,8 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(f"the episode ended at {self.time:g} s")
         info = last_info(self._engine, 0)
         self.ended_by = info["ended_by"]
+        if self._window is not None:
+            self._show(self._window)
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 
     def _info(self) -> dict[str, Any]:
@@ -493,11 +541,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return truth[self.task.protocol.quantity]
 
     @property
-    def human(self) -> Human | None:
+    def human(self) -> Operator | None:
         """The operator of this exercise; None without one, or before. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
-        return Human(*(self._number(f"human_{name}") for name in Human._fields))
+        return Operator(*(self._number(f"human_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
@@ -608,7 +656,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return episode_summary(self._engine, self._index)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """A picture of the station and of the trial so far, shape (400, 800, 3).
+        """A picture of the station and of the trial so far, RGB.
+
+        Returns:
+            Shape (render_width / 2, render_width, 3); None where a window shows it
+            (`render_mode="human"`).
 
         Raises:
             gymnasium.error.ResetNeeded: no episode has begun.
@@ -618,6 +670,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
                 "render() draws nothing without a render mode; make the environment with "
                 'render_mode="rgb_array"'
             )
+            return None
+        if self._window is not None:
+            if self._idle == NOT_BEGUN:
+                raise self._needs_reset("render()")
+            self._show(self._window)
             return None
         return self.picture()
 
@@ -636,12 +693,14 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
             # Imported here: an environment without pictures needs no matplotlib.
             from pma_gym.envs.rendering.picture import Picture
 
-            self._picture = Picture(self.task)
+            self._picture = Picture(self.task, self.render_width)
         return self._picture
 
     def close(self) -> None:
-        """Free the picture."""
+        """Free the picture and close the window."""
         self._picture = None
+        if self._window is not None:
+            self._window.close()
 
 
 def _no_step(_: object) -> int:

@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+import warnings
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 from pma_gym.effects.user_effects import source_of
 from pma_gym.engine.engine import Engine
 from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
 
 Setup = tuple[tuple[str, str], ...]
 """Names and values: the task, the options, the model's parameters."""
@@ -21,6 +23,15 @@ SINGLE = "a PMAEnv"
 FEW = 4
 """Differences that a message names."""
 
+_RENAMED = {
+    "Human": "Operator",
+    "Plan": "MomentProfile",
+    "Guard": "SafetyFilter",
+    "guard": "safety_filter",
+}
+"""Names of classes and fields in the texts of states that earlier versions saved."""
+
+_OLD_NAME = re.compile(rf"\b({'|'.join(_RENAMED)})(?=[{{:])")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -47,6 +58,24 @@ def setup(engine: Engine, **others: object) -> Setup:
     said |= _model(engine.nominal_model)
     said["numbers"] = " ".join(engine.state_layout.offsets)
     return tuple(said.items())
+
+
+def with_new_names(saved: Mapping[str, Any]) -> Setup:
+    """What a saved state was made with, old names in it replaced, with one deprecation warning.
+
+    >>> with_new_names({"human": "Operator{strength: 200.0}"})
+    (('human', 'Operator{strength: 200.0}'),)
+    """
+    texts = {str(name): str(value) for name, value in saved.items()}
+    new = {name: _OLD_NAME.sub(lambda old: _RENAMED[old[1]], text) for name, text in texts.items()}
+    if new != texts:
+        warnings.warn(
+            "the state was saved by an earlier version, with names that have changed; it is read; "
+            "to_json() of it saves it with the new names",
+            DeprecationWarning,
+            stacklevel=4,
+        )
+    return tuple(new.items())
 
 
 def differences(theirs: Setup, ours: Setup) -> str:
@@ -88,10 +117,15 @@ def _task(engine: Engine) -> dict[str, str]:
     said = {"task": task.name, "task.load": _text(task.load), "task.starts": _text(task.starts)}
     if task.exercise is not None:
         said["task.exercise"] = _text(task.exercise)
-    digest = hashlib.sha256(repr(task.structure).encode())
+    digest = hashlib.sha256(_structure(task).encode())
     digest.update(engine.table.references.tobytes())
     digest.update(engine._ideals.tobytes())
     return said | {"task.reference": f"{task.name} {digest.hexdigest()[:12]}"}
+
+
+def _structure(task: Task) -> str:
+    """What is compiled of a task as text, by the names that it was first written with."""
+    return repr(task.structure).replace("SafetyFilter(", "Guard(")
 
 
 def _model(model: Model) -> dict[str, str]:

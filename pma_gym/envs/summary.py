@@ -54,7 +54,7 @@ def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, 
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:
-    """RMSE of the true position at 384 Hz so far, at the door.
+    """RMSE of the true position at 384 Hz so far, in file units.
 
     Args:
         task: the task.
@@ -116,7 +116,7 @@ def exercise_offsets() -> list[str]:
 def exercise_summaries(
     numbers: Mapping[str, NDArray[np.float64]], counts: NDArray[np.int64], period: float
 ) -> dict[str, NDArray[np.float64]]:
-    """What exercises came to beside their RMSE, at the door.
+    """What exercises came to beside their RMSE, in file units.
 
     Args:
         numbers: of `exercise_offsets` by name, shape (m,) each.

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -17,6 +17,7 @@ from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import ActionError, Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import (
+    EnvironmentOptions,
     Pressure,
     check_count,
     check_known,
@@ -33,6 +34,7 @@ from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
 from pma_gym.envs.member import BatchMember
 from pma_gym.envs.rendering.history import RecordingEngine
+from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
 from pma_gym.envs.seeding import SeededByReset, own_seeds
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
@@ -44,7 +46,10 @@ from pma_gym.tasks import Task, limit_in_words
 if TYPE_CHECKING:
     from pma_gym.envs.rendering.picture import Picture
 
-OWN = ("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa", "render_mode")
+OWN = (
+    *("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa"),
+    *("render_mode", "render_width"),
+)
 """Keyword arguments of a batch beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa", "pressures_kpa", "reset_mask")
@@ -73,6 +78,7 @@ class PMAVectorEnv(
             rarely 1e-3 off, where rounding decides when friction lets go.
         pressures_kpa: pressures of each environment, in place of `pressure_kpa` for all.
         render_mode: None or `rgb_array`; a batch that renders keeps the course of every episode.
+        render_width: width of the pictures (pixels), a multiple of 4; they are half as high.
         options: as `PMAEnv`; a `reward` that is a function is called once for each environment.
 
     Attributes:
@@ -103,7 +109,8 @@ class PMAVectorEnv(
         precision: str = "double",
         pressures_kpa: Sequence[Pressure] | None = None,
         render_mode: str | None = None,
-        **options: Any,
+        render_width: int = USUAL_WIDTH,
+        **options: Unpack[EnvironmentOptions],
     ) -> None:
         """Check the options and compile."""
         num_envs, threads = plain_scalar(num_envs), plain_scalar(threads)
@@ -115,6 +122,7 @@ class PMAVectorEnv(
         if render_mode is not None:
             check_named("render_mode", render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode
+        self.render_width = check_render_width(render_width)
         self.num_envs = num_envs = int(num_envs)
         self.autoreset_mode = AutoresetMode(autoreset_mode)
         self.options = parse_options(options, "PMAVectorEnv.__init__()", OWN)
@@ -462,7 +470,10 @@ class PMAVectorEnv(
         return BatchMember(self, index % self.num_envs)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:  # type: ignore[override]
-        """A picture of every station and of its trial so far, shape (400, 800, 3) each.
+        """A picture of every station and of its trial so far, RGB.
+
+        Returns:
+            Shape (render_width / 2, render_width, 3) each.
 
         Raises:
             gymnasium.error.ResetNeeded: an environment has no episode yet.
@@ -480,13 +491,15 @@ class PMAVectorEnv(
             # Imported here: environments without pictures need no matplotlib.
             from pma_gym.envs.rendering.picture import Picture
 
-            self._picture = Picture(self.task)
+            self._picture = Picture(self.task, self.render_width)
         return self._picture
 
     def close_extras(self, **kwargs: Any) -> None:
         """Free the picture and end the threads."""
         self._picture = None
-        self.engine.close()
+        # Gymnasium 1.1 closes a batch whose options were refused too.
+        if hasattr(self, "engine"):
+            self.engine.close()
 
 
 def _few(indices: NDArray[np.int64]) -> str:

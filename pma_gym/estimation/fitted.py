@@ -16,7 +16,7 @@ class Round:
         number: rounds so far.
         trials: how many trials they use now.
         chi_square: the least sum of squared residuals over these so far.
-        values: its parameters by path, at the door.
+        values: its parameters by path, in file units.
     """
 
     number: int
@@ -31,11 +31,11 @@ class Fit:
 
     Attributes:
         model: the model with the fitted parameters.
-        values: them by path, at the door.
+        values: them by path, in file units.
         errors: their standard errors, by path: from the readings' noise, and where the model leaves
             more than noise unexplained, that much larger. Infinite for one that the trials do not
             determine; nan for one at a bound.
-        covariance: of the parameters, at the door, scaled as the errors, shape (p, p).
+        covariance: of the parameters, in file units, scaled as the errors, shape (p, p).
         chi_square: sum of squared residuals, in standard deviations of the readings.
         count: number of residuals.
         rounds: how many times the trials were simulated with all moves, few or all.

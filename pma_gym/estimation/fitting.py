@@ -23,8 +23,10 @@ from pma_gym.data.trial import Trial
 from pma_gym.estimation.fitted import Fit, Round
 from pma_gym.estimation.least_squares import inverse, least
 from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import Model
+from pma_gym.renamed_keywords import old_keywords
 
 __all__ = ["Fit", "Round", "fit"]
 
@@ -65,13 +67,14 @@ MOST_ROUNDS = 50
 _FIRST_DAMPING, _MOST_DAMPING = 1e-4, 1e12
 
 
+@old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
 def fit(
     model: Model,
     trials: Sequence[Trial],
     free: Sequence[str],
     threads: int = 1,
     tolerance: float = DEFAULT_TOLERANCE,
-    joined: bool = True,
+    interpolation: Interpolation = "foh",
     central: bool = False,
     progress: Callable[[Round], None] | None = None,
 ) -> Fit:
@@ -85,7 +88,8 @@ def fit(
         free: paths of the parameters that may change, `effect.parameter_unit`.
         threads: how many threads simulate.
         tolerance: of the integrator.
-        joined: whether commands are joined linearly; else each is held until the next.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
+            held until the next).
         central: move parameters both ways for differences, at twice the cost.
         progress: called after every round; what it raises ends the fit.
     Raises:
@@ -94,7 +98,7 @@ def fit(
     """
 
     def residuals(some: Sequence[Trial]) -> Residuals:
-        return Residuals(model, some, free, tolerance, joined, threads)
+        return Residuals(model, some, free, tolerance, interpolation, threads)
 
     with linear_algebra_alone():
         few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
@@ -120,7 +124,7 @@ class Search:
         before: a search over fewer trials, whose result is the start.
 
     Attributes:
-        values: the best so far, at the door, shape (p,).
+        values: the best so far, in file units, shape (p,).
         best: the sums there.
         damping: of the next step.
         rate: by which factor the last step lowered what the next one should gain.

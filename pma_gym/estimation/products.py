@@ -26,7 +26,7 @@ from pma_gym.codegen.machine.control import (
     real,
 )
 from pma_gym.codegen.machine.native import compiled
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.threads.sharing import share
 
 LANES = 8
@@ -118,7 +118,7 @@ _ADDRESSES = ("signals", "scratch", "out", "simulated", "measured", "weights")
 
 def _multiply(b: Builder, given: dict[str, Operand]) -> None:
     """Write the products of one job; sums stand behind the differences in its scratch memory."""
-    lanes = Lanes(LANES)
+    lanes = SimdEmitter(LANES)
     scratch, rows = given["scratch"], given["rows"]
     size = b.add(given["moved"], integer(1))
     pairs = b.sdiv(b.mul(size, b.add(size, integer(1))), integer(2))
@@ -149,7 +149,7 @@ def _before(b: Builder, row: Operand) -> Operand:
 
 
 def _differ(
-    b: Builder, lanes: Lanes, given: dict[str, Operand], first: Operand, size: Operand
+    b: Builder, lanes: SimdEmitter, given: dict[str, Operand], first: Operand, size: Operand
 ) -> None:
     """Write the differences of some rows into scratch memory, weighted."""
     rows = [b.add(first, integer(k)) for k in range(LANES)]

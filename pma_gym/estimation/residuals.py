@@ -18,6 +18,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
+from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.equilibrium import solver
@@ -54,7 +55,7 @@ class Sums:
 
     Attributes:
         chi_square: r.r; infinite where the model cannot be simulated.
-        gradient: J^T r, shape (p,), per unit at the door.
+        gradient: J^T r, shape (p,), per unit in files.
         curvature: J^T J, shape (p, p).
     """
 
@@ -77,12 +78,13 @@ class Residuals:
         trials: the trials, which need measurements.
         free: paths of the free parameters.
         tolerance: of the integrator, as `Plant`.
-        joined: whether commands are joined linearly; else each is held until the next.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
+            held until the next).
         threads: how many threads share the work; the results' bits do not depend on it.
 
     Attributes:
         free: the free parameters.
-        start: their values in the model, at the door, shape (p,).
+        start: their values in the model, in file units, shape (p,).
         count: number of residuals.
         deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
         trials: number of trials.
@@ -98,10 +100,12 @@ class Residuals:
         trials: Sequence[Trial],
         free: Sequence[str],
         tolerance: float = DEFAULT_TOLERANCE,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         threads: int = 1,
     ) -> None:
-        self.plant, self.joined, self.threads = Plant(model, tolerance), joined, threads
+        check_interpolation(interpolation)
+        self.plant, self.threads = Plant(model, tolerance), threads
+        self.interpolation: Interpolation = interpolation
         self.free = _free(self.plant.model, free)
         places = [parameter.place for parameter in self.free]
         self._factors = np.array([parameter.quantity.factor for parameter in self.free])
@@ -133,7 +137,7 @@ class Residuals:
         """Sums at parameters, with the Jacobian by finite differences.
 
         Args:
-            values: the parameters at the door, shape (p,).
+            values: the parameters in file units, shape (p,).
             steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
             central: move each both ways, which costs twice as much.
         """
@@ -221,7 +225,7 @@ class Residuals:
             runs, spaces = [], self._spaces(block, count)
             for i, space in zip(block, spaces, strict=True):
                 logged = self._trials[i]
-                columns = (logged.time, logged.motor, logged.regulator, self.joined)
+                columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
                 runs += [
                     Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
                     for k in range(count)

@@ -1,9 +1,9 @@
-"""States that only follow the others, such as a sensor's lag: stepped when these have been.
+"""Cascaded states: driven by the others without feedback, such as a sensor's lag; stepped last.
 
-A follower's rate is S - d y, with a decay d that is fixed for the model and a source S of the other
-states, none of which depends on it. Its equation is linear, and where the others are at a step's
-ends is known when its turn comes. So it takes two evaluations of its rate in place of the stages of
-the integrator, with as high an order.
+A cascaded state's rate is S - d y, with a decay d that is fixed for the model and a source S of the
+other states, none of which depends on it. Its equation is linear, and where the others are at a
+step's ends is known when its turn comes. So it takes two evaluations of its rate in place of the
+stages of the integrator, with as high an order.
 """
 
 from collections.abc import Mapping
@@ -22,8 +22,8 @@ more than the integrator's stages."""
 
 
 @dataclass(frozen=True)
-class Follower:
-    """A state that follows.
+class CascadedState:
+    """A state that the others drive and that drives none of them.
 
     Attributes:
         state: the state.
@@ -36,9 +36,9 @@ class Follower:
     drift: Value
 
 
-def followers(eq: Equations) -> list[Follower]:
-    """The states of a plant that follow."""
-    found = []
+def cascaded_states(eq: Equations) -> list[CascadedState]:
+    """The cascaded states of a plant."""
+    cascaded = []
     for i, state in enumerate(eq.states):
         if state.scale is None or _is_followed(eq, state):
             continue
@@ -51,24 +51,23 @@ def followers(eq: Equations) -> list[Follower]:
             if part is not None and other is not state:
                 drift = drift + part * other.rate
         if sum(operation_counts([drift], CHANGING).values()) <= DEAREST:
-            found.append(Follower(state, -slope, drift))
-    return found
+            cascaded.append(CascadedState(state, -slope, drift))
+    return cascaded
 
 
 def _is_followed(eq: Equations, state: State) -> bool:
     """Whether anything but itself depends on a state."""
     others = [other.rate for other in eq.states if other is not state]
-    paths = [path.after for path in eq.paths]
-    switches = [value for switch in eq.switches for value in (switch.value, switch.rate)]
-    bends = [value for bend in eq.bends for value in (bend.value, bend.rate)]
-    known = live_inputs([*others, *paths, *switches, *bends])
+    memories = [memory.after for memory in eq.rate_independent_states]
+    ends = [value for end in (*eq.events, *eq.breakpoints) for value in (end.value, end.rate)]
+    known = live_inputs([*others, *memories, *ends])
     return any(value is state.value for value in known)
 
 
-def followed(
-    follower: Follower, length: Value, start: Mapping[int, Value], end: Mapping[int, Value]
+def cascaded_step(
+    cascaded: CascadedState, length: Value, start: Mapping[int, Value], end: Mapping[int, Value]
 ) -> Value:
-    """A follower at the end of a step.
+    """A cascaded state at the end of a step.
 
         y1 = y0 + h / (1 + e / 2 + e^2 / 12)
                   ((g0 + g1) / 2 + e (g1 - g0) / 12 + h (S'0 - S'1) / 12),   e = h d
@@ -78,15 +77,15 @@ def followed(
     every d.
 
     Args:
-        follower: the follower.
+        cascaded: the cascaded state.
         length: the step's length h (s).
         start: what holds at the step's beginning, by id.
         end: what the other states are at its end, by id.
     """
-    state, twelfth = follower.state, length * (1.0 / 12.0)
-    first, before = substitute([state.rate, follower.drift], start)
-    last, after = substitute([state.rate, follower.drift], end)
-    way = length * follower.decay
-    mean = 0.5 * (first + last) + (follower.decay * twelfth) * (last - first)
+    state, twelfth = cascaded.state, length * (1.0 / 12.0)
+    first, before = substitute([state.rate, cascaded.drift], start)
+    last, after = substitute([state.rate, cascaded.drift], end)
+    way = length * cascaded.decay
+    mean = 0.5 * (first + last) + (cascaded.decay * twelfth) * (last - first)
     share = length / (1.0 + way * (0.5 + way * (1.0 / 12.0)))
     return state.value + share * (mean + twelfth * (before - after))

@@ -6,13 +6,17 @@ rates and events from here.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from pma_gym.codegen.derivative import derivative
 from pma_gym.codegen.graph import CHANGING, FIXED, HELD, Graph, Value
 from pma_gym.effects.effect import Parameters
 
+Interpolation = Literal["foh", "zoh"]
+"""Commands between two rows: first-order hold (linear in time) or zero-order hold (constant)."""
+
 COMMANDS = ("motor_voltage", "regulator_voltage")
-"""What a plant is told (V)."""
+"""Commands of a plant (V)."""
 
 ZERO = "zero_contraction"
 """Name of the contraction x0 at which a trial began with no load (m)."""
@@ -36,13 +40,13 @@ class State:
 
 
 @dataclass(frozen=True)
-class Path:
-    """A memory that depends on the way travelled alone.
+class RateIndependentState:
+    """A memory that depends on the distance travelled alone, not on time.
 
     Attributes:
         name: its name.
         value: the memory where the step began.
-        after: the memory after the way since then.
+        after: the memory after the distance since then.
         scale: what an error of it is counted against.
     """
 
@@ -53,7 +57,7 @@ class Path:
 
 
 @dataclass(frozen=True)
-class Switch:
+class Event:
     """A value at whose zero the right-hand side has a kink.
 
     Attributes:
@@ -73,7 +77,7 @@ class Switch:
 
 
 @dataclass(frozen=True)
-class Bend:
+class Breakpoint:
     """A value at whose zero a law curves otherwise: a step ends about there.
 
     Attributes:
@@ -91,52 +95,57 @@ class Equations:
     Args:
         parameters: parameters (named tuples) by the name of their effect; only how many there are
             matters here.
-        ramped: commands change linearly in time; else they are held.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear in time) or
+            "zoh" (zero-order hold).
 
     Attributes:
         graph: the graph of all values.
         parameters: the effects' parameters by name, as values.
-        ramped: commands change linearly in time.
+        interpolation: of the commands.
         named: values by name: states, commands, and whatever else has been given a name.
         states: the states that have rates, in the order of the state vector.
-        paths: the memories of the way travelled, which follow them there.
-        switches: where steps end.
-        bends: where they end about.
-        ways: how far the way of a step may go before a memory of it bends (m), where it begins.
+        rate_independent_states: memories of the distance travelled, which come after the states.
+        events: event functions at whose zeros steps end.
+        breakpoints: values near whose zeros steps end.
+        path_breakpoints: how far a step may travel before a rate-independent law changes form (m),
+            by what holds where the step begins.
         outputs: true outputs by name.
-        travelled: the state whose way they remember, and its rate.
-        travel: its way since the step began; None where nothing remembers it.
+        travelled: the state whose distance they depend on, and its rate.
+        travel: its distance since the step began; None where no law depends on it.
     """
 
-    def __init__(self, parameters: Mapping[str, Parameters], ramped: bool = False) -> None:
+    def __init__(
+        self, parameters: Mapping[str, Parameters], interpolation: Interpolation = "zoh"
+    ) -> None:
         self.graph = Graph()
         self.parameters = {
             name: self.graph.inputs(name, values, FIXED) for name, values in parameters.items()
         }
-        command = CHANGING if ramped else HELD
-        self.ramped = ramped
+        command = CHANGING if interpolation == "foh" else HELD
+        self.interpolation = interpolation
         self.named: dict[str, Value] = {
             ZERO: self.graph.input(ZERO, HELD),
             **{name: self.graph.input(name, command) for name in COMMANDS},
         }
         self.states: list[State] = []
-        self.paths: list[Path] = []
-        self.switches: list[Switch] = []
-        self.bends: list[Bend] = []
-        self.ways: list[Value] = []
+        self.rate_independent_states: list[RateIndependentState] = []
+        self.events: list[Event] = []
+        self.breakpoints: list[Breakpoint] = []
+        self.path_breakpoints: list[Value] = []
         self.travelled: tuple[Value, Value] | None = None
         self.travel: Value | None = None
         self.outputs: dict[str, Value] = {}
 
     def finish(self) -> None:
-        """Add the commands as states of constant rate, if they are ramped."""
-        for name in COMMANDS if self.ramped else ():
+        """Add the commands as states of constant rate, for a first-order hold."""
+        for name in COMMANDS if self.interpolation == "foh" else ():
             self.add_state(name, self.graph.input(f"{name}_slope", HELD), None)
 
     @property
-    def remembered(self) -> list[State | Path]:
+    def remembered(self) -> list[State | RateIndependentState]:
         """States and memories, without commands: the state vector."""
-        return [*(state for state in self.states if state.name not in COMMANDS), *self.paths]
+        by_rate = [state for state in self.states if state.name not in COMMANDS]
+        return [*by_rate, *self.rate_independent_states]
 
     def __getitem__(self, name: str) -> Value:
         """A value by name; a state where nothing else has the name."""
@@ -153,9 +162,9 @@ class Equations:
         """Add a state by its rate, and what an error of it is counted against."""
         self.states.append(State(name, self[name], self.graph.value(rate), scale))
 
-    def add_switch(self, name: str, value: Value, overshoot: float, turning: bool = False) -> None:
+    def add_event(self, name: str, value: Value, overshoot: float, turning: bool = False) -> None:
         """Add a value at whose zero steps end; all states must have been added."""
-        self.switches.append(Switch(name, value, self._slope(value), overshoot, turning))
+        self.events.append(Event(name, value, self._slope(value), overshoot, turning))
 
     def rate_of(self, value: Value) -> Value:
         """Rate of a state."""
@@ -169,3 +178,16 @@ class Equations:
             if slope is not None:
                 rate = rate + slope * state.rate
         return rate
+
+
+def check_interpolation(interpolation: str) -> None:
+    """Refuse what is no interpolation of commands.
+
+    Raises:
+        ValueError: says what there is.
+    """
+    if interpolation not in ("foh", "zoh"):
+        raise ValueError(
+            "interpolation must be 'foh' (commands linear in time between rows) or 'zoh' (each "
+            f"held until the next row), got {interpolation!r}"
+        )

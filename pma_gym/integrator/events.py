@@ -1,8 +1,9 @@
-"""Where a step ends because the equations are others beyond: switches, and bends of the laws.
+"""Event location: steps end where the rates have a kink, and near where a law changes form.
 
-At a switch a step ends exactly, or its order would be lost: what has passed one is tried anew. At a
-bend, where a law only curves otherwise, it ends about there, so that no step learns of it by being
-refused. Both are foreseen from where things stand and how fast they move as a step begins.
+At an event (a zero of an event function) a step ends exactly, or its order would be lost: a step
+that has passed one is rejected. At a breakpoint, where a law only changes form smoothly, it ends
+close to it, so that no step is rejected because of it. Both are predicted from where states stand
+and how fast they move as a step begins.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,58 +12,58 @@ from dataclasses import dataclass
 from pma_gym.codegen.generic import square_root, where
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.substitute import substitute
-from pma_gym.integrator.equations import Equations, State, Switch
+from pma_gym.integrator.equations import Equations, Event, State
 from pma_gym.integrator.exponential_rosenbrock import Step
 
 AIMED = 0.9995
-"""Share of a step behind which a switch has been aimed at."""
+"""Share of a step behind which an event has been aimed at."""
 
 BEYOND = 1.0001
-"""How far a step goes on to be surely past a switch, as a factor of the way there."""
+"""How far a step goes on to be surely past an event, as a factor of the way there."""
 
 PAST = 1.01
-"""Share of the rest of the way to a switch that is made."""
+"""Share of the rest of the way to an event that is made."""
 
 SHORT = 0.96
-"""Share of the way to a switch that is made first: the rest, foreseen anew, is known exactly."""
+"""Share of the way to an event that is made first: the rest, predicted anew, is known exactly."""
 
 CLOSE = 0.1
-"""A switch within this share of the proposed step is the end of the next."""
+"""An event within this share of the proposed step is the end of the next."""
 
-BEND = 1.02
-"""Share of the way to a bend that is made."""
+BREAKPOINT = 1.02
+"""Share of the way to a breakpoint that is made."""
 
 SPENT = 0.1
 """Share of the way by which a step may miss where the slide turns that is left of it where it has
 as good as turned."""
 
 NEGLIGIBLE = 0.05
-"""Bends within this share of the proposed step are not waited for."""
+"""Breakpoints within this share of the proposed step are not waited for."""
 
 LEAST_AIM_S = 3e-7
-"""No step is made shorter than this (s) to end at a switch."""
+"""No step is made shorter than this (s) to end at an event."""
 
 FAR_S = 1e9
-"""Time to a switch (s) where there is none."""
+"""Time to an event (s) where there is none."""
 
 
 @dataclass(frozen=True)
-class Ahead:
-    """What lies ahead of a step.
+class PredictedEvent:
+    """The next event or breakpoint ahead of a step.
 
     Attributes:
         length: how long a step may be (s).
-        landing: whether that takes it to a switch.
+        landing: whether that takes it to an event.
     """
 
     length: Value
     landing: Value
 
 
-def ahead(
+def predict_event(
     eq: Equations, size: Value, frozen: Mapping[int, Value], here: Mapping[int, Value]
-) -> Ahead | None:
-    """How long a step may be, as far as that can be foreseen; None where nothing lies ahead.
+) -> PredictedEvent | None:
+    """Predict how long a step may be; None where no event or breakpoint can lie ahead.
 
     Args:
         eq: the plant's equations.
@@ -70,7 +71,7 @@ def ahead(
         frozen: what is fixed for the step, by id.
         here: what holds at its beginning, by id.
     """
-    if not eq.switches and not eq.bends and not eq.ways:
+    if not eq.events and not eq.breakpoints and not eq.path_breakpoints:
         return None
     graph, begin = eq.graph, {**frozen, **here}
     along = graph.constant(1.0)
@@ -80,22 +81,22 @@ def ahead(
         begin[eq["direction"].id] = along = where(eq.travelled[1] < 0.0, -1.0, 1.0)
     considered: list[tuple[Value, Value, Value]] = []
 
-    def consider(is_ahead: Value, its_way: Value, its_speed: Value, is_switch: bool) -> None:
+    def consider(is_ahead: Value, its_way: Value, its_speed: Value, is_event: bool) -> None:
         far = (graph.constant(1.0), graph.constant(1.0 / FAR_S))
         way, speed = (where(is_ahead, a, b) for a, b in zip((its_way, its_speed), far, strict=True))
-        considered.append((way, speed, graph.constant(is_switch, "truth")))
+        considered.append((way, speed, graph.constant(is_event, "truth")))
 
-    for switch in eq.switches:
-        value, (rate,) = switch.value, substitute([switch.rate], begin)
-        coming = (value * rate < 0.0) & (abs(value) > switch.overshoot)
-        if switch.turning:
-            coming = (value * rate < 0.0) & ~turns(switch, value, rate)
+    for event in eq.events:
+        value, (rate,) = event.value, substitute([event.rate], begin)
+        coming = (value * rate < 0.0) & (abs(value) > event.overshoot)
+        if event.turning:
+            coming = (value * rate < 0.0) & ~turns(event, value, rate)
         consider(coming, abs(value), abs(rate), True)
-    for bend in eq.bends:
-        value, rate = substitute([bend.value, bend.rate], begin)
+    for breakpoint in eq.breakpoints:
+        value, rate = substitute([breakpoint.value, breakpoint.rate], begin)
         left = abs(value) > (NEGLIGIBLE * size) * abs(rate)
         consider((value * rate < 0.0) & left, abs(value), abs(rate), False)
-    for its_way in eq.ways:
+    for its_way in eq.path_breakpoints:
         # At the mean of the speeds here and there, with the acceleration as it is here.
         assert eq.travelled is not None
         (rate,) = substitute([eq.rate_of(eq.travelled[1])], begin)
@@ -108,8 +109,8 @@ def ahead(
     way, speed, exact = _soonest(considered)
     soon = way / speed
     landing = exact & (soon < CLOSE * size)
-    length = soon * where(landing, PAST, where(exact, SHORT, BEND))
-    return Ahead(where(length > LEAST_AIM_S, length, LEAST_AIM_S), landing)
+    length = soon * where(landing, PAST, where(exact, SHORT, BREAKPOINT))
+    return PredictedEvent(where(length > LEAST_AIM_S, length, LEAST_AIM_S), landing)
 
 
 def _soonest(considered: list[tuple[Value, Value, Value]]) -> tuple[Value, Value, Value]:
@@ -126,12 +127,12 @@ def _soonest(considered: list[tuple[Value, Value, Value]]) -> tuple[Value, Value
     return considered[0]
 
 
-def turns(switch: Switch, speed: Value, rate: Value) -> Value:
+def turns(event: Event, speed: Value, rate: Value) -> Value:
     """Whether what moves has as good as turned, by its speed and the rate of that."""
-    return (speed * rate < 0.0) & (speed * speed < (SPENT * switch.overshoot) * abs(rate))
+    return (speed * rate < 0.0) & (speed * speed < (SPENT * event.overshoot) * abs(rate))
 
 
-def passed(
+def locate_event(
     eq: Equations,
     leading: Sequence[State],
     made: Step,
@@ -140,9 +141,9 @@ def passed(
     here: Mapping[int, Value],
     moved: Mapping[int, Value],
 ) -> tuple[Value, Value]:
-    """Share of the step at which a switch is passed, and whether it may not be missed.
+    """Locate an event within a step: the share at which it is passed, and if it must not be missed.
 
-    The share is that of the last of the switches that are passed; the others come in turn.
+    The share is that of the last of the events that are passed; the others come in turn.
 
     Args:
         eq: the plant's equations.
@@ -156,49 +157,49 @@ def passed(
     graph = eq.graph
     missed = twice = graph.constant(False, "truth")
     start = rate = end = graph.constant(1.0)
-    for switch in eq.switches:
+    for event in eq.events:
         at_end, at_start, speed = (
-            *substitute([switch.value], {**frozen, **moved}),
-            switch.value,
-            *substitute([switch.rate], {**frozen, **here}),
+            *substitute([event.value], {**frozen, **moved}),
+            event.value,
+            *substitute([event.rate], {**frozen, **here}),
         )
-        if switch.turning:
+        if event.turning:
             sign = frozen[eq["direction"].id]
         else:
             still = where(speed < 0.0, -1.0, 1.0)
             sign = where(at_start > 0.0, 1.0, where(at_start < 0.0, -1.0, still))
-        twice = twice | _passed_twice(leading, switch, made, length, frozen, sign)
+        twice = twice | _passed_twice(leading, event, made, length, frozen, sign)
         beyond = -sign * at_end
         # Way beyond the point of turning, or penetration times its share of the step, by the speed
         # at which the parabola through both ends comes there.
-        over = beyond * beyond * (0.5 * length if switch.turning else 1.0)
+        over = beyond * beyond * (0.5 * length if event.turning else 1.0)
         coming = 2.0 * (at_end - at_start) - speed * length
-        is_passed = (beyond > 0.0) & (over > switch.overshoot * abs(coming))
-        if switch.turning:
+        is_passed = (beyond > 0.0) & (over > event.overshoot * abs(coming))
+        if event.turning:
             # As good as turned, it may go on as it did for longer than was thought.
             turns_late = sign * at_start < 0.0
-            twice = twice | (turns_late & (beyond * length > switch.overshoot))
+            twice = twice | (turns_late & (beyond * length > event.overshoot))
             is_passed = is_passed & ~turns_late
         missed = missed | is_passed
         start = where(is_passed, sign * at_start, start)
         rate = where(is_passed, sign * speed, rate)
         end = where(is_passed, sign * at_end, end)
     slope = rate * length
-    bend = end - start - slope
-    inside = slope * slope - 4.0 * bend * start
+    curvature = end - start - slope
+    inside = slope * slope - 4.0 * curvature * start
     root = square_root(where(inside > 0.0, inside, 0.0))
-    # The form of the solution that adds what has one sign: where a switch first moves off, from as
-    # good as zero, the difference of root and slope has no digit that is right, and may be zero.
+    # The form of the solution that adds what has one sign: where an event function first moves off,
+    # from as good as zero, the difference of root and slope has no right digit, and may be zero.
     off = slope > 0.0
-    share = where(off, root + slope, 2.0 * start) / where(off, -2.0 * bend, root - slope)
+    share = where(off, root + slope, 2.0 * start) / where(off, -2.0 * curvature, root - slope)
     # What lies in the last bit of the step has been aimed at: no step aims twice.
-    aimed = start + AIMED * (slope + AIMED * bend) >= 0.0
+    aimed = start + AIMED * (slope + AIMED * curvature) >= 0.0
     missed = (missed & ~aimed) | twice
     # From rest the way back may begin at once: 0 / 0, which is no share above 0.05. Whatever is
-    # not taken is tried again shorter, or it would be tried for ever.
+    # rejected is tried again shorter, or it would be tried for ever.
     share = where((end < 0.0) & ~aimed, where(share > 0.05, BEYOND * share, 0.05), 0.5)
     unseen, bent = _unseen(eq, leading, made, frozen, here, moved)
-    return where(unseen & ~missed, BEND * bent, share), missed | unseen
+    return where(unseen & ~missed, BREAKPOINT * bent, share), missed | unseen
 
 
 def _unseen(
@@ -209,15 +210,15 @@ def _unseen(
     here: Mapping[int, Value],
     moved: Mapping[int, Value],
 ) -> tuple[Value, Value]:
-    """Whether a bend lies behind the last stage, which no rate saw; and its share of the step."""
+    """Whether a breakpoint lies behind the last stage, seen by no rate; its share of the step."""
     graph, begin = eq.graph, {**frozen, **here}
     unseen, share = graph.constant(False, "truth"), graph.constant(1.0)
     stage = {s.value.id: value for s, value in zip(leading, made.visited[-1], strict=True)}
     courses = [
-        [substitute([bend.value], {**frozen, **at})[0] for at in ({}, stage, moved)]
-        for bend in eq.bends
+        [substitute([breakpoint.value], {**frozen, **at})[0] for at in ({}, stage, moved)]
+        for breakpoint in eq.breakpoints
     ]
-    for way in eq.ways:
+    for way in eq.path_breakpoints:
         assert eq.travelled is not None
         (first,) = substitute([way], begin)
         place, along = eq.travelled[0], frozen[eq["direction"].id]
@@ -235,18 +236,18 @@ def _unseen(
 
 def _passed_twice(
     leading: Sequence[State],
-    switch: Switch,
+    event: Event,
     made: Step,
     length: Value,
     frozen: Mapping[int, Value],
     sign: Value,
 ) -> Value:
-    """Whether a switch was passed and passed again on the way, such as by turning twice."""
-    least = switch.overshoot * (10.0 if switch.turning else 1.0)
-    found = []
+    """Whether an event was passed and passed again on the way, such as by turning twice."""
+    least = event.overshoot * (10.0 if event.turning else 1.0)
+    passed = []
     for states in made.visited:
         given = {state.value.id: value for state, value in zip(leading, states, strict=True)}
-        (there,) = substitute([switch.value], {**frozen, **given})
+        (there,) = substitute([event.value], {**frozen, **given})
         beyond = (-0.25 * sign) * there
-        found.append((beyond * length if switch.turning else beyond) > least)
-    return found[0] | found[1]
+        passed.append((beyond * length if event.turning else beyond) > least)
+    return passed[0] | passed[1]

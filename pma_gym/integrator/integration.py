@@ -1,7 +1,7 @@
-"""Marches many plants, each with steps of its own, in SIMD lanes.
+"""Integrate many plants at once, one per SIMD lane, each with its own adaptive step size.
 
-A lane that has come to the end of its span takes the next piece of work at once, so that lanes with
-short steps hold up nobody, and what becomes of a plant depends on no other.
+A lane at the end of its span takes the next piece of work at once, so that lanes with short steps
+delay no other, and the result of a plant depends on no other plant.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,9 +22,9 @@ from pma_gym.codegen.machine.control import (
     repeat,
     variable,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import split
-from pma_gym.integrator.step_attempt import Attempt
+from pma_gym.integrator.step_attempt import StepAttempt
 
 FUSED = True
 """Products and sums are rounded once, as IEEE 754 has it (fused multiply-add), and a sum's terms
@@ -51,7 +51,7 @@ class Layout:
     table: list[Value]
 
     @classmethod
-    def of(cls, attempt: Attempt, extra: Sequence[Value] = ()) -> "Layout":
+    def of(cls, attempt: StepAttempt, extra: Sequence[Value] = ()) -> "Layout":
         """The layout of an attempt, and of other values that are computed beside it."""
         outputs = [*attempt.states, attempt.next_size, attempt.next_left]
         both = [*outputs, *extra]
@@ -81,7 +81,7 @@ class Lane:
     """
 
     def __init__(
-        self, builder: Builder, lanes: Lanes, layout: Layout, own: Sequence[str] = ()
+        self, builder: Builder, lanes: SimdEmitter, layout: Layout, own: Sequence[str] = ()
     ) -> None:
         self.builder, self.lanes, self.layout = builder, lanes, layout
         self.at = {value.id: i for i, value in enumerate(layout.slots)}
@@ -89,7 +89,7 @@ class Lane:
         size = len(self.at) + len(own)
         self.memory = memory(builder, ir.ArrayType(lanes.real, size))
         self.jobs = memory(builder, ir.ArrayType(INTEGER, lanes.width))
-        self.one = Lanes(1, {8: "double", 4: "float"}[lanes.size], FUSED)
+        self.one = SimdEmitter(1, {8: "double", 4: "float"}[lanes.size], FUSED)
 
     def slot(self, what: Value | str) -> int:
         """Place of a value or of a number by name."""
@@ -167,15 +167,15 @@ def memory(builder: Builder, type_: ir.Type) -> Operand:
     return made
 
 
-def march(
+def integrate_lanes(
     lane: Lane,
-    attempt: Attempt,
+    attempt: StepAttempt,
     take: Callable[[Operand], Operand],
     proceed: Callable[[Operand], Operand],
     watch: Callable[[dict[int, Operand]], None] | None = None,
     extra: Sequence[Value] = (),
 ) -> Operand:
-    """Write the march.
+    """Write the integration loop.
 
     Args:
         lane: the lanes.

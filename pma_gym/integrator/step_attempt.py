@@ -1,4 +1,4 @@
-"""One attempt at a step: how long it is, whether it is good enough, how long the next should be."""
+"""Step-size control: a step attempt's length, whether it is accepted, the next one's length."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from pma_gym.codegen.generic import from_bits, to_bits, where
 from pma_gym.codegen.graph import CHANGING, FIXED, Value
 from pma_gym.codegen.substitute import substitute
 from pma_gym.codegen.trace import order
-from pma_gym.integrator.cascaded_states import followed, followers
+from pma_gym.integrator.cascaded_states import cascaded_states, cascaded_step
 from pma_gym.integrator.equations import Equations
-from pma_gym.integrator.events import ahead, passed, turns
+from pma_gym.integrator.events import locate_event, predict_event, turns
 from pma_gym.integrator.exponential_rosenbrock import step
 
 SAFETY = 0.8
@@ -18,35 +18,36 @@ SHRINK, GROW = 0.1, 6.0
 """How much smaller or larger the next attempt is than this one, at most."""
 
 LEAST_S = 1e-7
-"""A step of this length (s) is taken whatever its error."""
+"""A step of this length (s) is accepted whatever its error."""
 
 SHORTER = 0.999
-"""Largest share of its length at which a step that passed a switch is tried again: where no smaller
+"""Largest share of its length at which a step that passed an event is tried again: where no smaller
 one is found it is halved, or it would be tried for ever."""
 
 LOST = 1e20
-"""A step of the least length with such an error, or one that is no number, ends the span: what the
-states are then says that the trial was lost."""
+"""A step of the least length with such an error, or with one that is no number, ends the span: the
+integration stops, and states that are no numbers mark the trial as failed."""
 
 LANDED_S = 1.2e-4
-"""First step after a switch (s), at most: friction turns within some hundredths of a millimetre."""
+"""First step after an event (s), at most: friction turns within some hundredths of a millimetre."""
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """An attempt, as values.
+class StepAttempt:
+    """An attempt at a step, as values.
 
     Attributes:
         size: proposed size at its beginning (s), an input.
         left: time left until the end of the span (s), an input.
         tolerance: largest error of a step, as a share of the states' scales, an input.
-        taken: whether it is good enough.
+        accepted: whether its error is within the tolerance.
         length: how long it is (s).
         before: states and memories at its beginning, inputs.
-        moved: what states and memories are at its end if it is taken, by the id of what they were.
+        moved: what states and memories are at its end if it is accepted, by the id of what they
+            were.
         frozen: what is fixed for the step, by id.
         here: what holds at its beginning, by id.
-        states: states and memories after it, as they were if it is not good enough.
+        states: states and memories after it, as they were if it is rejected.
         next_size: proposed size of the next.
         next_left: time left after it.
     """
@@ -54,7 +55,7 @@ class Attempt:
     size: Value
     left: Value
     tolerance: Value
-    taken: Value
+    accepted: Value
     length: Value
     before: list[Value]
     moved: dict[int, Value]
@@ -65,7 +66,7 @@ class Attempt:
     next_left: Value
 
 
-def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
+def step_attempt(eq: Equations, positions: Mapping[str, float]) -> StepAttempt:
     """An attempt at a step of a plant.
 
     Args:
@@ -78,21 +79,21 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     tolerance = graph.input("tolerance", FIXED)
     # Two halves instead of a step and a scrap.
     length = where(left <= size, left, where(left < 2.0 * size, 0.5 * left, size))
-    frozen, here = beginning(eq)
+    frozen, here = step_start(eq)
     frozen = frozen | _signs(eq, frozen)
-    found, landing = ahead(eq, size, frozen, here), graph.constant(False, "truth")
-    if found is not None:
-        sooner = found.length < length
-        landing = found.landing & sooner
-        length = where(sooner, found.length, length)
-    behind = followers(eq)
-    leading = [s for s in eq.states if all(s is not follower.state for follower in behind)]
+    predicted, landing = predict_event(eq, size, frozen, here), graph.constant(False, "truth")
+    if predicted is not None:
+        sooner = predicted.length < length
+        landing = predicted.landing & sooner
+        length = where(sooner, predicted.length, length)
+    behind = cascaded_states(eq)
+    leading = [s for s in eq.states if all(s is not cascaded.state for cascaded in behind)]
     made = step(leading, length, frozen, here)
     moved = {s.value.id: new for s, new in zip(leading, made.states, strict=True)}
     ends = {**frozen, **moved}
-    for follower in behind:
-        new = followed(follower, length, {**frozen, **here}, ends)
-        moved[follower.state.value.id] = new
+    for cascaded in behind:
+        new = cascaded_step(cascaded, length, {**frozen, **here}, ends)
+        moved[cascaded.state.value.id] = new
     states = [moved[state.value.id] for state in eq.states]
     square = graph.constant(0.0)
     for state, error in zip(leading, made.errors, strict=True):
@@ -105,35 +106,38 @@ def attempt(eq: Equations, positions: Mapping[str, float]) -> Attempt:
     factor = SAFETY * _inverse_eighth_root(square, allowed)
     factor = where(factor > SHRINK, where(factor < GROW, factor, GROW), SHRINK)
     exact = square <= allowed
-    share, missed = passed(eq, leading, made, length, frozen, here, moved)
-    # What lies behind a switch is not needed: a step that passed it is not made anew beyond it.
+    share, missed = locate_event(eq, leading, made, length, frozen, here, moved)
+    # What lies beyond an event is not needed: a step that passed one is not made anew beyond it.
     share = where(share < SHORTER, share, 0.5)
     factor = where(missed & (exact | (share < factor)), share, factor)
-    taken = (exact & ~missed) | (length <= LEAST_S)
+    accepted = (exact & ~missed) | (length <= LEAST_S)
     proposed = length * factor
     # A step cut short by the end of the span says little against the size before.
-    cut = taken & (length < size) & (proposed < size)
-    after = substitute([path.after for path in eq.paths], {**frozen, **moved})
+    cut = accepted & (length < size) & (proposed < size)
+    after = substitute([memory.after for memory in eq.rate_independent_states], {**frozen, **moved})
     landed = where(size < LANDED_S, size, LANDED_S)
-    before = [state.value for state in eq.states] + [path.value for path in eq.paths]
-    return Attempt(
+    memories = eq.rate_independent_states
+    before = [state.value for state in eq.states] + [memory.value for memory in memories]
+    return StepAttempt(
         size=size,
         left=left,
         tolerance=tolerance,
-        taken=taken,
+        accepted=accepted,
         length=length,
         before=before,
         moved=moved,
         frozen=frozen,
         here=here,
-        states=[where(taken, new, old) for new, old in zip([*states, *after], before, strict=True)],
+        states=[
+            where(accepted, new, old) for new, old in zip([*states, *after], before, strict=True)
+        ],
         next_size=where(
-            landing & taken,
+            landing & accepted,
             landed,
             where(cut, size, where(proposed > LEAST_S, proposed, LEAST_S)),
         ),
         # States that are no numbers any more need no small steps to the end of the span.
-        next_left=where(taken, where(square < LOST, left - length, 0.0), left),
+        next_left=where(accepted, where(square < LOST, left - length, 0.0), left),
     )
 
 
@@ -151,23 +155,23 @@ def first_size(size: Any, jump: Any) -> Any:  # noqa: ANN401
 
 
 JUMP_S = 1e-3
-"""First attempt after a jump of 1 V (s): longer ones are refused more often than they save."""
+"""First attempt after a jump of 1 V (s): longer ones are rejected more often than they save."""
 
 
-def beginning(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
+def step_start(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
     """What is fixed for a step, and what holds at its beginning."""
     if eq.travelled is None:
         return {}, {}
     way, speed = eq.travelled
-    here = {path.after.id: path.value for path in eq.paths}
+    here = {memory.after.id: memory.value for memory in eq.rate_independent_states}
     if eq.travel is not None:
         here[eq.travel.id] = eq.graph.constant(0.0)
     (rate,) = substitute([eq.rate_of(speed)], here)
     onwards = where(rate < 0.0, -1.0, 1.0)
     direction = where(speed > 0.0, 1.0, where(speed < 0.0, -1.0, onwards))
-    for switch in eq.switches:
-        if switch.turning:
-            direction = where(turns(switch, speed, rate), onwards, direction)
+    for event in eq.events:
+        if event.turning:
+            direction = where(turns(event, speed, rate), onwards, direction)
     return {eq["origin"].id: way, eq["direction"].id: direction}, here
 
 
@@ -180,16 +184,16 @@ def _signs(eq: Equations, frozen: Mapping[int, Value]) -> dict[int, Value]:
     if eq.travelled is None:
         return {}
     speed, direction = eq.travelled[1], frozen[eq["direction"].id]
-    found = {}
+    signs = {}
     for value in order([state.rate for state in eq.states]):
         if value.operation not in ("less", "less_equal"):
             continue
         left, right = value.operands
         if left is speed and right.is_constant and right.data == 0.0:
-            found[value.id] = direction < 0.0
+            signs[value.id] = direction < 0.0
         elif right is speed and left.is_constant and left.data == 0.0:
-            found[value.id] = direction > 0.0
-    return found
+            signs[value.id] = direction > 0.0
+    return signs
 
 
 def _allowed(eq: Equations) -> Value:

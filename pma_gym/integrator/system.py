@@ -6,7 +6,7 @@ from pma_gym.codegen.graph import Value
 from pma_gym.codegen.substitute import substitute
 from pma_gym.integrator.equations import COMMANDS, Equations
 from pma_gym.integrator.integration import Layout
-from pma_gym.integrator.step_attempt import Attempt
+from pma_gym.integrator.step_attempt import StepAttempt
 
 
 @dataclass(frozen=True)
@@ -20,14 +20,14 @@ class System:
     """
 
     equations: Equations
-    attempt: Attempt
+    attempt: StepAttempt
     layout: Layout
 
 
-def at_rest(eq: Equations) -> dict[int, Value]:
+def step_start_values(eq: Equations) -> dict[int, Value]:
     """What paths and their direction are where a step begins, by id."""
-    here = {path.after.id: path.value for path in eq.paths}
-    if eq.travelled is not None and eq.paths:
+    here = {memory.after.id: memory.value for memory in eq.rate_independent_states}
+    if eq.travelled is not None and eq.rate_independent_states:
         here[eq["origin"].id] = eq.travelled[0]
     return here
 
@@ -35,14 +35,14 @@ def at_rest(eq: Equations) -> dict[int, Value]:
 def rates(eq: Equations) -> list[Value]:
     """Rates of states, then of memories of the way: their slope along it, times the speed."""
     from pma_gym.codegen.derivative import derivative
-    from pma_gym.integrator.step_attempt import beginning
+    from pma_gym.integrator.step_attempt import step_start
 
-    frozen, here = beginning(eq)
+    frozen, here = step_start(eq)
     own = [state.rate for state in eq.states if state.name not in COMMANDS]
     found = substitute(own, {**frozen, **here})
-    for path in eq.paths:
+    for memory in eq.rate_independent_states:
         assert eq.travelled is not None
-        (slope,) = derivative(path.after, [eq.travelled[0]])
+        (slope,) = derivative(memory.after, [eq.travelled[0]])
         assert slope is not None
         found.append(substitute([slope], frozen)[0] * eq.travelled[1])
     return found

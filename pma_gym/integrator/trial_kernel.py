@@ -15,13 +15,13 @@ from pma_gym.codegen.machine.control import (
     offset,
 )
 from pma_gym.codegen.machine.native import pairs
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.integrator.equations import COMMANDS, ZERO
-from pma_gym.integrator.integration import FUSED, Lane, march, memory
+from pma_gym.integrator.integration import FUSED, Lane, integrate_lanes, memory
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.integrator.system import System
 
-JOB = ("rows", "joined", "time", "motor", "regulator", "table", "start", "out")
+JOB = ("rows", "first_order_hold", "time", "motor", "regulator", "table", "start", "out")
 """Entries of a job of `simulate`: counts, then addresses. `start` holds the state vector, the size
 of the first step and the contraction x0; `out` takes the states, one row a time."""
 
@@ -44,7 +44,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         f"simulate_{width}",
         [("count", INTEGER), ("jobs", POINTER), ("taken", POINTER), ("attempts", POINTER)],
     )
-    lanes = Lanes(width, fused=FUSED, paired=pairs(width))
+    lanes = SimdEmitter(width, fused=FUSED, paired=pairs(width))
     lane = Lane(b, lanes, system.layout)
     rows = memory(b, ir.ArrayType(INTEGER, width))
     n = len(eq.remembered)
@@ -66,7 +66,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         ahead = b.add(row, integer(1))
         duration = b.fsub(at(job, "time", ahead), at(job, "time", row))
         lane.put(made.left, k, duration)
-        joined = b.icmp_signed("!=", entry(job, "joined"), integer(0))
+        linear = b.icmp_signed("!=", entry(job, "first_order_hold"), integer(0))
         start = address(job, "start")
         known = {eq[ZERO].id: b.load(offset(b, start, n + 1), typ=DOUBLE)}
         moved: Operand = ir.Constant(DOUBLE, 0.0)
@@ -74,7 +74,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             first, last = at(job, column, row), at(job, column, ahead)
             slope = b.fdiv(b.fsub(last, first), duration)
             known[eq.graph.input(f"{name}_slope", 1).id] = b.select(
-                joined, slope, ir.Constant(DOUBLE, 0.0)
+                linear, slope, ir.Constant(DOUBLE, 0.0)
             )
             lane.put(eq[name], k, first)
             # A trial begins settled at its first commands: nothing jumps there.
@@ -84,7 +84,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             moved = b.select(larger, moves, moved)
         size = lane.get(made.size, k)
         found = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
-        lane.put(made.size, k, b.select(joined, size, found[begun.id]))
+        lane.put(made.size, k, b.select(linear, size, found[begun.id]))
         lane.hold(k, known)
         b.store(row, offset(b, rows, k, INTEGER))
 
@@ -122,6 +122,6 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
                 b.store(take(k), goes_on)
         return b.load(goes_on, typ=ir.IntType(1))
 
-    made_ones = march(lane, made, take, proceed)
+    made_ones = integrate_lanes(lane, made, take, proceed)
     b.store(b.load(made_ones, typ=INTEGER), attempts)
     b.ret_void()

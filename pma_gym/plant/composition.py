@@ -14,7 +14,7 @@ from pma_gym.codegen.graph import Value
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
 from pma_gym.effects.effect import Parameters, signals
-from pma_gym.integrator.equations import Bend, Equations, Path
+from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, RateIndependentState
 
 LAG_SHARE = 5.0
 """Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
@@ -52,7 +52,7 @@ class PlantEquations(Equations):
     Args:
         effects: the model's effects by name.
         parameters: their parameters by name; only how many there are matters here.
-        ramped: commands change linearly in time; else they are held.
+        interpolation: of the commands between rows: "foh" (linear in time) or "zoh" (held).
 
     Attributes:
         effects: the model's effects by name.
@@ -62,9 +62,9 @@ class PlantEquations(Equations):
         self,
         effects: Mapping[str, Effect],
         parameters: Mapping[str, Parameters],
-        ramped: bool = False,
+        interpolation: Interpolation = "zoh",
     ) -> None:
-        super().__init__(parameters, ramped)
+        super().__init__(parameters, interpolation)
         self.effects = dict(effects)
 
     def at(self, port: str) -> list[Effect]:
@@ -86,21 +86,23 @@ class PlantEquations(Equations):
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
         """The memory of an effect; one of the way travelled, as far as the step has come."""
-        if effect.path is None:
+        if effect.rate_independent_law is None:
             values = tuple(self[name] for name in effect.memory_names)
             return values if effect.memories > 1 else values[0]
         (name,) = effect.memory_names
-        for path in self.paths:
-            if path.name == name:
-                return path.after
+        for known in self.rate_independent_states:
+            if known.name == name:
+                return known.after
         assert self.travelled is not None
         start, parameters = self[name], self.parameters[effect.name]
         direction = self["direction"]
         self.travel = self.travelled[0] - self["origin"]
-        after = trace(effect.path, start, self.travel, direction, parameters)
-        self.paths.append(Path(name, start, after, effect.memory_scale))
-        if effect.path_bend:
-            self.ways.append(trace(effect.path_bend, start, direction, parameters))
+        after = trace(effect.rate_independent_law, start, self.travel, direction, parameters)
+        state = RateIndependentState(name, start, after, effect.memory_scale)
+        self.rate_independent_states.append(state)
+        if effect.path_breakpoint:
+            distance = trace(effect.path_breakpoint, start, direction, parameters)
+            self.path_breakpoints.append(distance)
         return after
 
     def total(self, port: str) -> Value:
@@ -160,12 +162,12 @@ class PlantEquations(Equations):
         for name, rate in zip(effect.memory_names, rates, strict=True):
             self.add_decaying(name, rate, effect.memory_scale)
 
-    def add_bends(self) -> None:
+    def add_breakpoints(self) -> None:
         """Add the bends of the effects' laws; all states must have been added."""
         for effect in self.effects.values():
-            if effect.bend:
-                value = self.call(effect, effect.bend)
-                self.bends.append(Bend(value, self._slope(value)))
+            if effect.breakpoint:
+                value = self.call(effect, effect.breakpoint)
+                self.breakpoints.append(Breakpoint(value, self._slope(value)))
 
     def add_sensors(self, scales: Mapping[str, float]) -> None:
         """Add the lag of every sensor, by what an error of its output is counted against.

@@ -32,7 +32,7 @@ class ModelError(ValueError):
 
 @dataclass(frozen=True)
 class Note:
-    """What is known about a parameter's value, in its unit at the door.
+    """What is known about a parameter's value, in its unit in files.
 
     Attributes:
         source: where the value comes from.
@@ -98,7 +98,7 @@ class Model:
         }
 
     def replace(self, values: Mapping[str, Value], name: str | None = None) -> "Model":
-        """A model with other values, given by `effect.parameter_unit` in the unit at the door.
+        """A model with other values, given by `effect.parameter_unit` in the unit in files.
 
         Raises:
             ModelError: an unknown parameter (with the nearest known) or one out of bounds.
@@ -125,7 +125,7 @@ class Model:
         """A model with effects of the catalogue added; the order given does not matter.
 
         Args:
-            effects: values by effect and `parameter_unit`, in the unit at the door; or names
+            effects: values by effect and `parameter_unit`, in the unit in files; or names
                 alone. What is not given is as the model has it, else neutral: the effect is there
                 and does nothing.
             name: name of the new model; this one's if not given.
@@ -177,7 +177,7 @@ class Model:
             raise ModelError(str(error)) from error
 
     def at_the_door(self, effect: str) -> dict[str, Value]:
-        """One effect's values by their names at the door."""
+        """One effect's values by their names in files."""
         return CATALOGUE[effect].at_the_door(self.parameters[effect])
 
     def paths(self) -> Iterator[str]:

@@ -52,9 +52,9 @@ class Notation(PlantEquations):
         self.parameters: dict[str, Parameters] = {
             name: inputs(name, values) for name, values in model.parameters.items()
         }
-        self.ramped = False
+        self.interpolation = "zoh"
         self.named: Any = {name: names.input(name) for name in (*COMMANDS, ZERO)}
-        self.states, self.paths, self.switches = [], [], []
+        self.states, self.rate_independent_states, self.events = [], [], []
         self.outputs: Any = {}
         self.travelled: Any = None
         self.roads: dict[str, Effect] = {}
@@ -70,14 +70,14 @@ class Notation(PlantEquations):
 
     def memory(self, effect: Effect) -> Any:  # noqa: ANN401
         """The memory of an effect, where it stands."""
-        if effect.path is None:
+        if effect.rate_independent_law is None:
             return super().memory(effect)
         (name,) = effect.memory_names
         self.roads[name] = effect
         return self[name]
 
-    def add_switch(self, *_: Any, **__: Any) -> None:
+    def add_event(self, *_: Any, **__: Any) -> None:
         """Nothing: where steps end is no part of the equations."""
 
-    def add_bends(self) -> None:
+    def add_breakpoints(self) -> None:
         """Nothing, as for switches."""

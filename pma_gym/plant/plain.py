@@ -3,9 +3,9 @@
     plain = PlainPlant(Plant("station"))
     print(plain.text)                       # the arithmetic, line by line
     for made in plain.attempts(rest, motor_voltage=3.0, regulator_voltage=6.0, duration=0.01):
-        print(made.length, made.taken, made.state)
+        print(made.length, made.accepted, made.state)
 
-It makes the same attempts in the same order as the compiled march, some hundred times slower.
+It makes the same attempts in the same order as the compiled integration, some hundred times slower.
 Compiled code rounds a product and a sum at once (fused multiply-add) and adds first what is there
 first, so a step's numbers differ from it by a few units in the last place, and a long trial's by
 what those grow to.
@@ -33,15 +33,15 @@ class Made:
     Attributes:
         proposed: size that it was begun with (s).
         left: time that was left of the span (s).
-        taken: whether it was good enough.
-        length: how long it was (s); time passes only if it was taken.
+        accepted: whether its error was within the tolerance.
+        length: how long it was (s); time passes only if it was accepted.
         state: state vector after it (SI).
         size: proposed size of the next (s).
     """
 
     proposed: float
     left: float
-    taken: bool
+    accepted: bool
     length: float
     state: np.ndarray = field(repr=False)
     size: float
@@ -62,8 +62,8 @@ class PlainPlant:
 
     def __init__(self, plant: Plant) -> None:
         self.plant = plant
-        system, made = plant.program.held, plant.program.held.attempt
-        stepped = [*made.states, made.next_size, made.next_left, made.taken, made.length]
+        system, made = plant.program.zero_order_hold, plant.program.zero_order_hold.attempt
+        stepped = [*made.states, made.next_size, made.next_left, made.accepted, made.length]
         functions = {"rates": plant.program.rates(), "attempt": stepped}
         inputs = {name: live_inputs(values) for name, values in functions.items()}
         self.arguments = {name: [i.data for i in values] for name, values in inputs.items()}
@@ -106,9 +106,9 @@ class PlainPlant:
             left: time left (s).
         """
         known = self._known(state, commands, zero_contraction) | {"size": size, "left": left}
-        *after, following, _, taken, length = self._call("attempt", known)
+        *after, following, _, accepted, length = self._call("attempt", known)
         after = np.array(after, float)
-        return Made(size, left, bool(taken), float(length), after, float(following))
+        return Made(size, left, bool(accepted), float(length), after, float(following))
 
     def attempts(
         self,
@@ -124,7 +124,7 @@ class PlainPlant:
             given = (motor_voltage, regulator_voltage)
             made = self.attempt(condition.state, given, zero, condition.size, left)
             condition.state[:], condition.size = made.state, made.size
-            if made.taken:
+            if made.accepted:
                 left -= made.length
                 condition.time += made.length
             yield made

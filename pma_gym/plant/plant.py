@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from pma_gym.data.trial import Trial
+from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import OUTPUTS, CompiledModel
 from pma_gym.plant.condition import Condition, check_voltages
 from pma_gym.plant.equilibrium.solver import equilibrium_at
 from pma_gym.plant.simulation import Run, simulate_all
+from pma_gym.renamed_keywords import old_keywords
 
 if TYPE_CHECKING:
     import control
@@ -78,7 +80,7 @@ class Plant(CompiledModel):
             np.array([0.0, duration]),
             np.full(2, motor_voltage, float),
             np.full(2, regulator_voltage, float),
-            False,
+            "zoh",
             self.table,
             condition.state,
             condition.zero_contraction,
@@ -89,12 +91,13 @@ class Plant(CompiledModel):
         condition.size = run.size
         condition.time += duration
 
+    @old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
     def run(
         self,
         time: np.ndarray,
         motor_voltage: np.ndarray,
         regulator_voltage: np.ndarray,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         condition: Condition | None = None,
     ) -> tuple[np.ndarray, float]:
         """States at each time under given commands.
@@ -103,11 +106,13 @@ class Plant(CompiledModel):
             time: increasing times (s), shape (n,).
             motor_voltage: motor commands (V), shape (n,).
             regulator_voltage: regulator commands (V), shape (n,).
-            joined: join commands linearly between times; else hold each until the next.
+            interpolation: of the commands between rows: "foh" (first-order hold, linear) or
+                "zoh" (each held until the next).
             condition: where to begin; settled at the first commands if not given.
         Returns:
             States of shape (n, states) and the contraction x0 that extension counts from (m).
         """
+        check_interpolation(interpolation)
         first = condition or self.settle(
             float(motor_voltage[0]), regulator_voltage=float(regulator_voltage[0])
         )
@@ -115,7 +120,7 @@ class Plant(CompiledModel):
             np.asarray(time, float),
             np.asarray(motor_voltage, float),
             np.asarray(regulator_voltage, float),
-            joined,
+            interpolation,
             self.table,
             first.state,
             first.zero_contraction,
@@ -123,8 +128,13 @@ class Plant(CompiledModel):
         simulate_all(self.program, [run])
         return run.states, first.zero_contraction
 
+    @old_keywords({"joined": "interpolation"}, {"joined": {True: "foh", False: "zoh"}})
     def simulate(
-        self, trial: Trial, noise: bool = True, seed: int | None = 0, joined: bool = True
+        self,
+        trial: Trial,
+        noise: bool = True,
+        seed: int | None = 0,
+        interpolation: Interpolation = "foh",
     ) -> Trial:
         """Run a trial's commands and log what the station's sensors would.
 
@@ -133,7 +143,8 @@ class Plant(CompiledModel):
                 pressure_command.
             noise: sensor noise and the DAQ's quantisation; the sensors' lag stays either way.
             seed: seed of the noise.
-            joined: join commands linearly between rows; else hold each until the next.
+            interpolation: of the commands between rows: "foh" (first-order hold, linear) or
+                "zoh" (each held until the next).
         Returns:
             The trial with measurements and truth filled in.
         Raises:
@@ -141,7 +152,7 @@ class Plant(CompiledModel):
                 holds the value before it.
         """
         motor, regulator = sensors.voltages(self.model, trial)
-        states, zero = self.run(trial.time, motor, regulator, joined)
+        states, zero = self.run(trial.time, motor, regulator, interpolation)
         truth = self.observe(states, zero)
         generator = np.random.Generator(np.random.Philox(seed)) if noise else None
         measured = sensors.measure(self.model, self.lagged(states, truth), generator)

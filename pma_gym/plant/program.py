@@ -25,13 +25,13 @@ from pma_gym.codegen.machine.control import (
     real,
 )
 from pma_gym.codegen.machine.native import compiled, simd_lanes
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.substitute import substitute
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.effects.user_effects import source_of
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.integrator.integration import memory
-from pma_gym.integrator.system import System, at_rest, rates
+from pma_gym.integrator.system import System, rates, step_start_values
 from pma_gym.integrator.trial_kernel import write_simulate
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
@@ -95,14 +95,14 @@ class Program:
         return {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
 
     @cached_property
-    def held(self) -> System:
-        """The system with commands held."""
-        return system(self.model, ramped=False)
+    def zero_order_hold(self) -> System:
+        """The system with a zero-order hold of the commands."""
+        return system(self.model, "zoh")
 
     @cached_property
-    def ramped(self) -> System:
-        """The system with commands joined linearly."""
-        return system(self.model, ramped=True)
+    def first_order_hold(self) -> System:
+        """The system with a first-order hold of the commands."""
+        return system(self.model, "foh")
 
     @cached_property
     def equations(self) -> PlantEquations:
@@ -150,7 +150,7 @@ class Program:
 
         def build() -> Module:
             module = Module()
-            write_simulate(module, self.ramped, width)
+            write_simulate(module, self.first_order_hold, width)
             return module
 
         key = [f"trials {width}", *self.key()]
@@ -170,10 +170,10 @@ class Program:
 
     def _table(self, module: Module) -> None:
         """Everything that is fixed for a model, from its vector."""
-        fixed = self.ramped.layout.fixed
+        fixed = self.first_order_hold.layout.fixed
         b, (vector, out) = function(module, "table", [("vector", POINTER), ("out", POINTER)])
         # Without fused products: the table may be made in other ways, of the same bits.
-        found = Lanes(1).emit(b, fixed, self.parameters(b, vector, fixed))
+        found = SimdEmitter(1).emit(b, fixed, self.parameters(b, vector, fixed))
         for i, value in enumerate(fixed):
             b.store(found[value.id], offset(b, out, i))
         b.ret_void()
@@ -198,7 +198,7 @@ class Program:
             for i, name in enumerate(given):
                 where = b.add(b.mul(row, integer(len(given))), integer(i))
                 known[eq[name].id] = b.load(offset(b, inputs, where), typ=DOUBLE)
-            found = Lanes(1).emit(b, rates, known)
+            found = SimdEmitter(1).emit(b, rates, known)
             for i, rate in enumerate(rates):
                 where = b.add(b.mul(row, integer(len(rates))), integer(i))
                 b.store(found[rate.id], offset(b, out, where))
@@ -210,7 +210,7 @@ class Program:
 
     def _observe(self, module: Module) -> None:
         eq = self.equations
-        outputs = substitute(list(eq.outputs.values()), at_rest(eq))
+        outputs = substitute(list(eq.outputs.values()), step_start_values(eq))
         b, (count, states, zero, vector, out) = function(
             module,
             "observe",
@@ -223,7 +223,7 @@ class Program:
             for i, entry in enumerate(eq.remembered):
                 where = b.add(b.mul(row, integer(n)), integer(i))
                 known[entry.value.id] = b.load(offset(b, states, where), typ=DOUBLE)
-            found = Lanes(1).emit(b, outputs, known)
+            found = SimdEmitter(1).emit(b, outputs, known)
             for i, value in enumerate(outputs):
                 where = b.add(b.mul(row, integer(len(outputs))), integer(i))
                 b.store(found[value.id], offset(b, out, where))
@@ -281,7 +281,7 @@ def balanced(
     with loop(b, HALVINGS):
         a, c = b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE)
         middle = b.fmul(real(0.5), b.fadd(a, c))
-        found = Lanes(1).emit(b, [force], {**known, eq["contraction"].id: middle})[force.id]
+        found = SimdEmitter(1).emit(b, [force], {**known, eq["contraction"].id: middle})[force.id]
         pulls = b.fcmp_ordered(">", found, load)
         b.store(b.select(pulls, middle, a), low)
         b.store(b.select(pulls, c, middle), high)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from pma_gym.codegen.threads.sharing import share
+from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.integrator.trial_kernel import JOB
 from pma_gym.plant.program import FIRST_S, Program
 
@@ -22,7 +23,7 @@ class Run:
         time: increasing times (s), shape (rows,).
         motor: motor voltage at them (V), shape (rows,).
         regulator: regulator voltage at them (V), shape (rows,).
-        joined: commands are joined linearly; else each is held until the next.
+        interpolation: of the commands between rows: "foh" (linear) or "zoh" (held).
         table: what is fixed for the model (`Plant.table`).
         state: state vector at the first time.
         zero_contraction: contraction x0 that the trial began at with no load (m).
@@ -34,7 +35,7 @@ class Run:
     time: np.ndarray
     motor: np.ndarray
     regulator: np.ndarray
-    joined: bool
+    interpolation: Interpolation
     table: np.ndarray
     state: np.ndarray
     zero_contraction: float
@@ -54,7 +55,8 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
     Returns:
         How many attempts at internal steps were made, counting all lanes of a register as one.
     Raises:
-        ValueError: a table of another structure, or columns of different lengths.
+        ValueError: an unknown interpolation, a table of another structure, or columns of
+            different lengths.
     """
     wide = len(runs) >= FEW
     kernel = program.simulate_many if wide else program.simulate_one
@@ -77,7 +79,13 @@ def simulate_all(program: Program, runs: Sequence[Run], threads: int = 1) -> int
         if run.states.shape != (rows, count):
             run.states = np.empty((rows, count))
         given = map(address, (run.time, run.motor, run.regulator, run.table))
-        jobs[i] = (rows, run.joined, *given, where + i * apart, run.states.ctypes.data)
+        jobs[i] = (
+            rows,
+            run.interpolation == "foh",
+            *given,
+            where + i * apart,
+            run.states.ctypes.data,
+        )
         if rows == 1:
             run.states[0] = run.state
     # The longest first, so that the last lanes do not wait for one of them.
@@ -101,6 +109,7 @@ def processors() -> int:
 
 def _rows(program: Program, run: Run) -> int:
     """How many rows a run has, if it is one of the program's."""
+    check_interpolation(run.interpolation)
     rows, *others = len(run.time), len(run.motor), len(run.regulator)
     if others != [rows, rows]:
         found = sorted({rows, *others})

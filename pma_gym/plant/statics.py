@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.effects.effect import signals
 from pma_gym.plant.model import Model
 
@@ -25,7 +25,7 @@ def muscle_force(model: Model) -> Callable[[np.ndarray, np.ndarray], np.ndarray]
     for effect in model.effects.values():
         if effect.port == "muscle_force" and effect.law and "memory" not in signals(effect.law):
             names = signals(effect.law)
-            laws.append((lanes(effect.law), names, model.parameters[effect.name]))
+            laws.append((as_numpy(effect.law), names, model.parameters[effect.name]))
 
     def force(pressure: np.ndarray, contraction: np.ndarray) -> np.ndarray:
         total = np.zeros(np.broadcast(pressure, contraction).shape)

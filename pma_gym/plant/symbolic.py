@@ -72,7 +72,7 @@ class _Expressions(Notation):
         choices = {name: self._arithmetic[name] for name in ("where", "exponential")}
         rates = {}
         for name, effect in self.roads.items():
-            path = rebind(effect.path, choices)  # pyright: ignore[reportArgumentType]
+            path = rebind(effect.rate_independent_law, choices)  # pyright: ignore[reportArgumentType]
             after = path(self[name], travel, direction, self.parameters[effect.name])
             rates[name] = sympy.diff(after, travel).subs(travel, 0) * speed
         return rates

@@ -2,20 +2,21 @@
 
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.substitute import substitute
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.integrator.integration import Layout
-from pma_gym.integrator.step_attempt import attempt
-from pma_gym.integrator.system import System, at_rest
+from pma_gym.integrator.step_attempt import step_attempt
+from pma_gym.integrator.system import System, step_start_values
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import PLANTS, Model
 
 
-def system(model: Model, ramped: bool) -> System:
-    """A model's equations and step; with `ramped`, commands change linearly in time."""
+def system(model: Model, interpolation: Interpolation) -> System:
+    """A model's equations and step; commands are interpolated by first- or zero-order hold."""
     plant = PLANTS[model.plant]
-    equations = PlantEquations(model.effects, model.parameters, ramped)
+    equations = PlantEquations(model.effects, model.parameters, interpolation)
     plant.write_equations(equations)
     equations.finish()
-    made = attempt(equations, plant.POSITIONS)
+    made = step_attempt(equations, plant.POSITIONS)
     return System(equations, made, Layout.of(made))
 
 
@@ -24,6 +25,6 @@ def static_force(eq: PlantEquations) -> Value:
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
     memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
-    here = at_rest(eq) | {eq["velocity"].id: nothing}
+    here = step_start_values(eq) | {eq["velocity"].id: nothing}
     (first,) = substitute([force], here)
     return substitute([first], memories | {eq["velocity"].id: nothing})[0]

@@ -183,7 +183,7 @@ def _note(phase: Phase, grid: NDArray[np.float64], time: NDArray[np.float64]) ->
 
 
 def _figures(row: Evaluation) -> list[tuple[str, str]]:
-    """Labels and figures of the row, in the task's unit at the door."""
+    """Labels and figures of the row, in the task's unit in files."""
     line, unit = row.regression, row.protocol.unit
     factor = SI_FACTORS[unit]
     chance = "<0.0001" if row.p_value < 1e-4 else f"{row.p_value:.4f}"

@@ -1,5 +1,6 @@
 """Tasks: what to follow, what it is worth, when it ends, what is drawn and what disturbs."""
 
+from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks.disturbances import DISTURBANCES, PULSE_S, Disturbances, Events
 from pma_gym.tasks.exercise import LOWEST_RATE_HZ, PACE, PLAN_ANGLES, Exercise
 from pma_gym.tasks.exercises import (
@@ -10,18 +11,18 @@ from pma_gym.tasks.exercises import (
     numbered_exercise,
 )
 from pma_gym.tasks.follow import infeasibility_reason
-from pma_gym.tasks.human import (
-    HUMAN_BOUNDS,
+from pma_gym.tasks.isotonic import ISOTONIC, isotonic, pressure_triangle
+from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words, unsafe
+from pma_gym.tasks.operator import (
+    OPERATOR_BOUNDS,
     PACED,
     PACING,
-    Human,
     MomentProfile,
+    Operator,
     OperatorState,
     Population,
     moment_profile,
 )
-from pma_gym.tasks.isotonic import ISOTONIC, isotonic, pressure_triangle
-from pma_gym.tasks.limits import LIMITS, broken, broken_limit, limit_in_words, unsafe
 from pma_gym.tasks.randomisation import (
     CORNERS,
     FORCE_TOLERANCE,
@@ -62,7 +63,7 @@ __all__ = [
     "EXERCISES",
     "FORCE_TOLERANCE",
     "GAUSSIAN_END",
-    "HUMAN_BOUNDS",
+    "OPERATOR_BOUNDS",
     "ISOTONIC",
     "LIMITS",
     "LOWEST_RATE_HZ",
@@ -81,7 +82,7 @@ __all__ = [
     "Disturbances",
     "Events",
     "Exercise",
-    "Human",
+    "Operator",
     "OperatorState",
     "MomentProfile",
     "Population",
@@ -117,3 +118,7 @@ __all__ = [
     "unsafe",
     "varied_station",
 ]
+
+__getattr__ = renamed_names(
+    __name__, {"Human": Operator, "Plan": MomentProfile, "Mind": OperatorState}
+)

@@ -1,7 +1,7 @@
 """An exercise: an operator turns the joint, the regulator sets what he works against.
 
-The motor plays the operator (`pma_gym.tasks.human`): out to 90 deg in 5 s, 5 s there, back in 5 s,
-as in the dissertation's rotation. What the device is to do is prescribed:
+The motor plays the operator (`pma_gym.tasks.operator`): out to 90 deg in 5 s, 5 s there, back in
+5 s, as in the dissertation's rotation. What the device is to do is prescribed:
 
     isokinetic    hold the joint's speed at 18 deg/s whatever the operator's effort
     isotonic      hold the moment at the joint
@@ -18,7 +18,7 @@ Source:
 from dataclasses import dataclass
 
 from pma_gym.data.protocol import ROTATION
-from pma_gym.tasks.human import MomentProfile, Population
+from pma_gym.tasks.operator import MomentProfile, Population
 from pma_gym.tasks.safety_filter import SafetyFilter
 from pma_gym.units import SI_FACTORS
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from pma_gym.data.protocol import ROTATION, Phase, Protocol
 from pma_gym.tasks.exercise import PACE, SAFE_MOMENT, Exercise
-from pma_gym.tasks.human import PACED, PACING, moment_profile
+from pma_gym.tasks.operator import PACED, PACING, moment_profile
 from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING
 from pma_gym.tasks.task import TASKS, Task
 from pma_gym.units import SI_FACTORS

@@ -7,7 +7,7 @@ from llvmlite import ir
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.machine.control import INTEGER, POINTER, function, integer, loop
 from pma_gym.codegen.machine.native import Library
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs, trace
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import signals
@@ -146,7 +146,7 @@ def columns_module(outputs, inputs, lanes):
 def run(outputs, given, width=1, real="double", fused=False, paired=False):
     """Compiled outputs for arrays by name, of a length that the width divides."""
     inputs = live_inputs(outputs)
-    lanes = Lanes(width, real, fused, paired)
+    lanes = SimdEmitter(width, real, fused, paired)
     library = Library(columns_module(outputs, inputs, lanes))
     call = library.function("run", [ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p])
     type_ = {"double": np.float64, "float": np.float32}[real]

@@ -9,7 +9,7 @@ from llvmlite import ir
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.machine.control import INTEGER, POINTER, integer
 from pma_gym.codegen.machine.ptx import kernel, ptx, thread_count, thread_index
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.random import normals, philox
 from pma_gym.codegen.trace import live_inputs, operation_counts, trace
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION, friction_force
@@ -46,7 +46,7 @@ def friction():
 
 
 def test_strict_text_rounds_every_operation(friction):
-    text = text_of(friction, Lanes())
+    text = text_of(friction, SimdEmitter())
     assert ".visible .entry run(" in text
     assert ".target sm_90" in text
     assert all(name in text for name in ("%ctaid.x", "%ntid.x", "%tid.x"))
@@ -61,7 +61,8 @@ def test_strict_text_rounds_every_operation(friction):
 
 def test_fused_and_single_text(friction):
     fused, single = (
-        instructions(text_of(friction, lanes)) for lanes in (Lanes(fused=True), Lanes(real="float"))
+        instructions(text_of(friction, lanes))
+        for lanes in (SimdEmitter(fused=True), SimdEmitter(real="float"))
     )
     assert fused["fma.rn.f64"] > 0
     assert single["div.rn.f32"] > 0 and single["fma.rn.f32"] == 0
@@ -71,7 +72,7 @@ def test_fused_and_single_text(friction):
 def test_random_numbers_call_no_library():
     graph = Graph()
     counter = tuple(graph.input(name, CHANGING, "integer") for name in "abcd")
-    text = text_of(list(normals(philox(counter, (1, 2)))), Lanes())
+    text = text_of(list(normals(philox(counter, (1, 2)))), SimdEmitter())
     assert "call" not in text and ".extern" not in text
     assert instructions(text)["sqrt.rn.f64"] == 2
 

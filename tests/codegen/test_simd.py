@@ -21,7 +21,7 @@ from pma_gym.codegen.machine.control import (
     variable,
 )
 from pma_gym.codegen.machine.native import Library, assembly
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.text import evaluate
 
 WIDTHS = [1, 2, 8, 16]
@@ -84,7 +84,7 @@ def test_variables_made_in_a_loop_are_set_aside_once():
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_lanes_are_loaded_spread_and_stored(width):
-    lanes = Lanes(width)
+    lanes = SimdEmitter(width)
 
     def write(builder, given, into):
         lanes.store(builder, lanes.load(builder, given, 1), into, 0)
@@ -108,7 +108,7 @@ def test_lanes_are_loaded_spread_and_stored(width):
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("truths", ["none", "first", "last", "all"])
 def test_any_and_all(width, truths):
-    lanes = Lanes(width)
+    lanes = SimdEmitter(width)
 
     def write(builder, given):
         mask = lanes.load(builder, given, kind="truth")
@@ -151,7 +151,7 @@ def test_an_input_that_is_not_given_is_named():
     graph = Graph()
     builder, _ = function(ir.Module(), "run", [])
     with pytest.raises(KeyError, match="input x is not given"):
-        Lanes().emit(builder, [graph.input("x", CHANGING) + 1.0], {})
+        SimdEmitter().emit(builder, [graph.input("x", CHANGING) + 1.0], {})
 
 
 def test_what_is_known_is_not_computed_again():
@@ -160,7 +160,7 @@ def test_what_is_known_is_not_computed_again():
     root = (x * x + 1.0) ** 0.5
     module = ir.Module()
     builder, (given,) = function(module, "run", [("given", DOUBLE)], DOUBLE)
-    found = Lanes().emit(builder, [root * 2.0], {root.id: given})
+    found = SimdEmitter().emit(builder, [root * 2.0], {root.id: given})
     builder.ret(found[(root * 2.0).id])
     assert "sqrt" not in str(module)
 
@@ -203,7 +203,7 @@ def test_wide_registers_are_used_where_there_are_some(build_columns):
         pytest.skip("needs AVX-512")
     graph = Graph()
     x, y = (graph.input(name, CHANGING) for name in "xy")
-    text = assembly(str(build_columns([x / y + abs(x) ** 0.5], [x, y], Lanes(8))))
+    text = assembly(str(build_columns([x / y + abs(x) ** 0.5], [x, y], SimdEmitter(8))))
     assert "vdivpd" in text and "vsqrtpd" in text
     assert all("%zmm" in line for line in text.splitlines() if "divpd" in line)
     assert "vfmadd" not in text

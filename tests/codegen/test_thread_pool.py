@@ -26,7 +26,7 @@ from pma_gym.codegen.machine.control import (
     variable,
 )
 from pma_gym.codegen.machine.native import Library, compiled
-from pma_gym.codegen.threads.thread_pool import Crew, write_another
+from pma_gym.codegen.threads.thread_pool import ThreadPool, write_another
 
 COUNTER, SECOND, TIMES = 0, 1, 2
 
@@ -34,10 +34,10 @@ COUNTER, SECOND, TIMES = 0, 1, 2
 def build() -> ir.Module:
     """Adds the second number to the first, and returns the second; the third is how often."""
     module = ir.Module()
-    b, (numbers, _) = function(module, "add", [("numbers", POINTER), ("crew", POINTER)], INTEGER)
+    b, (numbers, _) = function(module, "add", [("numbers", POINTER), ("pool", POINTER)], INTEGER)
     _write_add(b, numbers)
     b, (numbers, _) = function(
-        module, "add_often", [("numbers", POINTER), ("crew", POINTER)], INTEGER
+        module, "add_often", [("numbers", POINTER), ("pool", POINTER)], INTEGER
     )
     more = b.load(offset(b, numbers, integer(SECOND), INTEGER), typ=INTEGER)
     with loop(b, b.load(offset(b, numbers, integer(TIMES), INTEGER), typ=INTEGER)):
@@ -51,8 +51,8 @@ def build() -> ir.Module:
 
 def _write_add_all(module: ir.Module) -> None:
     """As "add", and then for every other part that there is to take."""
-    both = [("numbers", POINTER), ("crew", POINTER)]
-    b, (numbers, crew) = function(module, "add_all", both, INTEGER)
+    both = [("numbers", POINTER), ("pool", POINTER)]
+    b, (numbers, pool) = function(module, "add_all", both, INTEGER)
     now = variable(b, INTEGER, b.ptrtoint(numbers, INTEGER))
     bits = variable(b, INTEGER, integer(0))
     with repeat(b) as leave_if:
@@ -61,7 +61,7 @@ def _write_add_all(module: ir.Module) -> None:
         # Atomic, so that a part that two threads do is seen to have been done twice.
         b.atomic_rmw("add", atomic(b, part, COUNTER), more, "monotonic")
         b.store(b.or_(b.load(bits, typ=INTEGER), more), bits)
-        b.store(write_another(b, crew), now)
+        b.store(write_another(b, pool), now)
         leave_if(b.icmp_signed("==", b.load(now, typ=INTEGER), integer(0)))
     b.ret(b.load(bits, typ=INTEGER))
 
@@ -69,7 +69,7 @@ def _write_add_all(module: ir.Module) -> None:
 def _write_await_other(module: ir.Module) -> None:
     """Raise the flag at one address, wait for that at another; 1 if it is not raised for long."""
     b, (numbers, _) = function(
-        module, "await_other", [("numbers", POINTER), ("crew", POINTER)], INTEGER
+        module, "await_other", [("numbers", POINTER), ("pool", POINTER)], INTEGER
     )
     mine, other = (
         b.inttoptr(b.load(offset(b, numbers, i, INTEGER), typ=INTEGER), ir.PointerType(INTEGER))
@@ -92,22 +92,22 @@ def _write_add(b: Builder, numbers: Operand) -> None:
 
 
 def library() -> Library:
-    return compiled(["test crew"], build, "test")
+    return compiled(["test pool"], build, "test")
 
 
 @pytest.fixture
-def crew() -> Iterator[tuple[Crew, list[np.ndarray]]]:
+def pool() -> Iterator[tuple[ThreadPool, list[np.ndarray]]]:
     """Four threads, the parts of their work."""
     parts = [np.array([0, 1 << k], np.int64) for k in range(4)]
-    crew = Crew((library().address("add"), [[part] for part in parts]))
-    yield crew, parts
-    crew.close()
+    pool = ThreadPool((library().address("add"), [[part] for part in parts]))
+    yield pool, parts
+    pool.close()
 
 
-def test_each_part_is_done_once_a_call(crew):
-    crew, parts = crew
+def test_each_part_is_done_once_a_call(pool):
+    pool, parts = pool
     for calls in range(1, 50):
-        assert crew.run() == 15
+        assert pool.run() == 15
         assert [part[COUNTER] for part in parts] == [calls << k for k in range(4)]
 
 
@@ -115,9 +115,9 @@ def test_what_no_thread_takes_on_is_done_all_the_same(monkeypatch):
     # As on a machine that is busy with something else: the threads never come.
     monkeypatch.setattr(threading.Thread, "start", lambda _: None)
     parts = [np.array([0, 1 << k], np.int64) for k in range(7)]
-    crew = Crew((library().address("add"), [parts[:1], parts[1:3], parts[3:6], parts[6:]]))
+    pool = ThreadPool((library().address("add"), [parts[:1], parts[1:3], parts[3:6], parts[6:]]))
     for calls in range(1, 4):
-        assert crew.run() == 127
+        assert pool.run() == 127
         assert [part[COUNTER] for part in parts] == [calls << k for k in range(7)]
 
 
@@ -129,13 +129,13 @@ def test_parts_of_any_length_are_done_once_whoever_does_them(threads):
         for count in generator.integers(1, 9, threads)
     ]
     parts = [part for share in shares for part in share]
-    crew = Crew((library().address("add_often"), shares))
+    pool = ThreadPool((library().address("add_often"), shares))
     bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
     for calls in range(1, 400):
-        assert crew.run() == bits
+        assert pool.run() == bits
         for part in parts:
             assert part[COUNTER] == calls * part[SECOND] * part[TIMES]
-    crew.close()
+    pool.close()
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -146,12 +146,12 @@ def test_parts_that_a_function_takes_itself_are_done_once_and_waited_for(threads
         for count in generator.integers(1, 9, threads)
     ]
     parts = [part for share in shares for part in share]
-    crew = Crew((library().address("add_all"), shares))
+    pool = ThreadPool((library().address("add_all"), shares))
     bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts]))
     for calls in range(1, 2000):
-        assert crew.run() == bits
+        assert pool.run() == bits
         assert all(part[COUNTER] == calls * part[SECOND] for part in parts)
-    crew.close()
+    pool.close()
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -164,16 +164,16 @@ def test_works_that_follow_each_other_are_not_mixed_up(threads):
             for count in generator.integers(1, 9, threads)
         ]
         works.append((library().address(name), shares))
-    crew = Crew(*works)
+    pool = ThreadPool(*works)
     parts = [[part for share in shares for part in share] for _, shares in works]
     calls = np.zeros(3, int)
     for which in generator.integers(3, size=3000):
         bits = int(np.bitwise_or.reduce([part[SECOND] for part in parts[which]]))
-        assert crew.run(which) == bits
+        assert pool.run(which) == bits
         calls[which] += 1
         for number, own, times in zip(calls, parts, (1, 3, 1), strict=True):
             assert all(part[COUNTER] == number * times * part[SECOND] for part in own)
-    crew.close()
+    pool.close()
 
 
 def test_who_is_done_takes_what_another_has_not_begun():
@@ -183,16 +183,16 @@ def test_who_is_done_takes_what_another_has_not_begun():
         np.array([flags[mine].ctypes.data, flags[other].ctypes.data])
         for mine, other in ((0, 0), (1, 2), (2, 2))
     )
-    crew = Crew((library().address("await_other"), [[alone], [first, second]]))
+    pool = ThreadPool((library().address("await_other"), [[alone], [first, second]]))
     for _ in range(50):
         flags[:] = 0
-        assert crew.run() == 0, "waited in vain"
+        assert pool.run() == 0, "waited in vain"
         assert flags[:, 0].tolist() == [1, 1, 1]
-    crew.close()
+    pool.close()
 
 
-def test_threads_that_sleep_wake_up(crew):
-    crew, parts = crew
+def test_threads_that_sleep_wake_up(pool):
+    pool, parts = pool
     before = sys.getswitchinterval()
     # Short turns and all kinds of pauses: a thread is caught at every stage of falling asleep.
     sys.setswitchinterval(1e-6)
@@ -200,22 +200,22 @@ def test_threads_that_sleep_wake_up(crew):
         pauses = np.random.default_rng(0).uniform(0.0, 2e-3, 200)
         for pause in pauses:
             time.sleep(pause)
-            assert crew.run() == 15
+            assert pool.run() == 15
     finally:
         sys.setswitchinterval(before)
     assert parts[3][COUNTER] == 1600
 
 
-def test_what_was_announced_and_never_begun_keeps_nobody_awake(crew):
-    crew, _ = crew
+def test_what_was_announced_and_never_begun_keeps_nobody_awake(pool):
+    pool, _ = pool
     # As if Ctrl-C came between the two.
-    crew._board.announce()
-    assert crew.run() == crew.run() == 15
+    pool._board.announce()
+    assert pool.run() == pool.run() == 15
     time.sleep(0.2)
     before = time.process_time()
     time.sleep(0.3)
     assert time.process_time() - before < 0.1
-    assert crew.run() == 15
+    assert pool.run() == 15
 
 
 @pytest.fixture
@@ -226,18 +226,18 @@ def begun() -> Callable[[], list[threading.Thread]]:
 
 
 def test_a_crew_of_one_needs_no_thread(begun):
-    assert Crew((library().address("add"), [[np.array([0, 3], np.int64)]])).run() == 3
+    assert ThreadPool((library().address("add"), [[np.array([0, 3], np.int64)]])).run() == 3
     assert not begun()
 
 
 @pytest.mark.parametrize("asleep", [False, True])
 def test_threads_end_with_their_crew(begun, asleep):
-    crew = Crew((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
-    crew.run()
+    pool = ThreadPool((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
+    pool.run()
     threads = begun()
     assert len(threads) == 2
     time.sleep(0.2 if asleep else 0.0)
-    del crew
+    del pool
     gc.collect()
     for thread in threads:
         thread.join(10.0)
@@ -245,12 +245,12 @@ def test_threads_end_with_their_crew(begun, asleep):
 
 
 def test_a_closed_crew_begins_again(begun):
-    crew = Crew((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
+    pool = ThreadPool((library().address("add"), [[np.ones(2, np.int64)] for _ in range(3)]))
     for _ in range(2):
-        assert crew.run() == 1
+        assert pool.run() == 1
         threads = begun()
         assert len(threads) == 2
-        crew.close()
+        pool.close()
         for thread in threads:
             thread.join(10.0)
         assert not begun()

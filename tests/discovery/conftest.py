@@ -122,7 +122,7 @@ def found():
         model=truth,
         given=given,
         not_identifiable={"rotor.inertia_kg_m2": "no trial is fast enough: 4 Hz at most"},
-        blind=("torque_ripple", "slow_creep"),
+        not_detectable=("torque_ripple", "slow_creep"),
         floors={
             column.name: Floor(
                 gap[column.name].floor,
@@ -197,7 +197,7 @@ def diagnoses(found):
         "effect": found,
         "parameters": parameters,
         "agrees": bare(
-            found, "agrees", "Model and data agree to within the noise.", blind=("creep",)
+            found, "agrees", "Model and data agree to within the noise.", not_detectable=("creep",)
         ),
         "unknown": bare(found, "unknown", "A force is missing that no effect has.", law=law),
         "undecidable": bare(

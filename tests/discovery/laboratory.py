@@ -5,8 +5,8 @@ from functools import cache
 import numpy as np
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.fit_problem import Bench
-from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant import sensors
@@ -86,9 +86,9 @@ def diagnosed(case, number=3, rate=64.0, seed=3):
     return diagnose(laboratory(case, number, rate, seed)[0], STATION, propose=False)
 
 
-def bench(trials, model=STATION):
+def fit_problem(trials, model=STATION):
     """What fits share, with the noise that the sensors have."""
-    return Bench(trials, model, own_parameters(model), tuple(map(white_noise, LEVELS)))
+    return FitProblem(trials, model, free_parameters(model), tuple(map(white_noise, LEVELS)))
 
 
 def only(trial, *names):

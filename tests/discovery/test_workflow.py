@@ -150,8 +150,8 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
     worse = STATION.replace({"drive.gain_n_per_v": 99.0})
     own = workflow._Work._refitted
 
-    def caught(self, bench, journal):
-        fit = own(self, bench, journal)
+    def caught(self, problem, journal):
+        fit = own(self, problem, journal)
         moved = np.array(
             [
                 99.0 if path == "drive.gain_n_per_v" else value
@@ -161,7 +161,9 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
         return replace(fit, model=worse, values=moved)
 
     monkeypatch.setattr(workflow._Work, "_refitted", caught)
-    monkeypatch.setattr(workflow, "_nothing", lambda bench, fit: Selection((), (), fit, bench, fit))
+    monkeypatch.setattr(
+        workflow, "_nothing", lambda problem, fit: Selection((), (), fit, problem, fit)
+    )
     found = refit(laboratory("nothing")[0], STATION)
     assert found.model == STATION and found.parameters == {}
     assert any("a refit was discarded: it raises" in words for words in found.warnings)

@@ -41,14 +41,14 @@ EVERY = (
 )
 
 
-def simulated(plant, trial, joined):
+def simulated(plant, trial, interpolation):
     start = plant.settle(1.5, 300e3)
     told = TRIALS[trial](plant, 300e3)
-    states, zero = plant.run(told.time, told.motor, told.regulator, joined, start)
+    states, zero = plant.run(told.time, told.motor, told.regulator, interpolation, start)
     return start, states, plant.observe(states, zero)
 
 
-@pytest.fixture(scope="module", params=[("demanding", False), ("random", False), ("gentle", True)])
+@pytest.fixture(scope="module", params=[("demanding", "zoh"), ("random", "zoh"), ("gentle", "foh")])
 def case(request, station):
     return request.param, simulated(station, *request.param)
 
@@ -115,8 +115,8 @@ def test_an_effect_that_is_there_changes_something(name, station, station_with):
     if name in ("regulator_delay", "regulator_deadband"):
         found, states = (filled(each) for each in (plant, station))
     else:
-        _, found, _ = simulated(plant, "random", False)
-        _, states, _ = simulated(station, "random", False)
+        _, found, _ = simulated(plant, "random", "zoh")
+        _, states, _ = simulated(station, "random", "zoh")
     change = np.abs(found[:, kept(plant, station)] - states).max(axis=0)
     assert np.any(change > 1e-3 * np.ptp(states, axis=0))
 

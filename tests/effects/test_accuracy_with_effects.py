@@ -29,11 +29,11 @@ EVERY = (
 PRESSURES = (200e3, 550e3)
 
 
-def marched(plant, trial, pressure):
+def integrated(plant, trial, pressure):
     """States at every command, and attempts at steps."""
     start, told = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
     columns = (told.time, told.motor, told.regulator)
-    run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+    run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
     attempts = simulate_all(plant.program, [run])
     return run.states, attempts
 
@@ -45,10 +45,10 @@ def test_positions_keep_their_limit_with_an_effect(name, trial, station_with, st
     positions = [plant.states.index(state) for state in ("contraction", "angle")]
     made = plain = 0
     for pressure in PRESSURES:
-        found, attempts = marched(plant, trial, pressure)
-        truth, _ = marched(fine, trial, pressure)
+        found, attempts = integrated(plant, trial, pressure)
+        truth, _ = integrated(fine, trial, pressure)
         error = np.abs(found - truth)[:, positions].max(axis=0)
         assert np.all(error <= 1e-6 * np.ptp(truth[:, positions], axis=0))
-        made, plain = made + attempts, plain + marched(station, trial, pressure)[1]
+        made, plain = made + attempts, plain + integrated(station, trial, pressure)[1]
     # Nothing bends as sharply as damping whose factor follows a cable that whips.
     assert made <= (2.7 if name == "load_dependent_damping" else 1.6) * plain

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pma_gym.codegen.graph import CHANGING, Graph
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.codegen.text import evaluate
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import CATALOGUE
@@ -139,7 +139,7 @@ def traced(law, given):
 def test_one_text_gives_one_number(effect, law):
     given = arguments(effect, law, 64)
     plain = [flat(law(*one_row(given, row))) for row in range(64)]
-    parts = flat(lanes(law)(*given))
+    parts = flat(as_numpy(law)(*given))
     # Compiled code has the bits of the graph: `tests/kernels`.
     for part, found, expected in zip(
         parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True

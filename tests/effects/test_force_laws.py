@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from pma_gym.codegen.rebinding import lanes
+from pma_gym.codegen.rebinding import as_numpy
 from pma_gym.data.serres2008 import load_table
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.geometric_force import (
@@ -300,7 +300,7 @@ def test_arrays_give_what_floats_give(effect):
     p = effect.parse(NUMBERS[effect.name])
     pressures, xs = (a.ravel() for a in np.meshgrid([0.0, 2e5, 6e5], [-0.01, 0.0, 0.03, 0.07]))
     one_by_one = [effect.law(float(a), float(b), p) for a, b in zip(pressures, xs, strict=True)]
-    together = lanes(effect.law)(pressures, xs, p)
+    together = as_numpy(effect.law)(pressures, xs, p)
     np.testing.assert_allclose(together, one_by_one, rtol=1e-11, atol=1e-9)
 
 

@@ -21,12 +21,12 @@ from pma_gym.tasks import (
     PACE,
     PACED,
     PACING,
-    Human,
+    Operator,
     OperatorState,
     moment_exercise,
     phase_rmse,
 )
-from pma_gym.tasks.human import FORESIGHT_S, operator_step
+from pma_gym.tasks.operator import FORESIGHT_S, operator_step
 
 EXACT = PACED.typical._replace(effort=1.0, unsteadiness=0.0, tremor=0.0, fatigue=0.0, stiffness=0.0)
 """Somebody who gives just what the device takes."""
@@ -335,7 +335,7 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
         (
             "isokinetic_exercise",
             {"human": "strong"},
-            r"human must be one of random, typical or a pma_gym.tasks.Human",
+            r"human must be one of random, typical or a pma_gym.tasks.Operator",
         ),
         ("isokinetic_exercise", {"safety": 1}, "safety must be true or false, got 1"),
         (
@@ -406,4 +406,4 @@ def test_an_id_makes_it():
     env = gym.make("pma_gym/ResistiveExercise-v0", task="isotonic_exercise", pressure_kpa=550)
     _, info = env.reset(seed=1)
     assert info["moment_nm"] == pytest.approx(8.0, abs=1e-9)
-    assert isinstance(env.unwrapped.human, Human)
+    assert isinstance(env.unwrapped.human, Operator)

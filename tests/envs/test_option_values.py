@@ -2,6 +2,7 @@
 
 import json
 import shutil
+from dataclasses import fields
 from fractions import Fraction
 from pathlib import Path
 
@@ -11,7 +12,8 @@ import pytest
 from gymnasium.envs.registration import EnvSpec
 from gymnasium.vector import AutoresetMode
 
-from pma_gym.envs import PMAEnv, PMAVectorEnv
+from pma_gym.engine.options import EnvironmentOptions
+from pma_gym.envs import Options, PMAEnv, PMAVectorEnv
 from pma_gym.plant.model import shipped_models
 
 DISPLACEMENT = "pma_gym/IsokineticDisplacement-v0"
@@ -155,3 +157,8 @@ def test_pressures_of_a_reset_may_be_of_numpy():
         np.testing.assert_array_equal(
             other.reset(seed=2, options={"pressure_kpa": plain})[0], first
         )
+
+
+def test_editors_know_the_type_of_every_option():
+    known = {field.name: field.type for field in fields(Options)}
+    assert EnvironmentOptions.__annotations__ == known

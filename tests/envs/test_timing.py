@@ -23,7 +23,9 @@ def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model
     plant = Plant(model)
     regulator = np.full(201, plant.regulator_voltage(300e3))
     rest = plant.settle(0.0, pressure=300e3)
-    expected, _ = plant.run(time, np.append(volts, 0.0), regulator, joined=False, condition=rest)
+    expected, _ = plant.run(
+        time, np.append(volts, 0.0), regulator, interpolation="zoh", condition=rest
+    )
     # The same steps in other compiled code, which rounds in another order.
     scale = np.abs(expected).max(axis=0)
     assert np.all(np.abs(states - expected) <= 1e-10 * scale)

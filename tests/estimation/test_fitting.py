@@ -259,7 +259,7 @@ def test_a_state_that_is_no_number_does_not_hold_up_the_rest():
     motor, regulator = np.full(3841, 1.0), np.full(3841, plant.regulator_voltage(300e3))
     starts = [rest.state, rest.state * np.nan, rest.state, rest.state]
     zero = rest.zero_contraction
-    runs = [Run(when, motor, regulator, True, plant.table, start, zero) for start in starts]
+    runs = [Run(when, motor, regulator, "foh", plant.table, start, zero) for start in starts]
     assert simulate_all(plant.program, runs) < 20 * 3841
     assert np.isnan(runs[1].states).all() and np.isfinite(runs[0].states).all()
 

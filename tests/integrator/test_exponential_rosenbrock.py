@@ -6,7 +6,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from benchmarks.convergence import FixedStep, orders, smooth_plant
+from benchmarks.accuracy.convergence import FixedStep, orders, smooth_plant
 from pma_gym.codegen.graph import CHANGING, Graph
 from pma_gym.codegen.text import evaluate
 from pma_gym.integrator.equations import State
@@ -97,7 +97,7 @@ def test_half_a_step_is_known_on_the_way():
     errors = []
     for size in (0.1, 0.05, 0.025):
         half = evaluate(made.visited[0], {"x": 2.0, "y": 1.5, "size": size})
-        truth = smooth.marched(made, 0.5 * size, 64)
+        truth = smooth.integrated(made, 0.5 * size, 64)
         errors.append(np.abs(np.array([float(v) for v in half]) - truth).max())
     # Without what is not linear: h^3.
     assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(3.0, abs=0.2)

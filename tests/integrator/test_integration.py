@@ -79,7 +79,7 @@ def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
     told, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
     rest.state[at] = 1e-7
     made = PlainPlant(plant).attempt(rest.state, told, zero, 5e-4, 1e-3)
-    assert made.taken
+    assert made.accepted
 
     def rate(_, state):
         return plant.derivative(state, *told, zero)
@@ -95,7 +95,7 @@ def test_a_random_policy_takes_few_attempts():
         plant = Plant("station")
         start, told = plant.settle(0.0, pressure), random_commands(plant, pressure, steps=steps)
         columns = (told.time, told.motor, told.regulator)
-        run = Run(*columns, False, plant.table, start.state, start.zero_contraction)
+        run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
         attempts += simulate_all(plant.program, [run])
     assert attempts / (3 * steps) < 15.0
 
@@ -187,7 +187,7 @@ def test_run_steps_as_step_does():
     when = 0.01 * np.arange(31)
     motor = 2.0 + np.sin(when)
     regulator = plant.regulator_voltage(350e3)
-    states, _ = plant.run(when, motor, np.full(31, regulator), joined=False)
+    states, _ = plant.run(when, motor, np.full(31, regulator), interpolation="zoh")
     condition = plant.settle(float(motor[0]), regulator_voltage=regulator)
     for row, voltage in enumerate(motor[:-1]):
         np.testing.assert_array_equal(states[row], condition.state)
@@ -196,7 +196,7 @@ def test_run_steps_as_step_does():
     np.testing.assert_array_equal(states[-1], condition.state)
 
 
-def test_joined_commands_pass_through_their_middle():
+def test_commands_of_a_first_order_hold_pass_through_their_middle():
     plant = Plant("serres2008")
     start = plant.settle(1.0, 300e3)
     regulator = plant.regulator_voltage(300e3)
@@ -204,7 +204,7 @@ def test_joined_commands_pass_through_their_middle():
     middle, _ = plant.run(
         np.array([0.0, 0.1, 0.4]), np.array([1.0, 2.0, 5.0]), np.full(3, regulator)
     )
-    held, _ = plant.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator), False)
+    held, _ = plant.run(np.array([0.0, 0.4]), np.array([1.0, 5.0]), np.full(2, regulator), "zoh")
     np.testing.assert_allclose(ends[-1], middle[-1], rtol=1e-5, atol=1e-7)
     # The drive held at its first voltage moves nothing.
     np.testing.assert_allclose(held[-1], start.state, rtol=1e-9, atol=1e-7)

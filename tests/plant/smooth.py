@@ -22,7 +22,7 @@ def predator_and_prey(step: Callable[..., Step]) -> Step:
     return step(states, size, {}, {})
 
 
-def marched(made: Step, duration: float, count: int) -> NDArray[np.float64]:
+def integrated(made: Step, duration: float, count: int) -> NDArray[np.float64]:
     """Both after some steps from the start."""
     state = list(START)
     for _ in range(count):
@@ -33,8 +33,8 @@ def marched(made: Step, duration: float, count: int) -> NDArray[np.float64]:
 
 def orders(made: Step) -> NDArray[np.float64]:
     """Orders of convergence from 16 to 128 steps."""
-    exact = marched(made, 2.0, 2048)
-    errors = [np.abs(marched(made, 2.0, count) - exact).max() for count in (16, 32, 64, 128)]
+    exact = integrated(made, 2.0, 2048)
+    errors = [np.abs(integrated(made, 2.0, count) - exact).max() for count in (16, 32, 64, 128)]
     return np.log2(np.divide(errors[:-1], errors[1:]))
 
 
@@ -45,5 +45,5 @@ def in_one_step(made: Step) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         given = {"x": START[0], "y": START[1], "size": size}
         estimates.append(max(abs(float(error)) for error in evaluate(made.errors, given)))
         own = np.array([float(value) for value in evaluate(made.states, given)])
-        truths.append(np.abs(own - marched(made, size, 64)).max())
+        truths.append(np.abs(own - integrated(made, size, 64)).max())
     return np.array(estimates), np.array(truths)

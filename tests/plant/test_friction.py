@@ -183,13 +183,14 @@ def test_the_path_is_a_line_then_a_parabola_then_full(direction):
 
 def ramped_attempts(plant, state, zero, motor, slope, size, most):
     """Attempts of plain Python through one row at 128 Hz: (taken, length, next size)."""
-    system = plant.program.ramped
+    system = plant.program.first_order_hold
     made = system.attempt
-    values = [*made.states, made.next_size, made.next_left, made.taken, made.length]
+    values = [*made.states, made.next_size, made.next_left, made.accepted, made.length]
     inputs = live_inputs(values)
     module = {}
     exec(python_text(values, inputs, "attempt"), module)
-    names = [entry.name for entry in (*system.equations.states, *system.equations.paths)]
+    entries = (*system.equations.states, *system.equations.rate_independent_states)
+    names = [entry.name for entry in entries]
     known = dict(zip(["tolerance", *parameter_names(plant.model)], plant.vector, strict=True))
     known |= dict(zip(plant.states, state, strict=True))
     known |= {"zero_contraction": zero, "motor_voltage": motor, "motor_voltage_slope": slope}
@@ -241,7 +242,7 @@ def test_a_long_hold_takes_hardly_more_than_an_attempt_a_row():
     motor = np.interp(time, [2.0, 2.0 + 1 / 128, 47.0, 47.0 + 1 / 128], [low, high, high, low])
     regulator = np.full(len(time), 6.10016694490818)
     start = plant.settle(low, regulator_voltage=6.10016694490818)
-    run = Run(time, motor, regulator, True, plant.table, start.state, start.zero_contraction)
+    run = Run(time, motor, regulator, "foh", plant.table, start.state, start.zero_contraction)
     attempts = []
     # A daemon: were it to run for ever, the test would fail all the same.
     work = threading.Thread(

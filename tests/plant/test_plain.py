@@ -34,7 +34,7 @@ def test_a_step_is_the_compiled_one_to_a_few_roundings(both):
     rest = plant.settle(0.0, 350e3)
     commands = demanding_commands(plant, 350e3)
     states, zero = plant.run(
-        commands.time, commands.motor, commands.regulator, joined=False, condition=rest
+        commands.time, commands.motor, commands.regulator, interpolation="zoh", condition=rest
     )
     size = np.abs(states).max(axis=0)
     # So short that one attempt does, whatever the command has jumped by.
@@ -57,7 +57,8 @@ def test_the_attempts_are_the_compiled_ones(both):
     size = np.abs(fast.state) + 1e-6
     for motor in (1.5, 5.0, 0.3, 4.0):
         for _ in range(3):
-            lengths = [made.length for made in plain.attempts(slow, motor, 6.0, 0.01) if made.taken]
+            attempts = plain.attempts(slow, motor, 6.0, 0.01)
+            lengths = [made.length for made in attempts if made.accepted]
             plant.step(fast, motor, 6.0, 0.01)
             assert sum(lengths) == pytest.approx(0.01, rel=1e-12)
             assert slow.time == pytest.approx(fast.time, rel=1e-12)
@@ -81,14 +82,14 @@ def test_an_attempt_tells_what_it_was(both):
     plant, plain = both
     rest = plant.settle(1.0, 350e3)
     made = list(plain.attempts(rest, 4.0, 6.0, 0.01))
-    refused = [one for one in made if not one.taken]
+    rejected = [one for one in made if not one.accepted]
     assert 2 < len(made) < 60
     assert made[0].proposed == first_size(FIRST_S, 3.0)
     assert made[0].left == 0.01
     for before, after in zip(made[:-1], made[1:], strict=True):
         assert after.proposed == before.size
-        if not before.taken:
+        if not before.accepted:
             assert after.left == before.left
             assert after.proposed < before.length
-    assert len(refused) < len(made) / 2
-    assert sum(one.length for one in made if one.taken) == pytest.approx(0.01)
+    assert len(rejected) < len(made) / 2
+    assert sum(one.length for one in made if one.accepted) == pytest.approx(0.01)

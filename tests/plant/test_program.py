@@ -30,9 +30,9 @@ def trials(count, model="station"):
         rows = int(generator.integers(1, 30))
         motor, regulator = generator.uniform(0.0, 6.0, rows), generator.uniform(4.0, 8.0, rows)
         when = np.cumsum(generator.uniform(0.002, 0.02, rows))
-        joined = bool(k % 3)
+        interpolation = "foh" if k % 3 else "zoh"
         given = (rest.state, rest.zero_contraction)
-        runs.append(Run(when, motor, regulator, joined, plant.table, *given))
+        runs.append(Run(when, motor, regulator, interpolation, plant.table, *given))
     return runs
 
 
@@ -101,7 +101,7 @@ def test_run_is_one_trial_of_many():
     run.table = plant.table
     simulate_all(plant.program, [run])
     start = plant.settle(0.0, 300e3)
-    states, _ = plant.run(run.time, run.motor, run.regulator, run.joined, start)
+    states, _ = plant.run(run.time, run.motor, run.regulator, run.interpolation, start)
     np.testing.assert_array_equal(states, run.states)
 
 

@@ -68,12 +68,14 @@ def test_uneven_times_lie_on_the_same_trajectory(plant):
 def test_held_commands_come_later_than_joined_ones(plant):
     coarse = np.linspace(0.0, 1.0, 6)
     ramp = trial(coarse, motor_voltage=1.0 + 3.0 * coarse, regulator_voltage=6.0)
-    joined, held = (plant.simulate(ramp, noise=False, joined=how) for how in (True, False))
+    joined, held = (plant.simulate(ramp, noise=False, interpolation=how) for how in ("foh", "zoh"))
     assert np.all(held.truth["extension"][1:] < joined.truth["extension"][1:])
     staircase = 1.0 + 3.0 * np.floor(np.linspace(0.0, 0.9999, 2001) * 5.0) / 5.0
     fine = np.linspace(0.0, 1.0, 2001)
     stepped = plant.simulate(
-        trial(fine, motor_voltage=staircase, regulator_voltage=6.0), noise=False, joined=False
+        trial(fine, motor_voltage=staircase, regulator_voltage=6.0),
+        noise=False,
+        interpolation="zoh",
     )
     np.testing.assert_allclose(
         held.truth["extension"], stepped.truth["extension"][::400], atol=2e-5

@@ -24,7 +24,7 @@ from benchmarks.exercise.lag.rehearsal import LAG, NO_LAG, Course, Exertion, own
 from benchmarks.exercise.lag.swing import Swing, swings
 from pma_gym.engine.options import Pressure
 from pma_gym.plant.model import Model, load_model
-from pma_gym.tasks import EVERY_TASK, Human
+from pma_gym.tasks import EVERY_TASK, Operator
 
 FIRST_SEED = 1_000_000
 """Seed of the first frozen operator; seeds of training lie below."""
@@ -112,7 +112,7 @@ def foreknown_bounds(
     factors: Sequence[float],
     safeties: Sequence[bool],
     model: Model,
-    human: str | Human = "random",
+    human: str | Operator = "random",
 ) -> Iterator[Foreknown]:
     """What is left to who knows the operator's course, operator by operator; as `lag_bounds`."""
     for seed in seeds:

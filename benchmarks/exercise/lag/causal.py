@@ -1,7 +1,7 @@
 """What a regulator's lag costs whoever must react: least variance against an unsteady operator.
 
 The joint stands near a point of the exercise, by the nominal plant's linear laws at 100 Hz. The
-operator's moment is unsteady as `pma_gym.tasks.human` says, his joint has its stiffness:
+operator's moment is unsteady as `pma_gym.tasks.operator` says, his joint has its stiffness:
 
     w(k+1) = exp(-h/0.3 s) w(k) + ...e(k),   d(k+1) = (1 - s) d(k) + s u M w(k+1)
     x(k+1) = A x(k) + b_m (d(k+1) - k_h angle(k)) + b_v V(k)
@@ -35,8 +35,8 @@ from scipy.optimize import brentq
 from benchmarks.exercise.lag.points import Point, Rates, points, rates
 from benchmarks.exercise.lag.rehearsal import LAG, NO_LAG, RATE_HZ
 from pma_gym.plant.model import Model
-from pma_gym.tasks import EVERY_TASK, Human
-from pma_gym.tasks.human import WANDER_S
+from pma_gym.tasks import EVERY_TASK, Operator
+from pma_gym.tasks.operator import WANDER_S
 from pma_gym.units import SI_FACTORS
 
 PERIOD = 1.0 / RATE_HZ
@@ -80,7 +80,7 @@ def causal_bounds(
     model: Model,
     factors: Sequence[float] = FACTORS,
     delays: Sequence[int] = (1,),
-    human: Human | None = None,
+    human: Operator | None = None,
 ) -> tuple[Causal, ...]:
     """The least standard deviations at every point of an exercise.
 
@@ -106,7 +106,7 @@ def causal_bounds(
 
 
 def causal_bound(
-    point: Point, near: Rates, lag: float, delay: int, sensed: bool, human: Human
+    point: Point, near: Rates, lag: float, delay: int, sensed: bool, human: Operator
 ) -> Causal:
     """The least standard deviation near one point.
 
@@ -145,7 +145,7 @@ class Loop:
     noise: NDArray[np.float64]
 
     @classmethod
-    def of(cls, point: Point, near: Rates, delay: int, human: Human) -> "Loop":
+    def of(cls, point: Point, near: Rates, delay: int, human: Operator) -> "Loop":
         """By the module's equations; z holds x, d, w and the voltages on their way."""
         n = len(near.a)
         held, by_moment, by_voltage = _held(near)

@@ -17,7 +17,7 @@ from pma_gym.engine.options import Pressure
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model
-from pma_gym.tasks import Human, Task
+from pma_gym.tasks import Operator, Task
 from pma_gym.units import SI_FACTORS
 
 RATE_HZ = 100.0
@@ -46,7 +46,7 @@ class Exertion:
     seed: int
     model: Model
     pressure_kpa: Pressure = "random"
-    human: str | Human = "random"
+    human: str | Operator = "random"
     safety: bool = False
 
 

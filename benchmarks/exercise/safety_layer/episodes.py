@@ -6,12 +6,14 @@ of the recipe of suite `robust`, with effects that no model has. The safe moment
 are watched at the end of every control step.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.executors.executor import Executor, run_or_raise
 from benchmarks.exercise.safety_layer.adversarial import KINDS, PUMPING, kind_of, planned, pumped
 from benchmarks.hidden_effects.evaluation.scoring import wilson
 from benchmarks.training.stations import Stations
@@ -37,7 +39,7 @@ on. Below it are those that the safety layer's numbers were found with."""
 
 @dataclass(frozen=True)
 class Tally:
-    """What came of the episodes of one task, of one kind of agent.
+    """Counts over the episodes of one task and one kind of agent.
 
     Attributes:
         task: name of the task.
@@ -97,6 +99,7 @@ def measure(
     episodes: int,
     seed: int,
     safety: bool,
+    executor: Executor,
     on_block: Callable[[int], None] = lambda done: None,
     tasks: Sequence[str] = tuple(EXERCISES),
 ) -> tuple[Tally, ...]:
@@ -106,32 +109,35 @@ def measure(
         episodes: how many, shared by the tasks.
         seed: of the benchmark.
         safety: whether the safety layer is there.
+        executor: where blocks of episodes run.
         on_block: called with how many more are done.
         tasks: names of the tasks.
     Returns:
         A tally for every task, kind of stations and kind of agent.
     """
-    found: list[Tally] = []
     groups = [(name, stations) for name in tasks for stations in SETS]
-    for at, (name, stations) in enumerate(groups):
-        numbers = np.arange(episodes)[at :: len(groups)]
-        # Kinds of agents go round in each group by themselves.
-        results = [
-            _run(EXERCISES[name], stations, safety, seed, first, block)
-            for first, block in _blocks(numbers, on_block)
-        ]
-        whole = np.concatenate(results) if results else np.zeros((0, 4))
-        found += [_tally((name, stations, kind), safety, whole) for kind in KINDS]
-    return tuple(found)
+    # Kinds of agents take turns in each group.
+    works = {
+        (group, first): partial(
+            _run, EXERCISES[group[0]], group[1], safety, seed, first, numbers[first : first + BLOCK]
+        )
+        for at, group in enumerate(groups)
+        for numbers in [np.arange(episodes)[at :: len(groups)]]
+        for first in range(0, len(numbers), BLOCK)
+    }
+    results: dict[int, NDArray[np.float64]] = {}
 
-
-def _blocks(
-    numbers: NDArray[np.int64], on_block: Callable[[int], None]
-) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    for first in range(0, len(numbers), BLOCK):
-        block = numbers[first : first + BLOCK]
-        yield first, block
+    def keep(index: int, block: NDArray[np.float64]) -> None:
+        results[index] = block
         on_block(len(block))
+
+    run_or_raise(list(works.values()), executor, keep)
+    tallies: list[Tally] = []
+    for group in groups:
+        blocks = [results[k] for k, (its, _) in enumerate(works) if its == group]
+        whole = np.concatenate([np.zeros((0, 4)), *blocks])
+        tallies += [_tally((*group, kind), safety, whole) for kind in KINDS]
+    return tuple(tallies)
 
 
 def _options(stations: str, safety: bool) -> Options:

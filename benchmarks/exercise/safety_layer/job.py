@@ -1,4 +1,4 @@
-"""The command `safety`: runs the episodes, prints what came of them, keeps the figures."""
+"""The command `safety`: runs the episodes, prints the counts, keeps the figures."""
 
 import json
 from pathlib import Path
@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.progress import Progress
 
+from benchmarks.executors.executor import Executor
 from benchmarks.exercise.safety_layer.episodes import Safety, Tally, measure
 from benchmarks.exercise.tables import NONE, terminal_table
 from benchmarks.files import write_text
@@ -22,7 +23,9 @@ class SafetyError(ValueError):
     """Episodes that cannot be run; the message says why."""
 
 
-def run_safety(episodes: int, bare: int, seed: int, out: Path, console: Console) -> Safety:
+def run_safety(
+    episodes: int, bare: int, seed: int, out: Path, console: Console, executor: Executor
+) -> Safety:
     """Measure, print and write.
 
     Args:
@@ -31,6 +34,7 @@ def run_safety(episodes: int, bare: int, seed: int, out: Path, console: Console)
         seed: of the benchmark.
         out: folder for `safety.json` and `safety.md`.
         console: where to print.
+        executor: where blocks of episodes run.
     Raises:
         SafetyError: a number of episodes or a seed that is none.
     """
@@ -43,7 +47,10 @@ def run_safety(episodes: int, bare: int, seed: int, out: Path, console: Console)
         def advance(done: int) -> None:
             progress.advance(task, done)
 
-        tallies = (*measure(episodes, seed, True, advance), *measure(bare, seed, False, advance))
+        tallies = (
+            *measure(episodes, seed, True, executor, advance),
+            *measure(bare, seed, False, executor, advance),
+        )
     found = Safety(seed, tallies)
     shown = safety_table(found)
     console.print(terminal_table(shown), "")

@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery import diagnose, workflow
-from pma_gym.discovery.fitting.free_parameters import Own
+from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.noise import Whitening, white_noise
 from pma_gym.discovery.screening import residuals, scan_statistic
-from pma_gym.discovery.screening.score_test import Look
+from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection import forward_selection
 from pma_gym.plant.model import Model
 
@@ -44,13 +44,13 @@ def no_whitening(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without a refit: the model's own parameters stay as given, zeros of sensors are free."""
-    own = workflow.own_parameters
+    own = workflow.free_parameters
 
-    def held(model: Model) -> Own:
+    def held(model: Model) -> FreeParameters:
         found = own(model)
         return replace(found, prior=HELD * found.prior)
 
-    with _instead(workflow, "own_parameters", held):
+    with _instead(workflow, "free_parameters", held):
         found = ours(dataset, seed, jobs)
     # Parameters that were not free are neither off nor undetermined.
     return {**found, "parameters": {}, "not_identifiable": {}}
@@ -58,12 +58,12 @@ def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
 
 def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Without the simulated chance: every effect passes that changes enough, as if sure."""
-    whole = forward_selection.look
+    whole = forward_selection.screen
 
-    def sure(*args: Any, **options: Any) -> list[Look]:  # noqa: ANN401
+    def sure(*args: Any, **options: Any) -> list[ScreeningScore]:  # noqa: ANN401
         return [replace(each, p_value=0.0) for each in whole(*args, **options)]
 
-    with _instead(forward_selection, "look", sure):
+    with _instead(forward_selection, "screen", sure):
         return ours(dataset, seed, jobs)
 
 

@@ -1,15 +1,18 @@
 """Drawn cases through every way; an answer that is there is kept, so that a run goes on."""
 
+import itertools
 import json
 import sys
 import time
 import warnings
 from collections.abc import Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.hidden_effects.baselines.registry import WAYS
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.files import replace_file
@@ -56,19 +59,12 @@ def ask_all(folder: Path, ways: Sequence[str], jobs: int, seed: int = 0) -> None
     print(f"{count - len(missing)} of {count} answers are there already", file=sys.stderr)
     for way in ways:
         (folder / "answers" / way).mkdir(parents=True, exist_ok=True)
-    begun = time.monotonic()
-    if jobs == 1:
-        for done, question in enumerate(missing, 1):
-            _tell(done, len(missing), ask(question, seed), begun)
-        return
-    with ProcessPoolExecutor(jobs) as pool:
-        futures: list[Future[str]] = [pool.submit(ask, each, seed) for each in missing]
-        try:
-            for done, future in enumerate(as_completed(futures), 1):
-                _tell(done, len(missing), future.result(), begun)
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    begun, done = time.monotonic(), itertools.count(1)
+
+    def tell(_: int, words: str) -> None:
+        _tell(next(done), len(missing), words, begun)
+
+    run_or_raise([partial(ask, each, seed) for each in missing], local(jobs), tell)
 
 
 def ask(question: Question, seed: int) -> str:

@@ -49,7 +49,7 @@ class Balance:
 
 def balances(ready: Prepared) -> list[Balance]:
     """The station's balances at what was measured."""
-    parts = [_of_trial(ready, logged, k) for k, logged in enumerate(ready.evidence.logged)]
+    parts = [_of_trial(ready, logged, k) for k, logged in enumerate(ready.whitened.logged)]
     return [_joined([part[k] for part in parts]) for k in range(4)]
 
 

@@ -12,15 +12,16 @@ import sys
 import tempfile
 import time
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.hidden_effects.baselines.preparation import answer, moved, prepare
 from benchmarks.hidden_effects.baselines.signatures import signature
 from benchmarks.hidden_effects.generation.cases import draw_case
@@ -73,7 +74,7 @@ def random_forest(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     order = np.argsort(-votes, kind="stable")
     first = str(forest.classes_[order[0]])
     shares = {str(forest.classes_[k]): float(votes[k]) for k in order[:5]}
-    parameters = moved(ready.bench, ready.refitted)
+    parameters = moved(ready.problem, ready.refitted)
     if first == NOTHING:
         return answer("parameters" if ready.moved else "agrees", (), parameters, votes=shares)
     near = [name for name, share in shares.items() if share >= CONFUSED * shares[first]]
@@ -127,20 +128,15 @@ def train(count: int, seed: int, file: Path, jobs: int) -> None:
     missing = [k for k in range(1, count + 1) if (seed, k) not in known]
     begun = time.monotonic()
     print(f"{count - len(missing)} of {count} cases are in the table", file=sys.stderr)
-    for done, row in enumerate(_read_all(seed, missing, jobs), 1):
+    there = len(rows)
+
+    def keep(_: int, row: dict[str, Any]) -> None:
         rows.append(row)
         _write(file, rows)
-        took = time.monotonic() - begun
+        done, took = len(rows) - there, time.monotonic() - begun
         print(f"{done}/{len(missing)}  {row['label']}  ({took:.0f} s)", file=sys.stderr, flush=True)
 
-
-def _read_all(seed: int, numbers: Sequence[int], jobs: int):  # noqa: ANN202
-    if jobs == 1:
-        yield from (read_case(seed, number) for number in numbers)
-        return
-    with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(read_case, seed, number) for number in numbers]
-        yield from (future.result() for future in as_completed(futures))
+    run_or_raise([partial(read_case, seed, number) for number in missing], local(jobs), keep)
 
 
 def read_case(seed: int, number: int) -> dict[str, Any]:

@@ -51,7 +51,7 @@ def gaussian_process(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any
         name: explained(conditions, left[channel], some.order, seed)
         for channel, name in enumerate(OUTPUTS)
     }
-    parameters = moved(ready.bench, ready.refitted)
+    parameters = moved(ready.problem, ready.refitted)
     if max(shares.values()) > EXPLAINED:
         return answer("unknown", (), parameters, explained=shares)
     return answer("parameters" if ready.moved else "agrees", (), parameters, explained=shares)

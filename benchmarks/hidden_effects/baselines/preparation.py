@@ -9,14 +9,14 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.answer import MOVED
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.free_parameters import own_parameters, unit, values
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import free_parameters, unit, values
 from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.screening.residuals import left_over
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 
@@ -28,9 +28,9 @@ class Prepared:
     """A data set beside its model.
 
     Attributes:
-        bench: the trials, their noise taken for white.
+        problem: the trials, their noise taken for white.
         refitted: the model with its own parameters refitted.
-        evidence: the trials beside it.
+        whitened: the trials beside it.
         readings: what its sensors hold (SI), shape (4, rows) for each trial.
         left: those less what was measured, free zeros taken out, in standard deviations of the
             noise; NaN where nothing was measured.
@@ -38,23 +38,23 @@ class Prepared:
         orders: which repeat each trial is, or None.
     """
 
-    bench: Bench
+    problem: FitProblem
     refitted: Fitted
-    evidence: Evidence
+    whitened: WhitenedResiduals
     readings: Sequence[Array]
     left: Sequence[Array]
     floors: Sequence[Level]
     orders: Sequence[float] | None
 
     @property
-    def catalogue(self) -> list[Suspect]:
+    def catalogue(self) -> list[CandidateEffect]:
         """Every effect that the model lacks."""
-        return suspects(self.bench.given, self.orders)
+        return candidate_effects(self.problem.given, self.orders)
 
     @property
     def moved(self) -> bool:
         """Whether a parameter left the value that was given by more than its error."""
-        return any(each["significant"] for each in moved(self.bench, self.refitted).values())
+        return any(each["significant"] for each in moved(self.problem, self.refitted).values())
 
 
 def prepare(dataset: Dataset, threads: int) -> Prepared:
@@ -71,37 +71,37 @@ def prepare(dataset: Dataset, threads: int) -> Prepared:
     logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
     floors = initial_floors(given, logged, dataset.trials)
     noise = tuple(white_noise(floor.level) for floor in floors)
-    bench = Bench(trials, given, own_parameters(given), noise, threads)
-    refitted = bench.careful_fit(given)
+    problem = FitProblem(trials, given, free_parameters(given), noise, threads)
+    refitted = problem.careful_fit(given)
     if refitted is None:
         raise ValueError(
             f"model {given.name} cannot be simulated on the trials of {dataset.title}: its muscle "
             "does not balance the load where one begins; check the units of the commands"
         )
-    evidence = bench.evidence(refitted.model)
-    readings = evidence.readings(refitted.values)
+    whitened = problem.whitened_residuals(refitted.model)
+    readings = whitened.readings(refitted.values)
     assert readings is not None
     levels = np.array([floor.level for floor in floors])[:, None]
-    left = [part / levels for part in left_over(evidence, readings)]
+    left = [part / levels for part in simulated_less_measured(whitened, readings)]
     orders = [named.order for named in dataset.trials]
     known = None if None in orders else [float(order or 0.0) for order in orders]
-    return Prepared(bench, refitted, evidence, readings, left, floors, known)
+    return Prepared(problem, refitted, whitened, readings, left, floors, known)
 
 
-def noise_of(left: Sequence[Array], bench: Bench) -> Bench:
+def noise_of(left: Sequence[Array], problem: FitProblem) -> FitProblem:
     """The same bench with white noise of the variance that a residual has (rms, by output)."""
     squares = [np.nanmean(np.concatenate([part[c] ** 2 for part in left])) for c in range(4)]
     noise = tuple(
         white_noise(before.level * float(np.sqrt(square))) if np.isfinite(square) else before
-        for before, square in zip(bench.noise, squares, strict=True)
+        for before, square in zip(problem.noise, squares, strict=True)
     )
-    return replace(bench, noise=noise)
+    return replace(problem, noise=noise)
 
 
-def moved(bench: Bench, fit: Fitted) -> dict[str, dict[str, Any]]:
+def moved(problem: FitProblem, fit: Fitted) -> dict[str, dict[str, Any]]:
     """The model's own parameters and by how much they moved, as `diagnosis.json` has them."""
     found = {}
-    for path, start in zip(bench.own.free, values(bench.given, bench.own.free), strict=True):
+    for path, start in zip(problem.own.free, values(problem.given, problem.own.free), strict=True):
         value, error = fit.estimate(path)
         found[path] = {
             "from": float(start),
@@ -112,7 +112,7 @@ def moved(bench: Bench, fit: Fitted) -> dict[str, dict[str, Any]]:
 
 
 def estimate(fit: Fitted, path: str) -> dict[str, Any]:
-    """A parameter's value, 95 % interval and unit at the door."""
+    """A parameter's value, 95 % interval and unit in files."""
     value, error = fit.estimate(path)
     return {
         "value": value,

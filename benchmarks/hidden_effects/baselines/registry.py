@@ -34,7 +34,7 @@ class Way:
         lacking = [name for name in self.needs if importlib.util.find_spec(name) is None]
         if not lacking:
             return ""
-        return f"needs {', '.join(lacking)}: pip install -c constraints.txt -e '.[ways]'"
+        return f"needs {', '.join(lacking)}: pip install -c constraints.txt -e '.[baselines]'"
 
     @property
     def ask(self) -> Ask:
@@ -50,7 +50,9 @@ WAYS: dict[str, Way] = {
     "no_gate": Way("ours without the resampled gate", "ablations:no_gate"),
     "bic_stepwise": Way("plain BIC stepwise", "stepwise:bic_stepwise"),
     "sparse_regression": Way("PySINDy on the residual", "sparse:sparse_regression", ("pysindy",)),
-    "gaussian_process": Way("a Gaussian process only", "process:gaussian_process", ("sklearn",)),
+    "gaussian_process": Way(
+        "a Gaussian process only", "gaussian_process:gaussian_process", ("sklearn",)
+    ),
     "random_forest": Way(
         "a random forest on signatures", "forest:random_forest", ("sklearn",)
     ),

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
-from pma_gym.discovery.screening.time_bins import TICK_S, Ticks, ticks_of
+from pma_gym.discovery.screening.time_bins import BIN_S, TimeBins, time_bins
 from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -24,19 +24,19 @@ FAST_MM_S, HIGH_KPA = 10.0, 372.0
 """A speed above which motion is fast, and the pressure at which the muscle's damping changes."""
 
 
-def ticks(ready: Prepared) -> Ticks:
+def ticks(ready: Prepared) -> TimeBins:
     """All trials in ticks of 50 ms, without padding."""
-    found = ticks_of(ready.evidence.logged, ready.readings, ready.left)
+    found = time_bins(ready.whitened.logged, ready.readings, ready.left)
     there = np.isfinite(found.order)
-    return Ticks(**{name: each[..., there] for name, each in vars(found).items()})
+    return TimeBins(**{name: each[..., there] for name, each in vars(found).items()})
 
 
-def means(some: Ticks) -> Array:
+def means(some: TimeBins) -> Array:
     """Mean residual of each signal in each tick, in units of the noise, shape (4, n)."""
     return some.total / np.maximum(some.counts, 1.0)
 
 
-def regions(some: Ticks) -> dict[str, NDArray[np.bool_]]:
+def regions(some: TimeBins) -> dict[str, NDArray[np.bool_]]:
     """Regions that all data sets have in common, shape (n,) each."""
     moving = some.held == 0.0
     return {
@@ -57,7 +57,7 @@ def regions(some: Ticks) -> dict[str, NDArray[np.bool_]]:
     }
 
 
-def courses(some: Ticks) -> dict[str, Array]:
+def courses(some: TimeBins) -> dict[str, Array]:
     """What effects would go along with, shape (n,) each; not centred, not scaled."""
     rates = {name: _rate(some, getattr(some, name)) for name in ("load", "pressure", "contraction")}
     found = {
@@ -109,7 +109,7 @@ def _steps(ready: Prepared) -> Mapping[str, float]:
     }
 
 
-def _correlation(some: Ticks, left: Array, course: Array) -> float:
+def _correlation(some: TimeBins, left: Array, course: Array) -> float:
     """Correlation in all trials, each about its own means; 0 where one of them does not vary."""
     both = within(some, np.stack([left, course]))
     products = both @ both.T
@@ -117,7 +117,7 @@ def _correlation(some: Ticks, left: Array, course: Array) -> float:
     return float(products[0, 1] / scale) if scale > 0.0 else 0.0
 
 
-def within(some: Ticks, values: Array) -> Array:
+def within(some: TimeBins, values: Array) -> Array:
     """Values, shape (k, n), less their mean in each trial."""
     found = values.copy()
     for order in np.unique(some.order):
@@ -126,21 +126,21 @@ def within(some: Ticks, values: Array) -> Array:
     return found
 
 
-def _by_trial(some: Ticks) -> list[slice]:
+def _by_trial(some: TimeBins) -> list[slice]:
     edges = [0, *(np.flatnonzero(np.diff(some.order)) + 1).tolist(), len(some.order)]
     return [slice(a, b) for a, b in zip(edges, edges[1:], strict=False)]
 
 
-def _rate(some: Ticks, values: Array) -> Array:
+def _rate(some: TimeBins, values: Array) -> Array:
     """Derivative in time within each trial (per s)."""
     parts = [values[each] for each in _by_trial(some)]
-    return np.concatenate([np.gradient(p, TICK_S) if len(p) > 1 else 0.0 * p for p in parts])
+    return np.concatenate([np.gradient(p, BIN_S) if len(p) > 1 else 0.0 * p for p in parts])
 
 
-def _lagged(some: Ticks, time: float) -> Array:
+def _lagged(some: TimeBins, time: float) -> Array:
     """Contraction (mm) that follows with a time constant (s), from where each trial begins."""
     found = np.empty_like(some.contraction)
-    keep = np.exp(-TICK_S / time)
+    keep = np.exp(-BIN_S / time)
     for each in _by_trial(some):
         here = some.contraction[each]
         state = here[0]
@@ -150,7 +150,7 @@ def _lagged(some: Ticks, time: float) -> Array:
     return found
 
 
-def _play(some: Ticks, distance: float) -> Array:
+def _play(some: TimeBins, distance: float) -> Array:
     """Force of friction that builds up over a way (mm), -1 to 1: from 0 in each trial."""
     found = np.zeros_like(some.contraction)
     for each in _by_trial(some):

@@ -46,7 +46,7 @@ def sparse_regression(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, An
         for term, share in kept_terms(balance).items():
             name = term.partition(":")[0]
             shares[name] = shares.get(name, 0.0) + share
-    parameters = moved(ready.bench, ready.refitted)
+    parameters = moved(ready.problem, ready.refitted)
     if max(shares.values(), default=0.0) < LEAST_SHARE:
         return answer("parameters" if ready.moved else "agrees", (), parameters, shares=shares)
     largest = max(shares, key=lambda name: shares[name])

@@ -20,11 +20,11 @@ from benchmarks.hidden_effects.baselines.preparation import (
     prepare,
 )
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.screening.residuals import left_over
-from pma_gym.discovery.screening.score_test import Baseline, beginnings, look
+from pma_gym.discovery.screening.residuals import simulated_less_measured
+from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points
 from pma_gym.discovery.selection.forward_selection import MOST_EFFECTS, NEAR, TRIED
 
 Array = NDArray[np.float64]
@@ -50,17 +50,17 @@ def bic(squares: Sequence[float], counts: Sequence[int], parameters: int) -> flo
 def bic_stepwise(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """Effects of the catalogue, added one by one while the criterion falls."""
     ready = prepare(dataset, jobs)
-    bench = noise_of(ready.left, ready.bench)
-    best = bench.fit(ready.refitted.model) or ready.refitted
-    least = _bic_of(bench, best, (), bench.own.free)
-    chosen: tuple[Suspect, ...] = ()
+    problem = noise_of(ready.left, ready.problem)
+    best = problem.fit(ready.refitted.model) or ready.refitted
+    least = _bic_of(problem, best, (), problem.own.free)
+    chosen: tuple[CandidateEffect, ...] = ()
     while len(chosen) < MOST_EFFECTS:
-        found = _tried(bench, best, chosen, ready, seed)
+        found = _tried(problem, best, chosen, ready, seed)
         added, fit, value = min(found, key=lambda each: each[2], default=(None, best, np.inf))
         if added is None or value >= least:
             break
         chosen, best, least = (*chosen, added), fit, value
-    parameters = moved(bench, best)
+    parameters = moved(problem, best)
     effects = [
         {
             "name": each.name,
@@ -71,43 +71,49 @@ def bic_stepwise(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     ]  # fmt: skip
     if chosen:
         return answer("effect", effects, parameters, bic=least)
-    return answer("parameters" if _off(bench, best, least) else "agrees", (), parameters, bic=least)
+    return answer(
+        "parameters" if _off(problem, best, least) else "agrees", (), parameters, bic=least
+    )
 
 
 def _tried(
-    bench: Bench, best: Fitted, chosen: tuple[Suspect, ...], ready: Prepared, seed: int
-) -> list[tuple[Suspect, Fitted, float]]:
-    """The suspects that look best beside a fit, each fitted, with its criterion."""
-    baseline = Baseline.at(bench.evidence(best.model, chosen), best.values, best.steps)
-    plain = bench.given.replace({path: best.estimate(path)[0] for path in bench.own.free})
+    problem: FitProblem,
+    best: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    ready: Prepared,
+    seed: int,
+) -> list[tuple[CandidateEffect, Fitted, float]]:
+    """The candidates that look best beside a fit, each fitted, with its criterion."""
+    baseline = Baseline.at(problem.whitened_residuals(best.model, chosen), best.values, best.steps)
+    plain = problem.given.replace({path: best.estimate(path)[0] for path in problem.own.free})
     taken = {each.name for each in chosen}
     rest = [each for each in ready.catalogue if each.name not in taken]
-    looks = look(baseline, rest, seed, lambda each: bench.probed(plain, each))
-    looks.sort(key=lambda each: -each.gain)
+    scores = screen(baseline, rest, seed, lambda each: problem.probed(plain, each))
+    scores.sort(key=lambda each: -each.gain)
     found = []
-    worth = [each for each in looks if each.starts and each.gain > NEAR * looks[0].gain]
+    worth = [each for each in scores if each.starts and each.gain > NEAR * scores[0].gain]
     for each in worth[:TRIED]:
-        begun = beginnings(baseline, bench.probed(plain, each.suspect), each)[0]
-        extra = (*chosen, each.suspect)
-        fit = bench.fit(best.model, extra, {each.suspect.name: begun})
+        begun = starting_points(baseline, problem.probed(plain, each.candidate), each)[0]
+        extra = (*chosen, each.candidate)
+        fit = problem.fit(best.model, extra, {each.candidate.name: begun})
         if fit is not None:
-            found.append((each.suspect, fit, _bic_of(bench, fit, extra, fit.paths)))
+            found.append((each.candidate, fit, _bic_of(problem, fit, extra, fit.paths)))
     return found
 
 
 def _bic_of(
-    bench: Bench, fit: Fitted, extra: Sequence[Suspect], fitted: Sequence[str]
+    problem: FitProblem, fit: Fitted, extra: Sequence[CandidateEffect], fitted: Sequence[str]
 ) -> float:  # fmt: skip
-    evidence = bench.evidence(fit.model, extra)
-    readings = evidence.readings(fit.values)
+    whitened = problem.whitened_residuals(fit.model, extra)
+    readings = whitened.readings(fit.values)
     if readings is None:
         return float("inf")
-    left = left_over(evidence, readings)
+    left = simulated_less_measured(whitened, readings)
     known = [np.concatenate([part[c][np.isfinite(part[c])] for part in left]) for c in range(4)]
     return bic([float(each @ each) for each in known], [len(each) for each in known], len(fitted))
 
 
-def _off(bench: Bench, fit: Fitted, value: float) -> bool:
+def _off(problem: FitProblem, fit: Fitted, value: float) -> bool:
     """Whether refitted parameters, which count, are better than those that were given."""
-    given = replace(fit, model=bench.given, values=values(bench.given, bench.own.free))
-    return value < _bic_of(bench, given, (), ())
+    given = replace(fit, model=problem.given, values=values(problem.given, problem.own.free))
+    return value < _bic_of(problem, given, (), ())

@@ -1,4 +1,4 @@
-"""One case from the draw to the answer, in whatever process."""
+"""One case from the draw to the answer, in any process."""
 
 import time
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from benchmarks.hidden_effects.generation.blocks import Block
 
 @dataclass(frozen=True)
 class Work:
-    """A case to draw, to diagnose and to keep a record of.
+    """A case to draw and to diagnose; its result is a record.
 
     Attributes:
         block: its block.
@@ -49,7 +49,7 @@ class Work:
             rounds = follow(case, answer, self.block.rounds, self.judge)
         ends = {"draw": drawn - begun, "diagnose": answered - drawn}
         ends["rounds"] = time.perf_counter() - answered
-        record = records.Record(
+        return records.Record(
             self.number,
             case.truth,
             answer.document and records.essentials(answer.document),
@@ -59,5 +59,3 @@ class Work:
             self.code,
             self.block.rounds,
         )
-        records.write(record, self.folder)
-        return record

@@ -282,7 +282,7 @@ def _measured(
     colours: Array,
     parameters: Mapping[str, Values],
 ) -> Array:
-    """One trial's readings at the door: noise, a zero of the LVDT, the DAQ's rounding."""
+    """One trial's readings in file units: noise, a zero of the LVDT, the DAQ's rounding."""
     white = g.standard_normal(clean.shape)
     zero = g.normal(0.0, 0.1)
     out = np.empty_like(clean)

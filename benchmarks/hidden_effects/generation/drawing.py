@@ -4,11 +4,12 @@ import os
 import sys
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import run_or_raise
 from benchmarks.hidden_effects.generation.cases import Case, draw_case
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import case_name, is_written, write_case
@@ -85,18 +86,16 @@ def _write(work: Mapping[int, Callable[[], str]], folder: Path, jobs: int) -> No
     began, done = time.monotonic(), count - len(missing)
     if done:
         print(f"{done} of {count} cases are there already", file=sys.stderr)
-    if jobs == 1:
-        for make in missing:
-            done += 1
-            _tell(done, count, make(), began)
-        return
-    # A process a core; numpy's own threads would only get in each other's way.
-    os.environ["OMP_NUM_THREADS"] = "1"
-    with ProcessPoolExecutor(jobs) as pool:
-        futures = [pool.submit(make) for make in missing]
-        for future in as_completed(futures):
-            done += 1
-            _tell(done, count, future.result(), began)
+    if jobs > 1:
+        # A process a core; numpy's own threads would only get in each other's way.
+        os.environ["OMP_NUM_THREADS"] = "1"
+
+    def tell(_: int, words: str) -> None:
+        nonlocal done
+        done += 1
+        _tell(done, count, words, began)
+
+    run_or_raise(missing, local(jobs), tell)
 
 
 def _draw_one(plan: Plan, number: int, folder: Path) -> str:

@@ -42,7 +42,7 @@ CONVERTED: dict[str, Callable[[Values], dict[str, float]]] = {
 
 
 def expected(effect: str, hidden: Values) -> dict[str, float]:
-    """Values at the door, by the catalogue's parameter, that describe a hidden effect."""
+    """Values in file units, by the catalogue's parameter, that describe a hidden effect."""
     if effect in CONVERTED:
         return CONVERTED[effect](hidden)
     if effect.removesuffix("_lag") in SENSORS:

@@ -8,7 +8,7 @@ import numpy as np
 from benchmarks.hidden_effects.generation.files import lab_model
 from benchmarks.hidden_effects.physics.rig import Array
 from benchmarks.hidden_effects.physics.simulation import RATE
-from pma_gym.discovery.experiments.excitation import RATE_HZ, Protocol, library
+from pma_gym.discovery.experiments.excitation import RATE_HZ, Excitation, library
 from pma_gym.plant.model import parse_model
 
 Volts = tuple[Array, Array]
@@ -16,36 +16,36 @@ Volts = tuple[Array, Array]
 
 
 @cache
-def safe_experiments() -> tuple[Protocol, ...]:
+def safe_experiments() -> tuple[Excitation, ...]:
     """The whole library, as large as is safe by what the lab believes."""
     assert RATE_HZ == RATE, "the library and the generator count rows alike"
     return tuple(library([parse_model(tomllib.loads(lab_model()))]))
 
 
 def named(words: str, g: np.random.Generator) -> tuple[str, Volts]:
-    """Name and volts of a protocol whose name begins with words, at a random one of its settings.
+    """Name and volts of an excitation whose name begins with words, at one of its settings.
 
     Raises:
         ValueError: there is none.
     """
     found = [each for each in safe_experiments() if each.name.startswith(words)]
     if not found:
-        raise ValueError(f"the library has no protocol that begins with {words!r}")
+        raise ValueError(f"the library has no excitation that begins with {words!r}")
     chosen = found[int(g.integers(len(found)))]
     return chosen.name, volts(chosen)
 
 
 def random_experiment(g: np.random.Generator, rows: int) -> tuple[str, Volts]:
-    """A random protocol, cut or begun again so that it takes as many rows as another."""
+    """A random excitation, cut or repeated so that it takes as many rows as another."""
     every = safe_experiments()
     chosen = every[int(g.integers(len(every)))]
     motor, regulator = (np.resize(column, rows) for column in volts(chosen))
     return chosen.name, (motor, regulator)
 
 
-def volts(protocol: Protocol) -> Volts:
+def volts(excitation: Excitation) -> Volts:
     """Its commands, in whole millivolts as a lab sends them."""
-    commands = protocol.trial.commands
+    commands = excitation.trial.commands
     return (
         np.round(commands["motor_voltage"], 3),
         np.round(commands["regulator_voltage"], 3),

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from benchmarks.commands.options import LOCAL, ExecutorOption, chosen_executor
 from pma_gym.cli.options import StrictTyper
 from pma_gym.terminal import safe_streams
 
@@ -21,7 +22,9 @@ Groups = Annotated[str, typer.Option(help="Groups by commas; all if empty.")]
 
 
 @app.command()
-def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
+def run(
+    out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", executor: ExecutorOption = LOCAL
+) -> None:
     """Train what has no policy yet; an interrupted study goes on."""
     from benchmarks.training.study.cells import cells
     from benchmarks.training.study.runs import Run, runs, train_all
@@ -30,7 +33,7 @@ def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
     chosen = [cell for cell in cells() if not groups or cell.group in groups.split(",")]
     todo = runs(chosen, out)
 
-    def told(done: Run, policy: PolicyFile, number: int, count: int) -> None:
+    def print_run(done: Run, policy: PolicyFile, number: int, count: int) -> None:
         scores = policy.training["scores"]["validation"]
         print(
             f"{number}/{count} {done.cell.group} {policy.name} seed {done.seed}: "
@@ -39,20 +42,28 @@ def run(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "") -> None:
         )
 
     try:
-        print(f"{train_all(todo, jobs, told)} trained, {len(todo)} in all")
+        trained = train_all(todo, chosen_executor(executor, jobs), print_run)
+        print(f"{trained} trained, {len(todo)} in all")
     except KeyboardInterrupt:
         print("Interrupted; run it again, it goes on where it stopped", file=sys.stderr)
         raise typer.Exit(130) from None
 
 
 @app.command()
-def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "") -> None:
+def judge(
+    out: Out = OUT,
+    jobs: Jobs = 2,
+    groups: Groups = "",
+    suites: str = "",
+    executor: ExecutorOption = LOCAL,
+) -> None:
     """Run every seed's policies through the suites; what ran before stays."""
     from benchmarks.training.study.cells import cells
     from benchmarks.training.study.scored_policies import SUITES, judge_pid, seed_folders
     from benchmarks.training.study.scored_policies import judge as judge_group
     from pma_gym.terminal import SafeConsole
 
+    places = chosen_executor(executor, jobs)
     algorithms = {cell.group: cell.algorithm for cell in cells()}
     strange = [name for name in groups.split(",") if groups and name not in algorithms]
     if strange:
@@ -62,7 +73,7 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
         )
         raise typer.Exit(2)
     if not groups:
-        judge_pid(out, jobs, SafeConsole())
+        judge_pid(out, places, SafeConsole())
     for group, algorithm in algorithms.items():
         wanted = group in groups.split(",") if groups else not group.startswith("ablation-")
         if not wanted:
@@ -71,7 +82,7 @@ def judge(out: Out = OUT, jobs: Jobs = 2, groups: Groups = "", suites: str = "")
             print(f"{group}: no policy in {out / group}, train it first", file=sys.stderr)
             continue
         for suite in suites.split(",") if suites else SUITES:
-            judge_group(out / group, algorithm, suite, jobs, SafeConsole())
+            judge_group(out / group, algorithm, suite, places, SafeConsole())
 
 
 @app.command()

@@ -2,11 +2,11 @@
 
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from benchmarks.executors.executor import Executor, run_or_raise
 from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.run import Order, train
 from benchmarks.training.study.cells import Cell
@@ -43,29 +43,27 @@ def runs(cells: Sequence[Cell], out: Path) -> list[Run]:
 
 
 def train_all(
-    todo: Sequence[Run], jobs: int, told: Callable[[Run, PolicyFile, int, int], None]
+    todo: Sequence[Run], executor: Executor, on_done: Callable[[Run, PolicyFile, int, int], None]
 ) -> int:
     """Train what has no policy yet.
 
     Args:
         todo: trainings.
-        jobs: processes.
-        told: is told of each: the training, its policy, how many are done and how many there are.
+        executor: where.
+        on_done: called with each training, its policy, how many are done and how many there are.
     Returns:
         How many were trained.
     """
     missing = [run for run in todo if not run.path.exists()]
-    # Spawned: kernels and PyTorch have threads. A process keeps the stations that it has drawn.
-    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
-        futures = {pool.submit(train_one, run): run for run in missing}
-        try:
-            for done, future in enumerate(as_completed(futures), 1):
-                run = futures[future]
-                future.result()
-                told(run, load_policy_file(run.path), done, len(missing))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    done = 0
+
+    def keep(index: int, _: float) -> None:
+        nonlocal done
+        done += 1
+        run = missing[index]
+        on_done(run, load_policy_file(run.path), done, len(missing))
+
+    run_or_raise([partial(train_one, run) for run in missing], executor, keep)
     return len(missing)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.comparison.job import run_comparison
+from benchmarks.executors.executor import Executor
 from benchmarks.report.errors import Measure, Record, measures
 from benchmarks.runner.controller_spec import parse_contenders
 from benchmarks.runner.journal import JOURNAL, case_rows
@@ -36,14 +37,16 @@ def seed_folders(group: Path) -> list[Path]:
     return sorted(found, key=lambda path: int(path.name.partition("-")[2]))
 
 
-def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) -> Path | None:
+def judge(
+    group: Path, algorithm: str, suite: str, executor: Executor, console: Console
+) -> Path | None:
     """Run every seed's policies through a suite; what ran before stays.
 
     Args:
         group: folder of the seeds.
         algorithm: of the policies.
         suite: name of the suite.
-        jobs: processes.
+        executor: where the cases run.
         console: where to print.
     Returns:
         The folder of the results; None if there is no policy for the suite's loop.
@@ -59,15 +62,15 @@ def judge(group: Path, algorithm: str, suite: str, jobs: int, console: Console) 
         return None
     entries = [entry._replace(only=able) for entry in entries]
     out = group / f"suite-{suite}"
-    run_comparison(frozen, entries, out, jobs, console)
+    run_comparison(frozen, entries, out, executor, console)
     return out
 
 
-def judge_pid(out: Path, jobs: int, console: Console) -> None:
+def judge_pid(out: Path, executor: Executor, console: Console) -> None:
     """Run the PID through suite `robust`, what curves are compared with."""
     frozen = frozen_suite("robust")
     entries = [frozen.entry(one) for one in parse_contenders("pid")]
-    run_comparison(frozen, entries, out / PID_FOLDER, jobs, console)
+    run_comparison(frozen, entries, out / PID_FOLDER, executor, console)
 
 
 def _able(suite: FrozenSuite, tasks: Sequence[str], group: Path, algorithm: str) -> tuple[str, ...]:

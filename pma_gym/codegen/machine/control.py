@@ -1,4 +1,4 @@
-"""Functions, loops and memory in LLVM, to be written by hand around `Lanes.emit`."""
+"""Functions, loops and memory in LLVM, to be written by hand around `SimdEmitter.emit`."""
 
 import sys
 from collections.abc import Callable, Iterator, Sequence

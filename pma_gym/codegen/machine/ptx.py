@@ -1,7 +1,8 @@
 """Traced arithmetic for NVIDIA GPUs, as PTX text, which the GPU's driver compiles.
 
-One thread does one lane: emit with `Lanes(1)`. No CUDA toolkit is needed, for LLVM writes the text.
-Sums and products are written as rounding each, so that a GPU too gives the bits of a processor.
+One thread does one lane: emit with `SimdEmitter(1)`. No CUDA toolkit is needed, for LLVM
+writes the text. Sums and products are written as rounding each, so that a GPU too gives the bits of
+a processor.
 """
 
 from collections.abc import Sequence

@@ -1,6 +1,6 @@
 """Traced arithmetic as LLVM instructions, scalar or in SIMD lanes.
 
-Loops, loads and stores are written by hand with llvmlite's builder; `Lanes.emit` writes the
+Loops, loads and stores are written by hand with llvmlite's builder; `SimdEmitter.emit` writes the
 straight-line arithmetic between them. Instructions carry no fast-math flags, so that each lane of a
 vector has the bits of the scalar code; `fused` gives that up for speed.
 """
@@ -42,7 +42,7 @@ _SIGNS = {"less": "<", "less_equal": "<=", "equal": "==", "not_equal": "!="}
 _INTRINSICS = {"square_root": "sqrt", "absolute": "fabs", "floor": "floor"}
 
 
-class Lanes:
+class SimdEmitter:
     """Writes traced arithmetic for a number of lanes.
 
     Args:

@@ -57,7 +57,7 @@ thread that calls."""
 _POINTER, _INTEGER = ctypes.c_void_p, ctypes.c_int64
 
 
-class Crew:
+class ThreadPool:
     """Runs compiled functions on all parts of some work, in several threads.
 
     Args:
@@ -73,24 +73,24 @@ class Crew:
     def _begin(self) -> None:
         self._process = os.getpid()
         self._board = _Board(self._works)
-        self._hands = [_Hand(self._board, own) for own in range(1, self._board.threads)]
-        # Threads know nothing of the crew, so that it can be forgotten, and they with it.
-        self.close = weakref.finalize(self, _dismiss, self._hands)
+        self._workers = [_Worker(self._board, own) for own in range(1, self._board.threads)]
+        # Threads know nothing of the pool, so that it can be forgotten, and they with it.
+        self.close = weakref.finalize(self, _dismiss, self._workers)
         self.close.atexit = False
 
     def run(self, work: int = 0) -> int:
         """Do all parts of a work; the bits of what its function returned, together."""
-        # A process that was forked from this one has the hands but not their threads.
-        if self._hands and (self._process != os.getpid() or not self.close.alive):
+        # A process that was forked from this one has the workers but not their threads.
+        if self._workers and (self._process != os.getpid() or not self.close.alive):
             self._begin()
         if work != self._board.ready:
             self._board.prepare(work)
-        if self._hands:
+        if self._workers:
             # Announced first: a thread that is about to sleep looks at this once more.
             self._board.announce()
-            for hand in self._hands:
-                if hand.asleep:
-                    hand.bell.set()
+            for worker in self._workers:
+                if worker.asleep:
+                    worker.wake.set()
         return self._lead(*self._board.call)
 
 
@@ -131,19 +131,19 @@ class _Board:
         self.wanted = int(self._works[0]) + 1
 
 
-class _Hand:
+class _Worker:
     """A thread that waits for work, awake for a while and then asleep.
 
     Attributes:
-        asleep: whether it waits for the bell.
+        asleep: whether it waits for the wake.
         dismissed: whether it is to end.
-        bell: awakens it.
+        wake: awakens it.
     """
 
     def __init__(self, board: _Board, own: int) -> None:
         self._board = board
         self.asleep = self.dismissed = False
-        self.bell = threading.Event()
+        self.wake = threading.Event()
         kinds = [_POINTER, _POINTER, *[_INTEGER] * 4]
         self._serve = _library().function("serve", kinds, _INTEGER)
         self._own = own
@@ -153,23 +153,23 @@ class _Hand:
         seen = 0
         while not self.dismissed:
             seen = self._serve(*self._board.call, self._own, SPINS, seen)
-            self.bell.clear()
+            self.wake.clear()
             self.asleep = True
             # Work may have been announced between the last look and the line above.
             if self._board.wanted == seen and not self.dismissed:
-                self.bell.wait()
+                self.wake.wait()
             self.asleep = False
 
 
-def _dismiss(hands: Sequence[_Hand]) -> None:
-    for hand in hands:
-        hand.dismissed = True
-        hand.bell.set()
+def _dismiss(workers: Sequence[_Worker]) -> None:
+    for worker in workers:
+        worker.dismissed = True
+        worker.wake.set()
 
 
 @cache
 def _library() -> Library:
-    return compiled(["crew"], _build, "crew")
+    return compiled(["thread pool"], _build, "thread pool")
 
 
 def _build() -> ir.Module:
@@ -192,25 +192,25 @@ def _share(b: Builder, shares: Operand, number: Operand) -> Operand:
     return offset(b, shares, b.mul(number, integer(SHARE)), INTEGER)
 
 
-def write_another(b: Builder, crew: Operand) -> Operand:
+def write_another(b: Builder, pool: Operand) -> Operand:
     """Write the taking of another part in the midst of one; address of its arguments, 0 for none.
 
     It is to be done before the function returns, whose result is that of both.
 
     Args:
         b: where to write.
-        crew: the function's second argument.
+        pool: the function's second argument.
     """
     kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER]))
-    address = b.load(offset(b, crew, ANOTHER, INTEGER), typ=INTEGER)
-    return b.call(b.inttoptr(address, kind), [crew])
+    address = b.load(offset(b, pool, ANOTHER, INTEGER), typ=INTEGER)
+    return b.call(b.inttoptr(address, kind), [pool])
 
 
 def _write_take(module: ir.Module) -> None:
     """Take a part on that nobody has, one's own share first; 0 if there is none."""
-    b, (crew,) = function(module, "take", [("crew", POINTER)], INTEGER)
+    b, (pool,) = function(module, "take", [("thread pool", POINTER)], INTEGER)
     shares, threads, own = (
-        b.load(offset(b, crew, place, INTEGER), typ=INTEGER) for place in (SHARES, THREADS, OWN)
+        b.load(offset(b, pool, place, INTEGER), typ=INTEGER) for place in (SHARES, THREADS, OWN)
     )
     found, ahead = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
     with repeat(b) as leave_if:
@@ -226,16 +226,16 @@ def _write_take(module: ir.Module) -> None:
                 tried = b.cmpxchg(atomic(b, share, TAKEN), taken, more, "acq_rel", "acquire")
                 with b.if_then(b.extract_value(tried, 1)):
                     b.store(_arguments(b, share, b.sub(taken, end)), found)
-                    b.store(b.ptrtoint(share, INTEGER), offset(b, crew, FROM, INTEGER))
+                    b.store(b.ptrtoint(share, INTEGER), offset(b, pool, FROM, INTEGER))
             with none:
                 b.store(b.add(number, integer(1)), ahead)
         leave_if(b.icmp_signed("!=", b.load(found, typ=INTEGER), integer(0)))
     b.ret(b.load(found, typ=INTEGER))
     # The part in whose midst it is taken is not done before both are.
-    b, (crew,) = function(module, "another", [("crew", POINTER)], INTEGER)
-    found = b.call(module.get_global("take"), [crew])
+    b, (pool,) = function(module, "another", [("thread pool", POINTER)], INTEGER)
+    found = b.call(module.get_global("take"), [pool])
     with b.if_then(b.icmp_signed("!=", found, integer(0))):
-        _done(b, crew)
+        _done(b, pool)
     b.ret(found)
 
 
@@ -246,20 +246,20 @@ def _arguments(b: Builder, share: Operand, before_end: Operand) -> Operand:
     return b.load(offset(b, table, number, INTEGER), typ=INTEGER)
 
 
-def _from(b: Builder, crew: Operand) -> Operand:
-    return b.inttoptr(b.load(offset(b, crew, FROM, INTEGER), typ=INTEGER), POINTER)
+def _from(b: Builder, pool: Operand) -> Operand:
+    return b.inttoptr(b.load(offset(b, pool, FROM, INTEGER), typ=INTEGER), POINTER)
 
 
-def _done(b: Builder, crew: Operand) -> None:
-    b.atomic_rmw("add", atomic(b, _from(b, crew), DONE), integer(1), "release")
+def _done(b: Builder, pool: Operand) -> None:
+    b.atomic_rmw("add", atomic(b, _from(b, pool), DONE), integer(1), "release")
 
 
 def _write_work(module: ir.Module) -> None:
     """Do what nobody has taken on."""
     given = [*_BOARD[1:], ("own", INTEGER)]
     b, (shares, threads, own) = function(module, "work", given)
-    crew = variable(b, ir.ArrayType(INTEGER, FROM + 1))
-    crew.type = POINTER
+    pool = variable(b, ir.ArrayType(INTEGER, FROM + 1))
+    pool.type = POINTER
     another = b.ptrtoint(module.get_global("another"), INTEGER)
     for place, value in (
         (ANOTHER, another),
@@ -267,15 +267,15 @@ def _write_work(module: ir.Module) -> None:
         (THREADS, threads),
         (OWN, own),
     ):
-        b.store(value, offset(b, crew, place, INTEGER))
+        b.store(value, offset(b, pool, place, INTEGER))
     kind = ir.PointerType(ir.FunctionType(INTEGER, [POINTER, POINTER]))
     with repeat(b) as leave_if:
-        part = b.call(module.get_global("take"), [crew])
+        part = b.call(module.get_global("take"), [pool])
         leave_if(b.icmp_signed("==", part, integer(0)))
-        share = _from(b, crew)
+        share = _from(b, pool)
         # Not before there is a part: the next work may have begun, which is another.
         work = b.inttoptr(b.load(atomic(b, share, FUNCTION), typ=INTEGER), kind)
-        result = b.call(work, [b.inttoptr(part, POINTER), crew])
+        result = b.call(work, [b.inttoptr(part, POINTER), pool])
         b.atomic_rmw("or", atomic(b, share, RESULT), result, "monotonic")
         b.atomic_rmw("add", atomic(b, share, DONE), integer(1), "release")
     b.ret_void()

@@ -1,10 +1,10 @@
 """Trials in files: one file a trial, columns by name and unit, SI inside.
 
-A value at the door is a double; its text is the shortest that names it. What was read from a file
+A value in file units is a double; its text is the shortest that names it. What was read from a file
 is written and read again bit for bit. What comes from a computation in m, rad and Pa goes through
 mm, deg and kPa, where not every double has a counterpart: writing it and reading it back gives the
 same bits or, for one value in fifty (one in ten for angles), a neighbour (1 ulp). XLSX keeps 16
-digits of the value at the door: within 4 ulp.
+digits of the value in file units: within 4 ulp.
 """
 
 import os

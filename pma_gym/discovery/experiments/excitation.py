@@ -51,7 +51,7 @@ PRESSURE_STEP = 0.25
 
 
 @dataclass(frozen=True)
-class Protocol:
+class Excitation:
     """An experiment that is safe.
 
     Attributes:
@@ -109,7 +109,7 @@ Recipe = Callable[[float], tuple[str, Trial]]
 """Name and commands of a protocol of some size, a share of the full range."""
 
 
-def library(models: Sequence[Model], seed: int = 0) -> Iterator[Protocol]:
+def library(models: Sequence[Model], seed: int = 0) -> Iterator[Excitation]:
     """All protocols that are safe, one after the other.
 
     None for what is no station: only a station comes to rest by itself.
@@ -128,7 +128,7 @@ def library(models: Sequence[Model], seed: int = 0) -> Iterator[Protocol]:
             yield found
 
 
-def _largest(plants: Sequence[Plant], recipe: Recipe) -> Protocol | None:
+def _largest(plants: Sequence[Plant], recipe: Recipe) -> Excitation | None:
     """A protocol as large as is safe in every model; None if it never is."""
     for size in SIZES:
         name, trial = recipe(size)
@@ -139,7 +139,7 @@ def _largest(plants: Sequence[Plant], recipe: Recipe) -> Protocol | None:
             continue
         pairs = zip(plants, simulated, strict=True)
         if all(is_safe(plant.model, run) for plant, run in pairs):
-            return Protocol(name, trial, tuple(simulated))
+            return Excitation(name, trial, tuple(simulated))
     return None
 
 

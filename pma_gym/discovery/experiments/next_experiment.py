@@ -15,21 +15,21 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.diagnosis import NextExperiment
-from pma_gym.discovery.experiments.excitation import Protocol, library
+from pma_gym.discovery.experiments.excitation import Excitation, library
 from pma_gym.discovery.experiments.predicted_trials import (
     as_measured,
     columns,
     derivatives,
     proposal,
 )
-from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import covariance_root, unabsorbed
 from pma_gym.discovery.screening.score_test import SHOWN_GAIN
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
-Rival = tuple[Fitted, tuple[Suspect, ...]]
+Rival = tuple[Fitted, tuple[CandidateEffect, ...]]
 
 ENOUGH = SHOWN_GAIN / 2.0
 """Log odds that settle a question: five standard deviations. A shorter test that would leave it
@@ -46,43 +46,43 @@ PLAUSIBLE = (0.1, 2.0)
 
 
 @dataclass(frozen=True)
-class Hope:
+class ExpectedOdds:
     """What to expect of a protocol.
 
     Attributes:
-        protocol: the protocol.
+        excitation: the protocol.
         log_odds: of the pair of rivals that is hardest to tell.
         pair: that pair, (true, wrong); (0, 1) where it does not matter.
     """
 
-    protocol: Protocol
+    excitation: Excitation
     log_odds: float
     pair: tuple[int, int] = (0, 1)
 
     @property
     def rank(self) -> tuple[bool, float]:
         """What the choice goes by: whether it settles the question, then log odds a minute."""
-        return self.log_odds >= ENOUGH, self.log_odds / self.protocol.minutes
+        return self.log_odds >= ENOUGH, self.log_odds / self.excitation.minutes
 
 
 @dataclass(frozen=True)
-class Contest:
+class Discrimination:
     """Rivals, and what each may really be.
 
     Attributes:
-        bench: the trials so far.
+        problem: the trials so far.
         fits: of the rivals.
         models: theirs, as a new trial would see them.
         draws: parameters of each, shape (1 + k, p): its estimate, then what it may be as well.
     """
 
-    bench: Bench
+    problem: FitProblem
     fits: tuple[Fitted, ...]
     models: tuple[Model, ...]
     draws: tuple[Array, ...]
 
     @classmethod
-    def of(cls, bench: Bench, rivals: Sequence[Rival], seed: int) -> "Contest":
+    def of(cls, problem: FitProblem, rivals: Sequence[Rival], seed: int) -> "Discrimination":
         """Of fitted rivals.
 
         Data that leave a question open seldom tell how large the effect is, and a promise on the
@@ -93,8 +93,8 @@ class Contest:
         generator = np.random.Generator(np.random.Philox(seed))
         fits = tuple(fit for fit, _ in rivals)
         models = tuple(_as_next(fit.model, extra) for fit, extra in rivals)
-        own = set(bench.own.free)
-        return cls(bench, fits, models, tuple(_drawn(fit, own, generator) for fit in fits))
+        own = set(problem.own.free)
+        return cls(problem, fits, models, tuple(_drawn(fit, own, generator) for fit in fits))
 
     def pairs(self) -> list[tuple[int, int]]:
         """Which rival may be true, and which is then wrong."""
@@ -102,7 +102,7 @@ class Contest:
 
     def odds(
         self,
-        protocols: Sequence[Protocol],
+        excitations: Sequence[Excitation],
         pairs: Sequence[tuple[int, int]],
         refitted: bool = True,
     ) -> Array:
@@ -111,19 +111,20 @@ class Contest:
         The lower quartile over what the true rival may be: a promise that is mostly kept.
 
         Args:
-            protocols: simulated by the models, in their order.
+            excitations: simulated by the models, in their order.
             pairs: true and wrong rivals.
             refitted: take out what the wrong one's parameters absorb, which costs its derivatives.
         """
-        found = np.zeros((len(protocols), len(pairs)))
-        changes = {true: self._changes(true, protocols) for true, _ in pairs}
+        found = np.zeros((len(excitations), len(pairs)))
+        changes = {true: self._changes(true, excitations) for true, _ in pairs}
         first = {wrong: true for true, wrong in reversed(pairs) if refitted}
         absorbing = {
-            wrong: self._slopes(wrong, _simulated(protocols, true)) for wrong, true in first.items()
+            wrong: self._slopes(wrong, _simulated(excitations, true))
+            for wrong, true in first.items()
         }
         for at, (true, wrong) in enumerate(pairs):
-            fit, trials = self.fits[wrong], _simulated(protocols, true)
-            given = columns(self.bench, self.models[wrong], fit.paths, trials, fit.values[None])
+            fit, trials = self.fits[wrong], _simulated(excitations, true)
+            given = columns(self.problem, self.models[wrong], fit.paths, trials, fit.values[None])
             for k, each in enumerate(given):
                 if each is None:
                     continue
@@ -136,7 +137,7 @@ class Contest:
                 found[k, at] = 0.5 * float(np.quantile(gains, 0.25))
         return found
 
-    def _changes(self, true: int, protocols: Sequence[Protocol]) -> list[Array]:
+    def _changes(self, true: int, excitations: Sequence[Excitation]) -> list[Array]:
         """What draws of a rival change of its simulations, whitened, shape (1 + k, n) each.
 
         To first order, which size is nearly: a simulation of every draw may meet parameters so
@@ -145,8 +146,8 @@ class Contest:
         fit, draws = self.fits[true], self.draws[true]
         effects = np.flatnonzero(np.any(draws != fit.values, axis=0))
         if not len(effects):
-            return [np.zeros((1, 1))] * len(protocols)
-        by = self._slopes(true, _simulated(protocols, true), effects)
+            return [np.zeros((1, 1))] * len(excitations)
+        by = self._slopes(true, _simulated(excitations, true), effects)
         moves = (draws - fit.values)[:, effects]
         return [np.zeros((1, 1)) if each is None else moves @ each for each in by]
 
@@ -154,19 +155,21 @@ class Contest:
         self, rival: int, trials: Sequence[Trial], which: NDArray[np.int64] | None = None
     ) -> list[Array | None]:
         """Derivatives of trials, if a rival is true, by its parameters, or some of them."""
-        return derivatives(self.bench, self.models[rival], self.fits[rival], trials, which)
+        return derivatives(self.problem, self.models[rival], self.fits[rival], trials, which)
 
 
-def _simulated(protocols: Sequence[Protocol], rival: int) -> list[Trial]:
-    return [protocol.simulated[rival] for protocol in protocols]
+def _simulated(excitations: Sequence[Excitation], rival: int) -> list[Trial]:
+    return [excitation.simulated[rival] for excitation in excitations]
 
 
-def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExperiment | None:
+def next_experiment(
+    problem: FitProblem, rivals: Sequence[Rival], seed: int
+) -> NextExperiment | None:
     """The safe protocol that tells rivals apart fastest.
 
     Args:
-        bench: the trials so far.
-        rivals: models that explain them, each fitted, with the suspects in it.
+        problem: the trials so far.
+        rivals: models that explain them, each fitted, with the candidates in it.
         seed: of what is random in protocols, and of what the rivals may be.
     Returns:
         What to measure next; None where there are not two rivals, see `blind_spots.for_blind` then,
@@ -174,65 +177,72 @@ def next_experiment(bench: Bench, rivals: Sequence[Rival], seed: int) -> NextExp
     """
     if len(rivals) < 2:
         return None
-    contest = Contest.of(bench, rivals, seed)
-    best = fastest(contest, list(library([*contest.models, bench.given], seed)))
+    discrimination = Discrimination.of(problem, rivals, seed)
+    best = fastest(discrimination, list(library([*discrimination.models, problem.given], seed)))
     if best is None:
         return None
-    promised = min(best.log_odds, *_after_refit(contest, rivals, best))
-    shared = set.intersection(*(set(fit.names) for fit in contest.fits))
-    names = [" + ".join(n for n in fit.names if n not in shared) for fit in contest.fits]
+    promised = min(best.log_odds, *_after_refit(discrimination, rivals, best))
+    shared = set.intersection(*(set(fit.names) for fit in discrimination.fits))
+    names = [" + ".join(n for n in fit.names if n not in shared) for fit in discrimination.fits]
     told = [name for name in names if name]
     if len(told) != 1:
         told = [name or "none of them" for name in names]
-    return proposal(best.protocol, told, promised)
+    return proposal(best.excitation, told, promised)
 
 
-def fastest(contest: Contest, protocols: Sequence[Protocol]) -> Hope | None:
+def fastest(
+    discrimination: Discrimination, excitations: Sequence[Excitation]
+) -> ExpectedOdds | None:
     """The best of protocols, None if there are none.
 
     What parameters absorb only lowers the odds. So differences as they are bound them from above,
     and the costly derivatives are needed for few protocols.
     """
-    if not protocols:
+    if not excitations:
         return None
-    pairs = contest.pairs()
-    bound = contest.odds(protocols, pairs, refitted=False)
+    pairs = discrimination.pairs()
+    bound = discrimination.odds(excitations, pairs, refitted=False)
     # Two rivals that nothing tells apart must not hide what tells them from a third.
     told = np.max(bound, axis=0) >= LEAST
     kept = np.flatnonzero(told if told.any() else ~told)
     chosen = [pairs[k] for k in kept]
     hoped = [
-        Hope(each, float(np.min(row[kept]))) for each, row in zip(protocols, bound, strict=True)
+        ExpectedOdds(each, float(np.min(row[kept])))
+        for each, row in zip(excitations, bound, strict=True)
     ]
-    best: Hope | None = None
-    for hope in sorted(hoped, key=lambda each: each.rank, reverse=True):
-        if best is not None and hope.rank <= best.rank:
+    best: ExpectedOdds | None = None
+    for expected in sorted(hoped, key=lambda each: each.rank, reverse=True):
+        if best is not None and expected.rank <= best.rank:
             break
-        (odds,) = contest.odds([hope.protocol], chosen)
-        found = Hope(hope.protocol, float(np.min(odds)), chosen[int(np.argmin(odds))])
+        (odds,) = discrimination.odds([expected.excitation], chosen)
+        found = ExpectedOdds(expected.excitation, float(np.min(odds)), chosen[int(np.argmin(odds))])
         if best is None or found.rank > best.rank:
             best = found
     return best
 
 
-def _after_refit(contest: Contest, rivals: Sequence[Rival], hope: Hope) -> Iterator[float]:
+def _after_refit(
+    discrimination: Discrimination, rivals: Sequence[Rival], expected: ExpectedOdds
+) -> Iterator[float]:
     """Log odds of the hardest pair, either way round, when the wrong one is really refitted.
 
     Where trials hardly determine a rival, first order underestimates what it can absorb.
     """
-    bench = contest.bench
-    for true, wrong in (hope.pair, hope.pair[::-1]):
+    problem = discrimination.problem
+    for true, wrong in (expected.pair, expected.pair[::-1]):
         fit, extra = rivals[wrong]
-        trial = as_measured(bench, hope.protocol.simulated[true])
-        joint = replace(bench, trials=[*bench.trials, trial])
-        refitted = joint.fit(fit.model, [_once_more(suspect) for suspect in extra])
+        trial = as_measured(problem, expected.excitation.simulated[true])
+        joint = replace(problem, trials=[*problem.trials, trial])
+        refitted = joint.fit(fit.model, [_once_more(candidate) for candidate in extra])
         if refitted is not None:
             yield max(0.0, 0.5 * (refitted.chi_square - fit.chi_square))
 
 
-def _once_more(suspect: Suspect) -> Suspect:
-    """A suspect with one trial more, the first after a rest."""
-    return replace(suspect, own={path: [*each, min(each)] for path, each in suspect.own.items()})
+def _once_more(candidate: CandidateEffect) -> CandidateEffect:
+    """A candidate with one trial more, the first after a rest."""
+    return replace(
+        candidate, own={path: [*each, min(each)] for path, each in candidate.own.items()}
+    )
 
 
 def _drawn(fit: Fitted, own: set[str], generator: np.random.Generator) -> Array:
@@ -244,7 +254,7 @@ def _drawn(fit: Fitted, own: set[str], generator: np.random.Generator) -> Array:
     return np.concatenate([fit.values[None], np.clip(drawn, *bounds(fit.paths))])
 
 
-def _as_next(model: Model, extra: Sequence[Suspect]) -> Model:
+def _as_next(model: Model, extra: Sequence[CandidateEffect]) -> Model:
     """A model as a new trial would see it, the first after a rest."""
-    own = {path: float(min(each)) for suspect in extra for path, each in suspect.own.items()}
+    own = {path: float(min(each)) for candidate in extra for path, each in candidate.own.items()}
     return model.replace(own) if own else model

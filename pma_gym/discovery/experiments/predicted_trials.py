@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.diagnosis import NextExperiment
-from pma_gym.discovery.experiments.excitation import Protocol
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.experiments.excitation import Excitation
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -21,15 +21,17 @@ MOST = 50.0
 """Largest log odds that are promised: no model is that exact."""
 
 
-def foretold(bench: Bench, model: Model, free: Sequence[str], *simulated: Trial) -> Evidence:
+def predicted(
+    problem: FitProblem, model: Model, free: Sequence[str], *simulated: Trial
+) -> WhitenedResiduals:
     """Simulated trials beside a model."""
     nothing = np.full(len(free), np.inf)
-    trials = [as_measured(bench, trial) for trial in simulated]
-    return Evidence(model, trials, free, bench.noise, nothing, threads=bench.threads)
+    trials = [as_measured(problem, trial) for trial in simulated]
+    return WhitenedResiduals(model, trials, free, problem.noise, nothing, threads=problem.threads)
 
 
 def columns(
-    bench: Bench, model: Model, free: Sequence[str], simulated: Sequence[Trial], tried: Array
+    problem: FitProblem, model: Model, free: Sequence[str], simulated: Sequence[Trial], tried: Array
 ) -> list[Columns | None]:
     """`Evidence.columns` of each simulated trial, None for one that has none.
 
@@ -37,15 +39,15 @@ def columns(
     """
     if not simulated:
         return []
-    together = foretold(bench, model, free, *simulated).columns(tried)
+    together = predicted(problem, model, free, *simulated).columns(tried)
     if together is not None:
         return list(together)
-    apart = [foretold(bench, model, free, trial).columns(tried) for trial in simulated]
+    apart = [predicted(problem, model, free, trial).columns(tried) for trial in simulated]
     return [None if found is None else found[0] for found in apart]
 
 
 def derivatives(
-    bench: Bench,
+    problem: FitProblem,
     model: Model,
     fit: Fitted,
     simulated: Sequence[Trial],
@@ -54,7 +56,7 @@ def derivatives(
     """Derivatives of the whitened readings of each trial, shape (p, 4 rows); None if it has none.
 
     Args:
-        bench: says what a lab measures, and its noise.
+        problem: says what a lab measures, and its noise.
         model: the fit's, as a new trial would see it.
         fit: where, and how far parameters are moved for it.
         simulated: the trials.
@@ -63,7 +65,7 @@ def derivatives(
     chosen = np.arange(len(fit.values)) if which is None else np.asarray(which)
     steps = fit.steps[chosen]
     moved = np.concatenate([fit.values[None], fit.values + np.diag(fit.steps)[chosen]])
-    found = columns(bench, model, fit.paths, simulated, moved)
+    found = columns(problem, model, fit.paths, simulated, moved)
     return [None if each is None else _per_step(each, steps) for each in found]
 
 
@@ -72,9 +74,9 @@ def _per_step(found: Columns, steps: Array) -> Array:
     return changes.reshape(len(steps), -1) / steps[:, None]
 
 
-def as_measured(bench: Bench, simulated: Trial) -> Trial:
+def as_measured(problem: FitProblem, simulated: Trial) -> Trial:
     """A simulated trial with the signals that the lab measures."""
-    known = {name for trial in bench.trials for name in _measured(trial)}
+    known = {name for trial in problem.trials for name in _measured(trial)}
     readings = {name: row for name, row in simulated.measurements.items() if name in known}
     return replace(simulated, measurements=readings, truth={})
 
@@ -85,15 +87,15 @@ def _measured(trial: Trial) -> Iterator[str]:
             yield name
 
 
-def proposal(protocol: Protocol, separates: Sequence[str], log_odds: float) -> NextExperiment:
+def proposal(excitation: Excitation, separates: Sequence[str], log_odds: float) -> NextExperiment:
     """A protocol as an experiment to propose.
 
     Args:
-        protocol: the protocol.
+        excitation: the protocol.
         separates: names of what it tells apart.
         log_odds: natural logarithm of the odds to expect; no more than `MOST` is promised.
     """
     odds = math.exp(min(log_odds, MOST))
-    note = {"note": f"proposed: {protocol.name}"}
-    trial = Trial(protocol.trial.time, protocol.trial.commands, provenance=note)
-    return NextExperiment(protocol.name, tuple(separates), odds, protocol.minutes, trial)
+    note = {"note": f"proposed: {excitation.name}"}
+    trial = Trial(excitation.trial.time, excitation.trial.commands, provenance=note)
+    return NextExperiment(excitation.name, tuple(separates), odds, excitation.minutes, trial)

@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Suspect:
+class CandidateEffect:
     """One effect that may be missing.
 
     Attributes:

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import PIECE_S, Pieces
 
 Array = NDArray[np.float64]
@@ -24,14 +24,14 @@ LEAST_TRIALS = 4
 """Fewer trials than this say nothing of how parameters scatter between them."""
 
 
-def covariance(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> Array:
+def covariance(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]) -> Array:
     """Covariance of a fit's parameters, shape (p, p), at the door.
 
     Correlations are those of the curvature; errors are the largest that it, stretches or trials
     give.
     """
-    evidence = bench.evidence(fit.model, chosen)
-    pieces = evidence.pieces(fit.values, fit.steps)
+    whitened = problem.whitened_residuals(fit.model, chosen)
+    pieces = whitened.pieces(fit.values, fit.steps)
     if pieces is None:
         return fit.covariance
     known = np.isfinite(np.diag(fit.covariance))

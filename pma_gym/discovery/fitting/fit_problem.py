@@ -1,4 +1,4 @@
-"""Fits of a model, alone or with suspects in it, to whitened trials."""
+"""Fits of a model, alone or with candidates in it, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.free_parameters import Own, values
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.estimation.fitting import Search
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
@@ -40,7 +40,7 @@ class Fitted:
 
     Attributes:
         model: the model with its parameters.
-        names: the suspects in it.
+        names: the candidates in it.
         paths: its free parameters.
         values: their values at the door, shape (p,).
         covariance: theirs, from the whitened readings and the prior, shape (p, p).
@@ -72,7 +72,7 @@ def _chi_square(fit: Fitted) -> float:
 
 
 @dataclass(frozen=True)
-class Bench:
+class FitProblem:
     """What all fits share.
 
     Attributes:
@@ -87,37 +87,37 @@ class Bench:
 
     trials: Sequence[Trial]
     given: Model
-    own: Own
+    own: FreeParameters
     noise: tuple[Whitening, ...]
     threads: int = 1
     coarse: bool = False
     files: tuple[str, ...] = ()
 
-    def evidence(
+    def whitened_residuals(
         self,
         model: Model,
-        extra: Sequence[Suspect] = (),
+        extra: Sequence[CandidateEffect] = (),
         trials: Sequence[int] | None = None,
         reach: Mapping[str, float] | None = None,
-    ) -> Evidence:
-        """Trials beside a model with suspects in it; its own parameters and theirs are free.
+    ) -> WhitenedResiduals:
+        """Trials beside a model with candidates in it; its own parameters and theirs are free.
 
         Args:
             model: the model.
-            extra: the suspects.
+            extra: the candidates.
             trials: which trials; all if not given.
             reach: how many times as wide as assumed beforehand ranges are, by path.
         """
         paths, own = list(self.own.free), {}
-        for suspect in extra:
-            paths += suspect.fitted_paths
-            own |= suspect.own
+        for candidate in extra:
+            paths += candidate.fitted_paths
+            own |= candidate.own
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
         chosen = range(len(self.trials)) if trials is None else trials
         centre = values(model, paths)
         centre[: len(self.own.free)] = values(self.given, self.own.free)
-        return Evidence(
+        return WhitenedResiduals(
             model,
             [self.trials[i] for i in chosen],
             paths,
@@ -129,31 +129,31 @@ class Bench:
             reach=reach,
         )
 
-    def probed(self, model: Model, suspect: Suspect) -> Evidence:
-        """Trials beside a model with one suspect in it, all of whose parameters are free."""
-        return Evidence(
-            suspect.beside(model),
+    def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:
+        """Trials beside a model with one candidate in it, all of whose parameters are free."""
+        return WhitenedResiduals(
+            candidate.beside(model),
             self.trials,
-            suspect.paths,
+            candidate.paths,
             self.noise,
-            np.full(len(suspect.paths), np.inf),
-            own=suspect.own,
+            np.full(len(candidate.paths), np.inf),
+            own=candidate.own,
             threads=self.threads,
         )
 
     @cached_property
     def count(self) -> int:
         """How many readings there are."""
-        return self.evidence(self.given).count
+        return self.whitened_residuals(self.given).count
 
-    def sum_of_squares(self, model: Model, extra: Sequence[Suspect] = ()) -> float:
+    def sum_of_squares(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> float:
         """Whitened sum of squares of all readings, without what the prior adds.
 
         Infinite where the model cannot be simulated.
         """
-        evidence = self.evidence(model, extra)
-        at = values(model, [free.path for free in evidence.free])
-        pieces = evidence.pieces(at, np.empty(0))
+        whitened = self.whitened_residuals(model, extra)
+        at = values(model, [free.path for free in whitened.free])
+        pieces = whitened.pieces(at, np.empty(0))
         return np.inf if pieces is None else float(pieces.total()[0, 0])
 
     def left(self, fit: Fitted) -> float:
@@ -164,8 +164,8 @@ class Bench:
         """Whether a fit is so far from the trials that it may have been caught."""
         return self.left(fit) > CAUGHT
 
-    def careful_fit(self, model: Model, extra: Sequence[Suspect] = ()) -> Fitted | None:
-        """Fit a model with suspects in it, whose parameters may be far off.
+    def careful_fit(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
+        """Fit a model with candidates in it, whose parameters may be far off.
 
         A cable that slackens makes chi-square rugged, and a search that begins far away can end in
         a hollow. With the noise taken for larger, what parameters may be holds them on their way.
@@ -184,7 +184,7 @@ class Bench:
                 fits.append(self.fit(self._eased(away, extra, LARGER[-1:]), extra))
         return min(filter(None, fits), key=_chi_square)
 
-    def led_out(self, fit: Fitted, extra: Sequence[Suspect] = ()) -> Fitted:
+    def led_out(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
         """A fit, or a better one where it was caught far from the trials.
 
         With the noise taken for as large as what is left, and then for ever less, slopes are those
@@ -197,7 +197,9 @@ class Bench:
         found = self.fit(self._eased(fit.model, extra, ever_less), extra)
         return min(filter(None, (fit, found)), key=_chi_square)
 
-    def _eased(self, model: Model, extra: Sequence[Suspect], larger: Sequence[float]) -> Model:
+    def _eased(
+        self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
+    ) -> Model:
         """A model fitted to larger noise, ever less of it."""
         for factor in larger:
             noise = tuple(
@@ -208,65 +210,66 @@ class Bench:
             model = model if found is None else found.model
         return model
 
-    def evidence_of(self, fit: Fitted, extra: Sequence[Suspect] = ()) -> Evidence:
-        """Trials beside a fit with suspects in it, within the ranges that it ended with."""
-        return self.evidence(fit.model, extra, reach=fit.reach)
+    def whitened_at(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> WhitenedResiduals:
+        """Trials beside a fit with candidates in it, within the ranges that it ended with."""
+        return self.whitened_residuals(fit.model, extra, reach=fit.reach)
 
     def fit(
         self,
         model: Model,
-        extra: Sequence[Suspect] = (),
+        extra: Sequence[CandidateEffect] = (),
         starts: Mapping[str, Array] | None = None,
         trials: Sequence[int] | None = None,
     ) -> Fitted | None:
-        """Fit a model with suspects in it.
+        """Fit a model with candidates in it.
 
         A parameter goes beyond what is assumed beforehand where the fit gains by it
         (`assumed_range`).
 
         Args:
             model: where its own parameters begin.
-            extra: the suspects.
+            extra: the candidates.
             starts: values of all their `paths`, by name; where they are in the model if not given.
             trials: which trials; all if not given.
         Returns:
             The fit, or None where the model cannot be simulated.
         """
-        for suspect in extra:
-            model = suspect.beside(model)
-            if starts is not None and suspect.name in starts:
-                begun = dict(zip(suspect.paths, map(float, starts[suspect.name]), strict=True))
+        for candidate in extra:
+            model = candidate.beside(model)
+            if starts is not None and candidate.name in starts:
+                begun = dict(zip(candidate.paths, map(float, starts[candidate.name]), strict=True))
                 model = model.replace(begun)
-        evidence = self.evidence(model, extra, trials)
+        whitened = self.whitened_residuals(model, extra, trials)
         # A fit of some of the trials begins where that of all ended.
-        reach = evidence.needed_reach(evidence.start)
-        evidence = self.evidence(model, extra, trials, reach) if reach else evidence
+        reach = whitened.needed_reach(whitened.start)
+        if reach:
+            whitened = self.whitened_residuals(model, extra, trials, reach)
         try:
-            search = Search(evidence, False, 1.0)
+            search = Search(whitened, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
         for _ in range(MOST_DOUBLINGS):
-            edges = evidence.at_assumed_edge(search.values)
+            edges = whitened.at_assumed_edge(search.values)
             if not edges:
                 break
             wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
-            evidence = self.evidence(_at(model, search), extra, trials, wider)
-            further = Search(evidence, False, 1.0)
+            whitened = self.whitened_residuals(_at(model, search), extra, trials, wider)
+            further = Search(whitened, False, 1.0)
             ended = further.run(None, ROUNDS)
             if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
                 break
             search, converged, reach = further, ended, wider
         return Fitted(
             _at(model, search),
-            tuple(suspect.name for suspect in extra),
+            tuple(candidate.name for candidate in extra),
             tuple(search.named(search.values)),
             search.values,
             inverse(search.best.curvature),
             search.best.chi_square,
             search.moves,
             converged,
-            evidence.needed_reach(search.values),
+            whitened.needed_reach(search.values),
         )
 
 

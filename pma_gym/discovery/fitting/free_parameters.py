@@ -45,7 +45,7 @@ rig."""
 
 
 @dataclass(frozen=True)
-class Own:
+class FreeParameters:
     """A model's own parameters.
 
     Attributes:
@@ -57,10 +57,10 @@ class Own:
     prior: Array
 
 
-def own_parameters(model: Model) -> Own:
+def free_parameters(model: Model) -> FreeParameters:
     """Which parameters of a model may be off, and by how much."""
     free = tuple(path for path in model.paths() if _is_own(model, path))
-    return Own(free, np.array([prior(model, path) for path in free]))
+    return FreeParameters(free, np.array([prior(model, path) for path in free]))
 
 
 def prior(model: Model, path: str) -> float:

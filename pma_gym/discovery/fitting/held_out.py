@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.predictive_density import Whole
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.predictive_density import PredictiveDensity
 from pma_gym.discovery.preparation.splits import folds, stretches
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Unseen:
+class HeldOutMisfit:
     """What a model says of readings that it was not fitted to.
 
     Attributes:
@@ -35,59 +35,59 @@ class Unseen:
     surprise: Array
 
 
-def unseen(
-    bench: Bench,
+def held_out_misfit(
+    problem: FitProblem,
     fit: Fitted,
-    chosen: Sequence[Suspect],
+    chosen: Sequence[CandidateEffect],
     progress: Callable[[int, int], None] | None = None,
     judged: bool = False,
-) -> Unseen | None:
+) -> HeldOutMisfit | None:
     """Leave each fold out once, fit the others from where the fit of all is, and look at it.
 
     Where nothing is free, nothing is fitted. None with a single trial that is not long, or where a
     fit fails.
 
     Args:
-        bench: the trials.
+        problem: the trials.
         fit: of all of them.
-        chosen: the suspects in it.
+        chosen: the candidates in it.
         progress: called with the number of folds that are done, and of all.
         judged: whether to find out how surprising folds are.
     """
-    whole = Whole.of(bench, fit, chosen) if judged else None
-    if len(bench.trials) < 2:
-        return _unseen_stretches(bench, fit, chosen, progress, whole)
-    count = len(bench.trials)
+    whole = PredictiveDensity.of(problem, fit, chosen) if judged else None
+    if len(problem.trials) < 2:
+        return _unseen_stretches(problem, fit, chosen, progress, whole)
+    count = len(problem.trials)
     readings: list[Array] = [np.empty(0)] * count
     chi_square, surprised = np.zeros(count), list[float]()
-    parts, begun = folds(count, bench.files), fit.model if whole is None else whole.fit.model
+    parts, begun = folds(count, problem.files), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
-        found = bench.fit(begun, chosen, trials=seen) if fit.paths else fit
-        held = None if found is None else _look(bench, found, chosen, left_out)
+        found = problem.fit(begun, chosen, trials=seen) if fit.paths else fit
+        held = None if found is None else _held_out_of(problem, found, chosen, left_out)
         if found is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(bench.evidence(begun, chosen, seen), found))
+            surprised.append(whole.surprise(problem.whitened_residuals(begun, chosen, seen), found))
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
-    return Unseen(readings, chi_square, np.array(surprised))
+    return HeldOutMisfit(readings, chi_square, np.array(surprised))
 
 
 def _unseen_stretches(
-    bench: Bench,
+    problem: FitProblem,
     fit: Fitted,
-    chosen: Sequence[Suspect],
+    chosen: Sequence[CandidateEffect],
     progress: Callable[[int, int], None] | None,
-    whole: Whole | None,
-) -> Unseen | None:
+    whole: PredictiveDensity | None,
+) -> HeldOutMisfit | None:
     """The same for the stretches of a single trial; None where it has none."""
-    parts = stretches(bench.trials)
+    parts = stretches(problem.trials)
     if not parts:
         return None
-    (trial,) = bench.trials
+    (trial,) = problem.trials
     readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
     surprised, begun = list[float](), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
@@ -96,33 +96,37 @@ def _unseen_stretches(
         seen, rest = _masked(trial, left_out), _masked(trial, ~left_out)
         if not all(_measures(part) for part in (seen, rest)):
             return None
-        part = replace(bench, trials=[seen])
+        part = replace(problem, trials=[seen])
         found = part.fit(begun, chosen) if fit.paths else fit
-        held = None if found is None else _look(replace(bench, trials=[rest]), found, chosen, [0])
+        held = (
+            None
+            if found is None
+            else _held_out_of(replace(problem, trials=[rest]), found, chosen, [0])
+        )
         if found is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(part.evidence(begun, chosen), found))
+            surprised.append(whole.surprise(part.whitened_residuals(begun, chosen), found))
         readings[:, left_out] = held.readings[0][:, left_out]
         chi_square += float(held.chi_square[0])
-    return Unseen([readings], np.array([chi_square]), np.array(surprised))
+    return HeldOutMisfit([readings], np.array([chi_square]), np.array(surprised))
 
 
 @dataclass(frozen=True)
 class _Held:
-    """As `Unseen`, of one fold: readings (SI) and chi-square of each of its trials."""
+    """As `HeldOutMisfit`, of one fold: readings (SI) and chi-square of each of its trials."""
 
     readings: list[Array]
     chi_square: Array
 
 
-def _look(
-    bench: Bench, found: Fitted, chosen: Sequence[Suspect], left_out: Sequence[int]
+def _held_out_of(
+    problem: FitProblem, found: Fitted, chosen: Sequence[CandidateEffect], left_out: Sequence[int]
 ) -> _Held | None:
     """Trials beside a fit; None where it cannot be simulated on them."""
-    evidence = bench.evidence(found.model, chosen, left_out)
-    pieces = evidence.pieces(found.values, np.empty(0))
-    held = evidence.readings(found.values)
+    whitened = problem.whitened_residuals(found.model, chosen, left_out)
+    pieces = whitened.pieces(found.values, np.empty(0))
+    held = whitened.readings(found.values)
     if pieces is None or held is None:
         return None
     count = range(len(left_out))

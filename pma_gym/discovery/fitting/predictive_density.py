@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 
 Array = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def covariance_root(fit: Fitted) -> Array:
 
 
 @dataclass(frozen=True)
-class Whole:
+class PredictiveDensity:
     """The fit of all trials, which parts of them are set against.
 
     Attributes:
@@ -64,15 +64,17 @@ class Whole:
     freedom: float
 
     @classmethod
-    def of(cls, bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> "Whole":
-        """Of a model with suspects in it, from where a fit is."""
-        found = (bench.fit(fit.model, chosen) if fit.paths else None) or fit
-        evidence = bench.evidence(found.model, chosen)
+    def of(
+        cls, problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
+    ) -> "PredictiveDensity":
+        """Of a model with candidates in it, from where a fit is."""
+        found = (problem.fit(fit.model, chosen) if fit.paths else None) or fit
+        whitened = problem.whitened_residuals(found.model, chosen)
         if not found.paths:
-            found = replace(found, chi_square=_chi_square(evidence, found))
-        return cls(found, freedom(evidence, found))
+            found = replace(found, chi_square=_chi_square(whitened, found))
+        return cls(found, freedom(whitened, found))
 
-    def surprise(self, seen: Evidence, apart: Fitted) -> float:
+    def surprise(self, seen: WhitenedResiduals, apart: Fitted) -> float:
         """How little some trials expect the others: twice the negative log-likelihood.
 
         p(others | seen) = p(all) / p(seen), each by Laplace, the determinants at what fits all: by
@@ -94,18 +96,18 @@ class Whole:
         return found if np.isfinite(found) else np.inf
 
 
-def freedom(evidence: Evidence, fit: Fitted) -> float:
+def freedom(whitened: WhitenedResiduals, fit: Fitted) -> float:
     """Log determinant of the curvature at a fit, in units of what a parameter might have been.
 
     That is as far as its bounds reach, and `WIDE` times its value at most.
     """
     size = np.where(fit.values == 0.0, np.inf, WIDE * np.abs(fit.values))
-    widths = np.minimum(evidence.upper - evidence.lower, size)
-    curvature = evidence.sums(fit.values, fit.steps).curvature
+    widths = np.minimum(whitened.upper - whitened.lower, size)
+    curvature = whitened.sums(fit.values, fit.steps).curvature
     if not np.isfinite(curvature).all():
         return np.nan
     return float(np.linalg.slogdet(curvature * np.outer(widths, widths) + np.eye(len(widths)))[1])
 
 
-def _chi_square(evidence: Evidence, fit: Fitted) -> float:
-    return evidence.sums(fit.values, np.empty(0)).chi_square
+def _chi_square(whitened: WhitenedResiduals, fit: Fitted) -> float:
+    return whitened.sums(fit.values, np.empty(0)).chi_square

@@ -16,8 +16,8 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.documents import read_toml
@@ -38,26 +38,26 @@ SEARCHED, LEAST_SPEED = 0.2, 1.0
 
 
 def trial_states(
-    bench: Bench, fit: Fitted, chosen: Sequence[Suspect], names: Sequence[str]
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect], names: Sequence[str]
 ) -> dict[str, TrialState]:
     """The state of every trial of a fit, by the trial's name."""
     own: dict[str, Sequence[float]] = {}
-    for suspect in chosen:
-        own |= suspect.own
-    evidence = bench.evidence(fit.model, chosen)
-    begun = evidence.first_states(fit.values) if _begins_freely(fit.model) else None
+    for candidate in chosen:
+        own |= candidate.own
+    whitened = problem.whitened_residuals(fit.model, chosen)
+    begun = whitened.first_states(fit.values) if _begins_freely(fit.model) else None
     found = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
-            states = dict(zip(evidence.plant.states, begun[i].tolist(), strict=True))
+            states = dict(zip(whitened.plant.states, begun[i].tolist(), strict=True))
             parameters |= {
                 path: states[state] / SI_FACTORS[unit(path)] for state, path in STARTS.items()
             }
         if begun is not None:
-            parameters = _started(fit.model, bench.trials[i], parameters)
-        held = simulated(fit.model, bench.trials[i], TrialState({}, parameters))
-        found[name] = TrialState(_zeros(bench.trials[i], held), parameters)
+            parameters = _started(fit.model, problem.trials[i], parameters)
+        held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
+        found[name] = TrialState(_zeros(problem.trials[i], held), parameters)
     return found
 
 

@@ -23,6 +23,7 @@ from pma_gym.discovery.preparation.assumed_range import (
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.model import Model
 
@@ -66,7 +67,7 @@ class Pieces:
         return int(self.counts[np.isin(self.trial, trials)].sum())
 
 
-class Evidence(Residuals):
+class WhitenedResiduals(Residuals):
     """Trials beside a model with free parameters, whitened; what a search may lower.
 
     Args:
@@ -78,7 +79,7 @@ class Evidence(Residuals):
             for one that may be anything.
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
-        tolerance, joined, threads: as `Residuals`.
+        tolerance, interpolation, threads: as `Residuals`.
         reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
 
     Attributes:
@@ -95,11 +96,11 @@ class Evidence(Residuals):
         centre: Array | None = None,
         own: Mapping[str, Sequence[float]] | None = None,
         tolerance: float = DEFAULT_TOLERANCE,
-        joined: bool = True,
+        interpolation: Interpolation = "foh",
         threads: int = 1,
         reach: Mapping[str, float] | None = None,
     ) -> None:
-        super().__init__(model, trials, free, tolerance, joined, threads)
+        super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
         self._possible = self.lower, self.upper

@@ -23,28 +23,28 @@ _CANDIDATES = (
 
 
 def decision_blocks(diagnosis: Diagnosis, origin: Mapping[str, str]) -> list[Block]:
-    """Steps, candidates, noise, parameters, blind spots, origin."""
+    """Steps, candidates, noise, parameters, effects not detectable, origin."""
     blocks: list[Block] = [Heading("How it was decided")]
     if diagnosis.steps:
         blocks.append(Steps([readable(step, diagnosis) for step in diagnosis.steps]))
     if diagnosis.candidates:
         blocks += [Heading("Candidates", 3), Paragraph(_CANDIDATES)]
         blocks.append(candidates_table(diagnosis))
-    blocks += _blind_blocks(diagnosis)
+    blocks += _not_detectable_blocks(diagnosis)
     blocks += _parameter_blocks(diagnosis)
     if diagnosis.floors:
         blocks.append(floors_table(diagnosis.floors))
     return blocks + _origin_blocks(diagnosis, origin)
 
 
-def _blind_blocks(diagnosis: Diagnosis) -> list[Block]:
-    if not diagnosis.blind:
+def _not_detectable_blocks(diagnosis: Diagnosis) -> list[Block]:
+    if not diagnosis.not_detectable:
         return []
     return [
         Heading("What would not have shown", 3),
         Paragraph(
-            f"Even at their usual size these data would hide {effect_names(diagnosis.blind)}. "
-            "Their absence above says nothing."
+            "These data would not show the following effects even at their usual size, so the "
+            f"diagnosis cannot exclude them: {effect_names(diagnosis.not_detectable)}."
         ),
     ]
 

@@ -209,7 +209,7 @@ def _next_blocks(diagnosis: Diagnosis) -> list[Block]:
     following = diagnosis.next_experiment
     if following is None:
         return []
-    text = f"{capitalised(following.protocol)}."
+    text = f"{capitalised(following.excitation)}."
     if len(following.separates) > 1:
         text += (
             f" It tells {effect_names(following.separates)} apart: expected odds "

@@ -17,21 +17,25 @@ from pma_gym.units import SI_FACTORS
 Array = NDArray[np.float64]
 
 
-def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
+def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
     """Every trial as measured, and as three models have it."""
-    bench, (proposing, proposed) = found.bench, found.proposed
-    evidence = bench.evidence(found.given)
-    before = evidence.readings(values(found.given, bench.own.free))
-    unseen, without = found.unseen, found.unseen_without
-    refitted = without.readings if without is not None else evidence.readings(found.refitted.values)
+    problem, (proposing, proposed) = findings.problem, findings.proposed
+    whitened = problem.whitened_residuals(findings.given)
+    before = whitened.readings(values(findings.given, problem.own.free))
+    unseen, without = findings.unseen, findings.unseen_without
+    refitted = (
+        without.readings if without is not None else whitened.readings(findings.refitted.values)
+    )
     after = (
         unseen.readings
         if unseen is not None
-        else proposing.evidence(proposed.model, found.selection.chosen).readings(proposed.values)
+        else proposing.whitened_residuals(proposed.model, findings.selection.chosen).readings(
+            proposed.values
+        )
     )
     assert refitted is not None and after is not None
     records = []
-    for i, (each, logged) in enumerate(zip(found.named, evidence.logged, strict=True)):
+    for i, (each, logged) in enumerate(zip(findings.named, whitened.logged, strict=True)):
         measured = np.where(_there(logged), logged.measured, np.nan)
         # A model that cannot be simulated as it was given says nothing.
         started = refitted[i] if before is None else before[i]
@@ -45,7 +49,7 @@ def trial_records(found: Findings) -> tuple[TrialRecord, ...]:
             started_off, refitted_off, after_off = (
                 _rms(curve[channel] - measured[channel]) / factor for curve in curves
             )
-            floor = found.floors[channel].level / factor
+            floor = findings.floors[channel].level / factor
             gaps[column.name] = Gap(started_off, refitted_off, after_off, floor, unseen is not None)
         first, second, third = curves
         records.append(
@@ -84,15 +88,18 @@ def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
     return found
 
 
-def floors_at_the_door(found: Findings) -> dict[str, Floor]:
+def floors_at_the_door(findings: Findings) -> dict[str, Floor]:
     """Noise of the signals that were measured."""
     floors = {}
     for channel, name in enumerate(OUTPUTS):
-        if not any(each.measures[channel] for each in found.bench.evidence(found.given).logged):
+        if not any(
+            each.measures[channel]
+            for each in findings.problem.whitened_residuals(findings.given).logged
+        ):
             continue
-        column, level = BY_QUANTITY[name], found.floors[channel]
+        column, level = BY_QUANTITY[name], findings.floors[channel]
         factor = SI_FACTORS[column.unit]
-        learnt = found.selection.bench.noise[channel]
+        learnt = findings.selection.problem.noise[channel]
         sources = {source: value / factor for source, value in level.by_source.items()}
         sources["autoregression"] = learnt.innovation / factor
         floors[column.name] = Floor(
@@ -105,10 +112,10 @@ def floors_at_the_door(found: Findings) -> dict[str, Floor]:
     return floors
 
 
-def judgements(found: Findings) -> dict[str, Judgement]:
+def judgements(findings: Findings) -> dict[str, Judgement]:
     """What is left of each signal, by its column."""
     judged = {}
-    for name, each in found.adequacy.signals.items():
+    for name, each in findings.adequacy.signals.items():
         column = BY_QUANTITY[name]
         figures = (each.misfit, each.explained, each.bound, each.fitted)
         misfit, explained, bound, fitted = (

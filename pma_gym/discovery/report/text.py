@@ -263,10 +263,11 @@ def _use_parameters(diagnosis: Diagnosis) -> list[str]:
 
 def _use_as_is(diagnosis: Diagnosis) -> list[str]:
     steps = [f"Keep the model {diagnosis.given.name}: nothing in these trials speaks against it."]
-    if diagnosis.blind:
+    if diagnosis.not_detectable:
         steps.append(
-            f"These trials would not have shown {effect_names(diagnosis.blind, 'or')}; if one of "
-            "them matters to you, measure what excites it."
+            "These trials cannot show "
+            f"{effect_names(diagnosis.not_detectable, 'or')}; if one of them matters to you, "
+            "measure what excites it."
         )
     return steps
 
@@ -299,10 +300,10 @@ def _measure(diagnosis: Diagnosis) -> list[str]:
 def _run_next(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
     assert following is not None
-    protocol = following.protocol[:1].lower() + following.protocol[1:]
+    excitation = following.excitation[:1].lower() + following.excitation[1:]
     run = (
-        f"`next.csv` on the rig ({protocol}; {duration(following.minutes)}), save its log into the "
-        "data set under a name of its own, and diagnose again."
+        f"`next.csv` on the rig ({excitation}; {duration(following.minutes)}), save its log into "
+        "the data set under a name of its own, and diagnose again."
     )
     if diagnosis.verdict in ("parameters", "agrees"):
         shown = effect_names(following.separates, "or")

@@ -4,7 +4,7 @@ import numpy as np
 
 from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fitting.fit_problem import Fitted
-from pma_gym.discovery.fitting.free_parameters import Own, unit
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
 from pma_gym.discovery.report.approximate_text import left_words
 from pma_gym.discovery.report.size_text import sized_effects
@@ -22,9 +22,9 @@ from pma_gym.discovery.report.text import (
 from pma_gym.discovery.report.unknown_text import unknown_words
 from pma_gym.discovery.selection.backward_elimination import ODDS
 from pma_gym.discovery.verdict.adequacy import OPEN
-from pma_gym.discovery.verdict.decision import BLIND_SHARE, MOST_RIVALS, MOVED_CHANGE
+from pma_gym.discovery.verdict.decision import MOST_RIVALS, MOVED_CHANGE, UNDETECTABLE_SHARE
 from pma_gym.discovery.verdict.findings import Findings
-from pma_gym.discovery.verdict.residual_fraction import Left
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
 from pma_gym.units import with_unit
 
@@ -74,21 +74,24 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         return (
             f"Model {name} misses something, but {trials} cannot tell which of {rivals} it is"
         ) + _propose(diagnosis)
-    few_blind = len(diagnosis.blind) <= BLIND_SHARE * max(len(diagnosis.candidates), 1)
-    if few_blind and any(each.fault in OPEN for each in diagnosis.adequacy.values()):
+    few_hidden = len(diagnosis.not_detectable) <= UNDETECTABLE_SHARE * max(
+        len(diagnosis.candidates), 1
+    )
+    if few_hidden and any(each.fault in OPEN for each in diagnosis.adequacy.values()):
         return (
             f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
             f"{undecided(diagnosis)}."
         )
     best = diagnosis.candidates[0] if diagnosis.candidates else None
-    if best is not None and few_blind:
+    if best is not None and few_hidden:
         return (
             f"Model {name} may miss something, {effect_name(best.name)} most likely, but it shows "
             f"in too little of {trials} to rule chance out"
         ) + _propose(diagnosis)
     return (
         f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
-        f"{len(diagnosis.blind)} effects of the catalogue would not have shown at their usual size"
+        f"{len(diagnosis.not_detectable)} effects of the catalogue would not show at their usual "
+        "size"
     ) + _propose(diagnosis)
 
 
@@ -103,7 +106,7 @@ def trials_words(diagnosis: Diagnosis) -> str:
 
 def _propose(diagnosis: Diagnosis) -> str:
     following = diagnosis.next_experiment
-    return f"; measure next: {following.protocol}." if following else "."
+    return f"; measure next: {following.excitation}." if following else "."
 
 
 def _approximately(diagnosis: Diagnosis) -> str:
@@ -162,7 +165,7 @@ def _change_of(diagnosis: Diagnosis):  # noqa: ANN202
     return words
 
 
-def unidentified(path: str, fit: Fitted, own: Own) -> str:
+def unidentified(path: str, fit: Fitted, own: FreeParameters) -> str:
     """Why the data do not determine a parameter."""
     at = fit.paths.index(path)
     spread = np.sqrt(np.diag(fit.covariance))
@@ -178,7 +181,7 @@ def unidentified(path: str, fit: Fitted, own: Own) -> str:
     )
 
 
-def doubt(path: str, fit: Fitted, own: Own) -> str:
+def doubt(path: str, fit: Fitted, own: FreeParameters) -> str:
     """What speaks against a parameter that is named although another could stand for it."""
     others = "if that one is off" if twin(path, fit) else "if others are off instead"
     return f"{path}: {unidentified(path, fit, own)}; {others}, {path} may be as it was given"
@@ -195,20 +198,21 @@ def twin(path: str, fit: Fitted) -> str | None:
     return fit.paths[int(np.argmax(alike))] if alike.max(initial=0.0) > ALIKE else None
 
 
-def steps(found: Findings, diagnosis: Diagnosis, left: Left) -> tuple[str, ...]:
+def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> tuple[str, ...]:
     """What was done, a sentence each."""
-    bench, selection = found.bench, found.selection
+    problem, selection = findings.problem, findings.selection
     said = [
         f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}.",
-        f"Parameters first: {len(bench.own.free)} numbers of {found.given.name} were refitted, "
-        "with the zeros of contraction and rotation free in every trial; each is held to its value "
-        "as by a measurement with 10 % error, which counts only where the trials say nothing.",
+        f"Parameters first: {len(problem.own.free)} parameters of {findings.given.name} were "
+        "refitted, with the zeros of contraction and rotation free in every trial; each is held to "
+        "its value as by a measurement with 10 % error, which counts only where the trials do not "
+        "determine it.",
     ]
     for number, stage in enumerate(selection.stages, 1):
-        best = stage.looks[0]
+        best = stage.scores[0]
         said.append(
-            f"Round {number}: {len(stage.looks)} effects were looked at; {best.suspect.name} could "
-            f"explain most (chi-square {best.gain:.4g}, family-wise p {best.p_value:.2g}, "
+            f"Round {number}: {len(stage.scores)} candidates were scored; {best.candidate.name} "
+            f"could explain most (chi-square {best.gain:.4g}, family-wise p {best.p_value:.2g}, "
             f"{best.change:.2g} of the noise in its clearest signal). "
             + (
                 f"{len(stage.fits)} were fitted."
@@ -217,20 +221,22 @@ def steps(found: Findings, diagnosis: Diagnosis, left: Left) -> tuple[str, ...]:
             )
             + (
                 " Quarters of a second of the residual are beyond what noise can do "
-                f"({chance(stage.burst.chance)}): that opened the gate, and the best explains them."
-                if stage.burst.excess
+                f"({chance(stage.scan.chance)}): that opened the gate, and the best explains them."
+                if stage.scan.excess
                 else ""
             )
         )
     if selection.chosen:
         said.append(
             f"Of what was slow in the residual, {percent(left.slow)} is left by "
-            f"{effect_names([suspect.name for suspect in selection.chosen])}; of its "
+            f"{effect_names([candidate.name for candidate in selection.chosen])}; of its "
             f"autocorrelation, {percent(left.remembered)}."
         )
-    if found.fewest is not None:
-        said.append(_named(len(found.fewest.fit.paths), len(bench.own.free), diagnosis.verdict))
-    if found.unseen is not None:
+    if findings.elimination is not None:
+        said.append(
+            _named(len(findings.elimination.fit.paths), len(problem.own.free), diagnosis.verdict)
+        )
+    if findings.unseen is not None:
         said.append(
             "Trials were left out in up to six parts; curves and gaps after the amendment are of "
             "fits that had not seen them."

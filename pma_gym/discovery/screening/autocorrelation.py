@@ -30,7 +30,7 @@ share of it; the least share of what a residual remembers that is a tone."""
 
 
 @dataclass(frozen=True)
-class Memory:
+class AutocorrelationTest:
     """What a signal's residual remembers of itself.
 
     Attributes:
@@ -49,7 +49,7 @@ class Memory:
         return self.share > LEAST and self.score > SURE
 
 
-def memory(parts: Sequence[Array], rate_hz: float) -> Memory:
+def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> AutocorrelationTest:
     """What one signal's residual remembers of itself.
 
     Args:
@@ -66,13 +66,15 @@ def memory(parts: Sequence[Array], rate_hz: float) -> Memory:
             sums[lag] += values[:size] @ values[lag:]
             counts[lag] += known[:size] @ known[lag:]
     if counts[0] < ENOUGH or sums[0] <= 0.0:
-        return Memory(0.0, 0.0, 0.0)
+        return AutocorrelationTest(0.0, 0.0, 0.0)
     variance = sums[0] / counts[0]
     enough = counts >= 0.5 * ENOUGH
     shares = np.where(enough, sums / np.maximum(counts, 1.0) / variance, 0.0)
     own = 1.0 + 2.0 * float(np.sum(shares[1:first] ** 2))
     scores = np.abs(shares[first:]) * np.sqrt(counts[first:] / own)
-    return Memory(float(np.abs(shares[first:]).max()), float(scores.max()), float(variance))
+    return AutocorrelationTest(
+        float(np.abs(shares[first:]).max()), float(scores.max()), float(variance)
+    )
 
 
 @dataclass(frozen=True)
@@ -95,7 +97,7 @@ def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
         parts: of each trial (SI), NaN where there is none.
         rate_hz: readings a second.
     """
-    kept = memory(parts, rate_hz)
+    kept = autocorrelation_test(parts, rate_hz)
     if not kept.sure:
         return None
     size = max(len(part) for part in parts)

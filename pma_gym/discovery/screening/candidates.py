@@ -1,9 +1,9 @@
-"""Suspects: every effect that a model lacks and the catalogue has, ready to be tried.
+"""List the candidates: every effect of the catalogue that a model lacks, ready to be fitted.
 
-A suspect is a model that has the effect where it does nothing, the parameters that say how large it
-is and of what shape, and probes: parameters at which it would be seen. Three kinds come up: effects
-that the model has not at all; numbers that it has at their neutral value, such as the slack of a
-taut cable; and sensors that are slower than it says.
+A candidate is a model that has the effect at its neutral values, the parameters of its size and
+shape, and probes: parameters at which the effect would show. There are three kinds: effects that
+the model lacks; parameters that it has at their neutral value, such as the slack of a taut cable;
+and sensors that are slower than the model says.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.plant import sensors
@@ -21,7 +21,7 @@ from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
 
-STAND_INS = frozenset(
+REPLACING_LAWS = frozenset(
     {
         "contractile_force",
         "stiffness",
@@ -76,7 +76,7 @@ _LAGS = {
 }
 
 
-def suspects(model: Model, orders: Sequence[float] | None = None) -> list[Suspect]:
+def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> list[CandidateEffect]:
     """Every effect that a model lacks, in the order of the catalogue.
 
     Args:
@@ -88,12 +88,14 @@ def suspects(model: Model, orders: Sequence[float] | None = None) -> list[Suspec
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
-    return [suspect for suspect in found if suspect is not None]
+    return [candidate for candidate in found if candidate is not None]
 
 
-def _lacking(model: Model, effect: Effect, orders: Sequence[float] | None) -> "Suspect | None":
+def _lacking(
+    model: Model, effect: Effect, orders: Sequence[float] | None
+) -> "CandidateEffect | None":
     """An effect that the model has not."""
-    if effect.name in model.parameters or effect.name in STAND_INS or effect.neutral is None:
+    if effect.name in model.parameters or effect.name in REPLACING_LAWS or effect.neutral is None:
         return None
     counted = "repeat" in effect.quantities
     if counted and (orders is None or len(set(orders)) < 2):
@@ -123,17 +125,17 @@ def _lacking(model: Model, effect: Effect, orders: Sequence[float] | None) -> "S
     except ModelError:
         return None
     own = {f"{effect.name}.{doors['repeat']}": list(orders or ())} if counted else {}
-    return _suspect(effect.name, effect, extended, doors, shown, own)
+    return _candidate(effect.name, effect, extended, doors, shown, own)
 
 
-def _suspect(
+def _candidate(
     name: str,
     effect: Effect,
     model: Model,
     doors: Mapping[str, str],
     shown: Mapping[str, Quantity],
     own: Mapping[str, Sequence[float]],
-) -> Suspect:
+) -> CandidateEffect:
     stems = list(shown)
     amplitudes = [stem for stem in stems if shown[stem].neutral is not None]
     switches = [stem for stem in amplitudes if stem in effect.held]
@@ -154,7 +156,7 @@ def _suspect(
     kept = [k for k, row in enumerate(probes) if row not in probes[:k]]
     times = [stem in shapes for stem in stems] if switches else [False] * len(stems)
     scaled = [stem in amplitudes and not _is_limit(shown[stem]) for stem in stems]
-    return Suspect(
+    return CandidateEffect(
         name,
         effect.name,
         model,
@@ -205,7 +207,7 @@ def _scaled(quantity: Quantity, scale: float) -> float:
     return neutral + scale * (_usual(quantity) - neutral)
 
 
-def _at_neutral(model: Model) -> Iterator[Suspect]:
+def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
     """Numbers that the model has at their neutral value."""
     for name, effect in model.effects.items():
         if name in sensors.SENSORS or name in ("limits", "validity", "operator"):
@@ -222,10 +224,10 @@ def _at_neutral(model: Model) -> Iterator[Suspect]:
             ):
                 continue
             alone = {stem: quantity}
-            yield _suspect(f"{name}_{stem}", effect, model, doors, alone, {})
+            yield _candidate(f"{name}_{stem}", effect, model, doors, alone, {})
 
 
-def _slow_sensors(model: Model) -> Iterator[Suspect]:
+def _slow_sensors(model: Model) -> Iterator[CandidateEffect]:
     """Sensors that may be slower than the model says."""
     for name, shown in _LAGS.items():
         if name not in model.parameters:
@@ -234,7 +236,7 @@ def _slow_sensors(model: Model) -> Iterator[Suspect]:
         here = values(model, [path])
         probes = here * np.array(SLOWER)[:, None]
         none = np.zeros(1, bool)
-        yield Suspect(
+        yield CandidateEffect(
             *(shown, name, model, (path,), ~none, here, probes, none),
             np.zeros(len(probes), bool),
         )

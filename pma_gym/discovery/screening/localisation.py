@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.fitting.fit_problem import Fitted
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, single_regions
 from pma_gym.discovery.screening.residual_maps import residual_map
-from pma_gym.discovery.screening.residuals import left_over
-from pma_gym.discovery.screening.time_bins import PIECE_TICKS, Ticks, ticks_of
+from pma_gym.discovery.screening.residuals import simulated_less_measured
+from pma_gym.discovery.screening.time_bins import PIECE_BINS, TimeBins, time_bins
 from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -52,35 +52,35 @@ VISIBLE = 1.05
 
 
 def localise(
-    evidence: Evidence, fit: Fitted, noise_levels: Sequence[float] | Array, seed: int
+    whitened: WhitenedResiduals, fit: Fitted, noise_levels: Sequence[float] | Array, seed: int
 ) -> tuple[tuple[Place, ...], tuple[Map, ...]]:
     """Where the residual of a fitted model lies.
 
     Args:
-        evidence: the trials beside the model.
+        whitened: the trials beside the model.
         fit: its parameters.
         noise_levels: standard deviations of the four signals' noise (SI), shape (4,).
         seed: of the simulated residuals.
     Returns:
         Regions, the largest share of its signal's gap first, and a map for each signal with a gap.
     """
-    readings = evidence.readings(fit.values)
+    readings = whitened.readings(fit.values)
     if readings is None:
         return (), ()
     levels = np.asarray(noise_levels, float)[:, None]
-    residuals = [part / levels for part in left_over(evidence, readings)]
-    ticks = ticks_of(evidence.logged, readings, residuals)
-    seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(ticks, channel)]
-    return _places(ticks, seen, seed), tuple(residual_map(ticks, channel) for channel in seen)
+    residuals = [part / levels for part in simulated_less_measured(whitened, readings)]
+    bins = time_bins(whitened.logged, readings, residuals)
+    seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(bins, channel)]
+    return _places(bins, seen, seed), tuple(residual_map(bins, channel) for channel in seen)
 
 
-def _has_gap(ticks: Ticks, channel: int) -> bool:
-    count = np.sum(ticks.counts[channel])
-    return bool(count > 0 and np.sum(ticks.excess[channel]) > (VISIBLE - 1.0) * count)
+def _has_gap(bins: TimeBins, channel: int) -> bool:
+    count = np.sum(bins.counts[channel])
+    return bool(count > 0 and np.sum(bins.excess[channel]) > (VISIBLE - 1.0) * count)
 
 
-def _places(ticks: Ticks, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
-    singles = single_regions(ticks)
+def _places(bins: TimeBins, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
+    singles = single_regions(bins)
     regions = singles + [
         Region(first.kinds + second.kinds, "", first.inside & second.inside)
         for first, second in combinations(singles, 2)
@@ -95,15 +95,15 @@ def _places(ticks: Ticks, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
         return ()
     inside = np.stack([region.inside for region in regions])
     generator = np.random.Generator(np.random.Philox(seed))
-    pieces = inside.shape[1] // PIECE_TICKS
+    pieces = inside.shape[1] // PIECE_BINS
     deals = generator.permuted(np.tile(np.arange(pieces), (RESAMPLES, 1)), axis=1)
     member = inside.astype(np.float32).T
-    p_values = np.stack([_p_values(ticks.excess[channel], member, deals) for channel in seen])
+    p_values = np.stack([_p_values(bins.excess[channel], member, deals) for channel in seen])
     p_values = adjusted(p_values.ravel()).reshape(p_values.shape)
     found = []
     for channel, p_value in zip(seen, p_values, strict=True):
-        share, readings = _shares(ticks, channel, member)
-        for k in _told(ticks.excess[channel], inside, names, share, readings, p_value):
+        share, readings = _shares(bins, channel, member)
+        for k in _told(bins.excess[channel], inside, names, share, readings, p_value):
             words = ", ".join(singles[i].words for i in names[k])
             signal = BY_QUANTITY[OUTPUTS[channel]].name
             found.append(Place(signal, words, float(share[k]), float(p_value[k])))
@@ -111,9 +111,9 @@ def _places(ticks: Ticks, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
     return tuple(found[:MOST])
 
 
-def _shares(ticks: Ticks, channel: int, member: Single) -> tuple[Array, Array]:
+def _shares(bins: TimeBins, channel: int, member: Single) -> tuple[Array, Array]:
     """Shares of a signal's gap, and of its readings, in regions; shape (regions,) each."""
-    both = np.stack([ticks.excess[channel], ticks.counts[channel]])
+    both = np.stack([bins.excess[channel], bins.counts[channel]])
     parts = (both.astype(np.float32) @ member).astype(np.float64)
     share, readings = parts / np.sum(both, axis=1)[:, None]
     return np.clip(share, 0.0, 1.0), readings
@@ -127,7 +127,7 @@ def _p_values(excess: Array, member: Single, deals: NDArray[np.int64]) -> Array:
         member: 1 for the ticks of a region, shape (n, regions).
         deals: orders of the pieces, shape (RESAMPLES, pieces).
     """
-    pieces = excess.reshape(-1, PIECE_TICKS).astype(np.float32)
+    pieces = excess.reshape(-1, PIECE_BINS).astype(np.float32)
     dealt = pieces[deals].reshape(len(deals), -1)
     drawn, here = dealt @ member, excess.astype(np.float32) @ member
     # Single precision: what is equal but for rounding counts as equal.

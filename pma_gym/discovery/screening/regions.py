@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.screening.time_bins import Ticks
+from pma_gym.discovery.screening.time_bins import TimeBins
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -30,13 +30,13 @@ class Region:
     inside: Mask
 
 
-def single_regions(ticks: Ticks) -> list[Region]:
+def single_regions(bins: TimeBins) -> list[Region]:
     """Regions of one condition, those of motion first, as a person says them."""
-    there = np.isfinite(ticks.order)
-    held, speed = ticks.held, ticks.speed
+    there = np.isfinite(bins.order)
+    held, speed = bins.held, bins.speed
     found: list[tuple[str, str, Mask]] = []
     for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
-        since = np.where(there, getattr(ticks, kind), np.nan)
+        since = np.where(there, getattr(bins, kind), np.nan)
         found += [(kind, f"0-{t:g} s after {words}", since <= t) for t in (0.1, 0.2, 0.5)]
         found.append((kind, f"more than 1 s after {words}", (since > 1.0) & np.isfinite(since)))
     found.append(("motion", "while held", held > 0.0))
@@ -56,15 +56,15 @@ def single_regions(ticks: Ticks) -> list[Region]:
     ]
     phases = ("before the first command", "between the first command and the last", "")
     for number, words in enumerate(phases[:2]):
-        found.append(("phase", words, ticks.phase == number))
-    found.append(("phase", "in the final hold", ticks.phase == 2.0))
+        found.append(("phase", words, bins.phase == number))
+    found.append(("phase", "in the final hold", bins.phase == 2.0))
     for kind, name, unit in _LEVELS:
-        values = getattr(ticks, kind)
+        values = getattr(bins, kind)
         for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
             found.append((kind, f"{name}above {cut:g} {unit}", values > cut))
             found.append((kind, f"{name}under {cut:g} {unit}", values < cut))
-    found.append(("order", "in the first half of the trials", ticks.order < 0.5))
-    found.append(("order", "in the second half of the trials", ticks.order > 0.5))
+    found.append(("order", "in the first half of the trials", bins.order < 0.5))
+    found.append(("order", "in the second half of the trials", bins.order > 0.5))
     count = int(there.sum())
     kept = {}
     for kind, words, inside in found:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Map
-from pma_gym.discovery.screening.time_bins import Ticks
+from pma_gym.discovery.screening.time_bins import TimeBins
 from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -26,18 +26,18 @@ _AXES: Mapping[str, str] = {
 }
 
 
-def residual_map(ticks: Ticks, channel: int) -> Map:
+def residual_map(bins: TimeBins, channel: int) -> Map:
     """The signal's mean residual over the two conditions that explain most of it.
 
     Args:
-        ticks: all trials.
+        bins: all trials.
         channel: which of the plant's outputs, 0 to 3.
     """
-    total, counts = ticks.total[channel], ticks.counts[channel]
-    edges = {name: _edges(getattr(ticks, name)[counts > 0]) for name in _AXES}
+    total, counts = bins.total[channel], bins.counts[channel]
+    edges = {name: _edges(getattr(bins, name)[counts > 0]) for name in _AXES}
     best = None
     for x, y in combinations(_AXES, 2):
-        sums, there = _grid(ticks, x, y, edges, total), _grid(ticks, x, y, edges, counts)
+        sums, there = _grid(bins, x, y, edges, total), _grid(bins, x, y, edges, counts)
         filled = there > 0
         means = np.divide(sums, there, out=np.full_like(sums, np.nan), where=filled)
         # What noise alone would make of so many cells is no explanation.
@@ -50,9 +50,9 @@ def residual_map(ticks: Ticks, channel: int) -> Map:
     return Map(signal, _AXES[x], _AXES[y], edges[x], edges[y], means)
 
 
-def _grid(ticks: Ticks, x: str, y: str, edges: Mapping[str, Array], weights: Array) -> Array:
+def _grid(bins: TimeBins, x: str, y: str, edges: Mapping[str, Array], weights: Array) -> Array:
     """Sums over cells, shape (cells of y, cells of x)."""
-    across, along = getattr(ticks, x), getattr(ticks, y)
+    across, along = getattr(bins, x), getattr(bins, y)
     there = np.isfinite(across) & np.isfinite(along) & (weights != 0.0)
     columns = _cell(across[there], edges[x])
     rows = _cell(along[there], edges[y])

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.noise import Whitening, autoregression, step_between
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
-from pma_gym.discovery.screening.autocorrelation import Memory, memory
-from pma_gym.discovery.screening.scan_statistic import NO_BURSTS, Bursts, bursts
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.autocorrelation import AutocorrelationTest, autocorrelation_test
+from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic, scan_statistic
 from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
@@ -20,29 +20,31 @@ FAR = 10.0
 noise whatever its form."""
 
 
-def relearnt(bench: Bench, fit: Fitted, chosen: Sequence[Suspect]) -> tuple[Whitening, ...]:
+def reestimated_noise(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
+) -> tuple[Whitening, ...]:
     """Whitening of what a fit leaves, never of less than is seen at rest."""
-    evidence = bench.evidence(fit.model, chosen)
-    left = residuals(evidence, fit)
+    whitened = problem.whitened_residuals(fit.model, chosen)
+    left = residuals(whitened, fit)
     found = []
-    for channel, before in enumerate(bench.noise):
+    for channel, before in enumerate(problem.noise):
         parts = [part[channel] for part in left]
         known = [part for part in parts if np.isfinite(part).any()]
         found.append(autoregression(known, before.level) if known else before)
     return tuple(found)
 
 
-def residuals(evidence: Evidence, fit: Fitted) -> list[Array]:
+def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
     """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
-    readings = evidence.readings(fit.values)
+    readings = whitened.readings(fit.values)
     assert readings is not None
-    return left_over(evidence, readings)
+    return simulated_less_measured(whitened, readings)
 
 
-def left_over(evidence: Evidence, readings: Sequence[Array]) -> list[Array]:
+def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Array]) -> list[Array]:
     """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
     found = []
-    for logged, held in zip(evidence.logged, readings, strict=True):
+    for logged, held in zip(whitened.logged, readings, strict=True):
         left = held - logged.measured
         for channel, name in enumerate(OUTPUTS):
             if not logged.measures[channel]:
@@ -55,18 +57,20 @@ def left_over(evidence: Evidence, readings: Sequence[Array]) -> list[Array]:
     return found
 
 
-def remembers(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
+def is_autocorrelated(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
+) -> bool:
     """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden."""
-    return any(each.sure for each in memories(bench, fit, chosen).values())
+    return any(each.sure for each in autocorrelation_tests(problem, fit, chosen).values())
 
 
-def far_off(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
+def far_off(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()) -> bool:
     """Whether what a fit leaves of some signal is many times its noise.
 
     Where everything is wrong, turning signs of the residual's pieces tells chance from nothing.
     """
-    left = residuals(bench.evidence(fit.model, chosen), fit)
-    for channel, noise in enumerate(bench.noise):
+    left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
+    for channel, noise in enumerate(problem.noise):
         known = np.concatenate([part[channel] for part in left])
         known = known[np.isfinite(known)]
         if known.size and np.sqrt(np.mean(known**2)) > FAR * noise.level:
@@ -74,34 +78,41 @@ def far_off(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> bool:
     return False
 
 
-def memories(bench: Bench, fit: Fitted, chosen: Sequence[Suspect] = ()) -> dict[str, Memory]:
+def autocorrelation_tests(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
+) -> dict[str, AutocorrelationTest]:
     """What the rest that a fit leaves of each output remembers of itself.
 
     Nothing beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts
     are taken from readings, so that what is left remembers their noise.
     """
-    if not _tells(bench):
+    if not _tells(problem):
         return {}
-    left = residuals(bench.evidence(fit.model, chosen), fit)
-    rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in bench.trials]))
-    return {name: memory([part[c] for part in left], rate) for c, name in enumerate(OUTPUTS)}
+    left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
+    rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in problem.trials]))
+    return {
+        name: autocorrelation_test([part[c] for part in left], rate)
+        for c, name in enumerate(OUTPUTS)
+    }
 
 
-def burst_of(bench: Bench, fit: Fitted) -> Bursts:
-    """The bursts in what a fit leaves of all signals; none where `remembers` cannot say either."""
-    if not _tells(bench):
-        return NO_BURSTS
-    evidence = bench.evidence(fit.model)
-    left, logged = residuals(evidence, fit), evidence.logged
-    edges = [evidence.edges(each) for each in logged]
+def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
+    """Scan statistic of what a fit leaves of all signals; 1 where no residual can be judged."""
+    if not _tells(problem):
+        return NO_EXCESS
+    whitened = problem.whitened_residuals(fit.model)
+    left, logged = residuals(whitened, fit), whitened.logged
+    edges = [whitened.edges(each) for each in logged]
     found = [
-        bursts([part[c] for part in left], edges, bench.noise[c].level, step_between(logged, c))
+        scan_statistic(
+            [part[c] for part in left], edges, problem.noise[c].level, step_between(logged, c)
+        )
         for c in range(len(OUTPUTS))
     ]
     chance = min(1.0, len(found) * min(each.chance for each in found))
-    return Bursts(chance, sum(each.excess for each in found))
+    return ScanStatistic(chance, sum(each.excess for each in found))
 
 
-def _tells(bench: Bench) -> bool:
+def _tells(problem: FitProblem) -> bool:
     """Whether a residual tells of itself what is noise."""
-    return not bench.coarse and bench.given.plant != "slide"
+    return not problem.coarse and problem.given.plant != "slide"

@@ -41,7 +41,7 @@ HALVINGS = 60
 
 
 @dataclass(frozen=True)
-class Bursts:
+class ScanStatistic:
     """Pieces of one signal's residual that noise does not make.
 
     Attributes:
@@ -54,12 +54,12 @@ class Bursts:
     excess: float
 
 
-NO_BURSTS = Bursts(1.0, 0.0)
+NO_EXCESS = ScanStatistic(1.0, 0.0)
 
 
-def bursts(
+def scan_statistic(
     parts: Sequence[Array], edges: Sequence[Sequence[int]], level: float, step: float
-) -> Bursts:
+) -> ScanStatistic:
     """Bursts in one signal's residual.
 
     Args:
@@ -70,7 +70,7 @@ def bursts(
             do what rounding can.
     """
     if sparse(parts) or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH:
-        return NO_BURSTS
+        return NO_EXCESS
     pieces = [
         piece[np.isfinite(piece)]
         for part, at in zip(parts, edges, strict=True)
@@ -78,7 +78,7 @@ def bursts(
     ]
     pieces = [piece for piece in pieces if len(piece) >= LEAST_REST]
     if len(pieces) < 2:
-        return NO_BURSTS
+        return NO_EXCESS
     noise = noise_of(parts, level)
     beyond = [np.maximum(np.abs(piece) - 0.5 * step, 0.0) / noise.level for piece in pieces]
     colour = autocorrelation(noise, max(map(len, pieces)))
@@ -94,7 +94,7 @@ def bursts(
         least = min(least, found)
         if found <= CHANCE:
             excess += float(pieces[k] @ pieces[k] - size * noise.level**2) / level**2
-    return Bursts(least, excess)
+    return ScanStatistic(least, excess)
 
 
 def noise_of(parts: Sequence[Array], level: float) -> Whitening:

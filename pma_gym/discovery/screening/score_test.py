@@ -1,4 +1,4 @@
-"""Screening: how much each suspect could explain, from one look at each of its probes.
+"""Screening: how much each candidate could explain, from one look at each of its probes.
 
 What a probe changes in the signals is made white, and what the model's own parameters could do of
 it is projected out. The rest, times a free factor, is set against the residual. Chance is simulated
@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 
 Array = NDArray[np.float64]
 
@@ -28,14 +28,14 @@ FACTORS = (0.1, 8.0)
 """By what a probe may be multiplied to start a fit from."""
 
 PROBES = 3
-"""How many probes of a suspect are looked at again."""
+"""How many probes of a candidate are looked at again."""
 
 SIZES = (0.1, 0.17, 0.3, 0.5, 0.85, 1.4)
 """Factors on a probe at which a closer look simulates it: a dead zone of a size between two of them
 still explains most of a burst."""
 
 CLOSER, AT_ONCE = 24, 64
-"""How many probes of a suspect a closer look simulates at most, taken evenly, and how many lie in
+"""How many probes of a candidate a closer look simulates at most, taken evenly, and how many lie in
 memory together."""
 
 LEAST_PART = 1e-6
@@ -47,11 +47,11 @@ may be steps of the integrator that rounding made fall otherwise."""
 
 
 @dataclass(frozen=True)
-class Look:
-    """What the best probe of a suspect could explain.
+class ScreeningScore:
+    """What the best probe of a candidate could explain.
 
     Attributes:
-        suspect: the suspect.
+        candidate: the candidate.
         gain: fall of chi-square.
         p_value: family-wise.
         probe: which probe it is; -1 where none changes anything.
@@ -62,7 +62,7 @@ class Look:
         starts: probes that explain most, with their factors, the best first.
     """
 
-    suspect: Suspect
+    candidate: CandidateEffect
     gain: float
     p_value: float
     probe: int
@@ -74,94 +74,96 @@ class Look:
 
 @dataclass(frozen=True)
 class Baseline:
-    """The refitted model that suspects are tried beside.
+    """The refitted model that candidates are tried beside.
 
     Attributes:
-        evidence: the trials beside it.
+        whitened: the trials beside it.
         values: its parameters at the door.
         columns: whitened residual and derivatives of each trial, shape (1 + p, 4, rows).
         inverse: of the curvature with the prior, shape (p, p).
     """
 
-    evidence: Evidence
+    whitened: WhitenedResiduals
     values: Array
     columns: list[Any]
     inverse: Array
 
     @classmethod
-    def at(cls, evidence: Evidence, values: Array, steps: Array) -> "Baseline":
+    def at(cls, whitened: WhitenedResiduals, values: Array, steps: Array) -> "Baseline":
         """At parameters, whose derivatives take such steps.
 
         Raises:
             ValueError: the model cannot be simulated there.
         """
-        columns = evidence.columns(np.concatenate([values[None], values + np.diag(steps)]))
+        columns = whitened.columns(np.concatenate([values[None], values + np.diag(steps)]))
         if columns is None:
             raise ValueError("the refitted model cannot be simulated")
         for part in columns:
             part[1:] /= steps[:, None, None].astype(np.float32)
-        total = evidence.products(columns).total()
-        curvature = total[1:, 1:] + np.diag(evidence.prior**-2.0)
+        total = whitened.products(columns).total()
+        curvature = total[1:, 1:] + np.diag(whitened.prior**-2.0)
         # A parameter of an effect may change nothing here, and nothing is assumed of it.
         diagonal = np.diag(curvature)
         scale = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
         inner = np.linalg.pinv(curvature * np.outer(scale, scale), hermitian=True)
-        return cls(evidence, values, columns, inner * np.outer(scale, scale))
+        return cls(whitened, values, columns, inner * np.outer(scale, scale))
 
 
-def look(
+def screen(
     baseline: Baseline,
-    suspects: Sequence[Suspect],
+    candidates: Sequence[CandidateEffect],
     seed: int,
-    evidence_of: Callable[[Suspect], Evidence],
+    whitened_of: Callable[[CandidateEffect], WhitenedResiduals],
     progress: Callable[[int], None] | None = None,
-) -> list[Look]:
-    """Look at every suspect.
+) -> list[ScreeningScore]:
+    """Look at every candidate.
 
     Args:
         baseline: the refitted model.
-        suspects: the suspects.
+        candidates: the candidates.
         seed: of the simulated residuals.
-        evidence_of: the trials beside the refitted model with a suspect in it, whose parameters
+        whitened_of: the trials beside the refitted model with a candidate in it, whose parameters
             are free.
-        progress: called with the number of suspects that are done.
+        progress: called with the number of candidates that are done.
     """
     size = len(baseline.columns[0])
     found = []
-    for number, suspect in enumerate(suspects):
-        found.append(_probe(baseline, evidence_of(suspect), suspect, size))
+    for number, candidate in enumerate(candidates):
+        found.append(_probe(baseline, whitened_of(candidate), candidate, size))
         if progress is not None:
             progress(number + 1)
-    return _judged(found, suspects, seed)
+    return _judged(found, candidates, seed)
 
 
 @dataclass(frozen=True)
 class _Probed:
-    """Scores of a suspect's probes, by pieces: slopes g (n, pieces), strengths h (n,), changes."""
+    """Scores of probes, by pieces: slopes g (n, pieces), strengths h (n,), changes."""
 
     slopes: Array
     strengths: Array
     changes: Array
 
 
-def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) -> _Probed:
-    """Scores of a suspect's probes beside the refitted model, which has `size - 1` parameters."""
-    tried = np.concatenate([suspect.absent[None], suspect.probes])
-    columns = evidence.columns(tried)
+def _probe(
+    baseline: Baseline, whitened: WhitenedResiduals, candidate: CandidateEffect, size: int
+) -> _Probed:
+    """Scores of a candidate's probes beside the refitted model, which has `size - 1` parameters."""
+    tried = np.concatenate([candidate.absent[None], candidate.probes])
+    columns = whitened.columns(tried)
     if columns is None:
-        columns = _balanced(evidence, tried)
+        columns = _balanced(whitened, tried)
     changes = [part[1:] for part in columns]
-    across = np.zeros((size - 1, len(suspect.probes)))
-    whole = np.zeros(len(suspect.probes))
+    across = np.zeros((size - 1, len(candidate.probes)))
+    whole = np.zeros(len(candidate.probes))
     along, own = [], []
     readings = sum(part[0].size for part in changes)
     for logged, ours, theirs in zip(
-        baseline.evidence.logged, baseline.columns, changes, strict=True
+        baseline.whitened.logged, baseline.columns, changes, strict=True
     ):
         flat = theirs.reshape(len(theirs), -1)
         across += ours[1:].reshape(size - 1, -1) @ flat.T
         whole += np.einsum("ij,ij->i", flat, flat, dtype=np.float64)
-        edges = baseline.evidence.edges(logged)[:-1]
+        edges = baseline.whitened.edges(logged)[:-1]
         for found, part in ((along, theirs), (own, ours[1:])):
             slopes = np.einsum("kcr,cr->kr", part, ours[0], dtype=np.float64)
             found.append(np.add.reduceat(slopes, edges, axis=1))
@@ -173,12 +175,12 @@ def _probe(baseline: Baseline, evidence: Evidence, suspect: Suspect, size: int) 
     return _Probed(slopes, strengths, _changes(baseline, changes, weights))
 
 
-def _balanced(evidence: Evidence, tried: Array) -> list[Any]:
+def _balanced(whitened: WhitenedResiduals, tried: Array) -> list[Any]:
     """As `_one_by_one`, but those that balance the load go together, which takes far less time."""
-    able = evidence.balanced[: len(tried)]
-    together = evidence.columns(tried[able]) if able[0] and not able.all() else None
+    able = whitened.balanced[: len(tried)]
+    together = whitened.columns(tried[able]) if able[0] and not able.all() else None
     if together is None:
-        return _one_by_one(evidence, tried)
+        return _one_by_one(whitened, tried)
     columns = []
     for part in together:
         whole = np.zeros((len(tried), *part.shape[1:]), part.dtype)
@@ -187,12 +189,12 @@ def _balanced(evidence: Evidence, tried: Array) -> list[Any]:
     return columns
 
 
-def _one_by_one(evidence: Evidence, tried: Array) -> list[Any]:
+def _one_by_one(whitened: WhitenedResiduals, tried: Array) -> list[Any]:
     """As `Evidence.columns`; a probe that cannot be simulated changes nothing."""
-    rows = [evidence.columns(np.stack([tried[0], row])) for row in tried[1:]]
-    first = evidence.columns(tried[:1])
+    rows = [whitened.columns(np.stack([tried[0], row])) for row in tried[1:]]
+    first = whitened.columns(tried[:1])
     if first is None:
-        raise ValueError(f"model {evidence.plant.model.name} cannot be simulated")
+        raise ValueError(f"model {whitened.plant.model.name} cannot be simulated")
     return [
         np.concatenate(
             [part, *(np.zeros_like(part) if row is None else row[i][1:] for row in rows)]
@@ -207,7 +209,7 @@ def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Arra
     counts = np.zeros(4)
     reduced = weights.T.astype(np.float32)
     for logged, ours, theirs in zip(
-        baseline.evidence.logged, baseline.columns, changes, strict=True
+        baseline.whitened.logged, baseline.columns, changes, strict=True
     ):
         rest = theirs - np.tensordot(reduced, ours[1:], axes=1)
         squares += np.einsum("kcr,kcr->kc", rest, rest, dtype=np.float64)
@@ -215,30 +217,32 @@ def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Arra
     return np.sqrt(np.max(squares / np.maximum(counts, 1.0), axis=1))
 
 
-def _judged(found: Sequence[_Probed], suspects: Sequence[Suspect], seed: int) -> list[Look]:
+def _judged(
+    found: Sequence[_Probed], candidates: Sequence[CandidateEffect], seed: int
+) -> list[ScreeningScore]:
     generator = np.random.Generator(np.random.Philox(seed))
     pieces = found[0].slopes.shape[1]
     flips = generator.choice([-1.0, 1.0], size=(RESAMPLES, pieces))
     largest = np.zeros(RESAMPLES)
-    for each, suspect in zip(found, suspects, strict=True):
-        drawn = _gains(flips @ each.slopes.T, each.strengths, suspect.signs)
+    for each, candidate in zip(found, candidates, strict=True):
+        drawn = _gains(flips @ each.slopes.T, each.strengths, candidate.signs)
         largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
-    looks = []
-    for each, suspect in zip(found, suspects, strict=True):
+    scores = []
+    for each, candidate in zip(found, candidates, strict=True):
         if not each.strengths.any():
-            looks.append(Look(suspect, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
+            scores.append(ScreeningScore(candidate, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
             continue
         sums = each.slopes.sum(axis=1)
-        gains = _gains(sums[None], each.strengths, suspect.signs)[0]
+        gains = _gains(sums[None], each.strengths, candidate.signs)[0]
         best = int(np.argmax(gains))
         p_value = (1.0 + np.sum(largest >= gains[best])) / (RESAMPLES + 1.0)
         factors = np.divide(
             -sums, each.strengths, out=np.zeros_like(sums), where=each.strengths > 0
         )
         usual = int(np.argmax(each.strengths))
-        looks.append(
-            Look(
-                suspect,
+        scores.append(
+            ScreeningScore(
+                candidate,
                 float(gains[best]),
                 float(p_value),
                 best,
@@ -248,7 +252,7 @@ def _judged(found: Sequence[_Probed], suspects: Sequence[Suspect], seed: int) ->
                 _starts(gains, factors),
             )
         )
-    return looks
+    return scores
 
 
 def _gains(slopes: Array, strengths: Array, signs: NDArray[np.bool_]) -> Array:
@@ -267,30 +271,32 @@ def _starts(gains: Array, factors: Array) -> tuple[tuple[int, float], ...]:
     )
 
 
-def closer(baseline: Baseline, evidence: Evidence, found: Look) -> Look:
-    """A look at a suspect whose probes are simulated at many sizes.
+def refined_score(
+    baseline: Baseline, whitened: WhitenedResiduals, found: ScreeningScore
+) -> ScreeningScore:
+    """A look at a candidate whose probes are simulated at many sizes.
 
     What comes a little later is not what a look makes of it, a change times a factor: a cable that
     comes taut beats once, at another instant.
 
     Args:
         baseline: the refitted model.
-        evidence: the trials beside it with the suspect in it.
+        whitened: the trials beside it with the candidate in it.
         found: the look so far.
     Returns:
         The same look with the gain that is the larger of the two, and starts from all sizes.
     """
-    suspect = found.suspect
-    if not len(suspect.probes):
+    candidate = found.candidate
+    if not len(candidate.probes):
         return found
     starts = list(found.starts)
-    for probe in range(0, len(suspect.probes), -(-len(suspect.probes) // CLOSER)):
+    for probe in range(0, len(candidate.probes), -(-len(candidate.probes) // CLOSER)):
         starts += [(probe, size) for size in SIZES]
-        starts += [(probe, -size) for size in SIZES if suspect.signs[probe]]
-    tried = np.array([suspect.grown(probe, factor) for probe, factor in starts])
+        starts += [(probe, -size) for size in SIZES if candidate.signs[probe]]
+    tried = np.array([candidate.grown(probe, factor) for probe, factor in starts])
     gains = np.concatenate(
         [
-            _simulated_gains(baseline, evidence, replace(suspect, probes=tried[k : k + AT_ONCE]))
+            _simulated_gains(baseline, whitened, replace(candidate, probes=tried[k : k + AT_ONCE]))
             for k in range(0, len(tried), AT_ONCE)
         ]
     )
@@ -299,23 +305,27 @@ def closer(baseline: Baseline, evidence: Evidence, found: Look) -> Look:
     return replace(found, gain=best, starts=tuple(starts[k] for k in order) or found.starts)
 
 
-def _simulated_gains(baseline: Baseline, evidence: Evidence, suspect: Suspect) -> Array:
-    """Fall of chi-square by a suspect's probes as they are, parameters free beside them."""
-    probed = _probe(baseline, evidence, suspect, len(baseline.columns[0]))
+def _simulated_gains(
+    baseline: Baseline, whitened: WhitenedResiduals, candidate: CandidateEffect
+) -> Array:
+    """Fall of chi-square by a candidate's probes as they are, parameters free beside them."""
+    probed = _probe(baseline, whitened, candidate, len(baseline.columns[0]))
     return -2.0 * probed.slopes.sum(axis=1) - probed.strengths
 
 
-def beginnings(baseline: Baseline, evidence: Evidence, found: Look) -> list[Array]:
-    """Where to begin fits of a suspect: values that explain most as they are, the best first.
+def starting_points(
+    baseline: Baseline, whitened: WhitenedResiduals, found: ScreeningScore
+) -> list[Array]:
+    """Where to begin fits of a candidate: values that explain most as they are, the best first.
 
     A look takes what a probe changes times a factor; here each is simulated, for a dead zone twice
     as wide does not change twice as much.
     """
-    suspect, tried = found.suspect, []
+    candidate, tried = found.candidate, []
     for probe, factor in found.starts:
         for each in (factor, np.sign(factor) * np.sqrt(abs(factor)), 1.0, 0.4 * factor):
-            values = suspect.grown(probe, float(each))
+            values = candidate.grown(probe, float(each))
             if not any(np.array_equal(values, other) for other in tried):
                 tried.append(values)
-    gains = _simulated_gains(baseline, evidence, replace(suspect, probes=np.array(tried)))
+    gains = _simulated_gains(baseline, whitened, replace(candidate, probes=np.array(tried)))
     return [tried[k] for k in np.argsort(-gains, kind="stable")]

@@ -11,10 +11,10 @@ from pma_gym.estimation.logged import Logged
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-TICK_S = 0.05
+BIN_S = 0.05
 """Readings of so long (s) are taken together: finer than any region."""
 
-PIECE_TICKS = 20
+PIECE_BINS = 20
 """Ticks of a piece that is dealt as a whole: a second, longer than the memory of noise and
 plant."""
 
@@ -30,7 +30,7 @@ STEP_V, STEP_V_PER_S = 0.1, 8.0
 
 
 @dataclass(frozen=True)
-class Ticks:
+class TimeBins:
     """All trials in ticks, padded to whole pieces; shape (n,) each unless said otherwise.
 
     Attributes:
@@ -62,9 +62,9 @@ class Ticks:
     order: Array
 
 
-def ticks_of(
+def time_bins(
     logs: Sequence[Logged], readings: Sequence[Array], residuals: Sequence[Array]
-) -> Ticks:
+) -> TimeBins:
     """All trials in ticks.
 
     Args:
@@ -76,12 +76,14 @@ def ticks_of(
     for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
         order = number / max(len(logs) - 1, 1)
         parts.append(_of_trial(logged, held, residual, order))
-    return Ticks(**{name: np.concatenate([p[name] for p in parts], axis=-1) for name in parts[0]})
+    return TimeBins(
+        **{name: np.concatenate([p[name] for p in parts], axis=-1) for name in parts[0]}
+    )
 
 
 def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dict[str, Array]:
     time = logged.time
-    width = max(TICK_S, float(np.median(np.diff(time)))) if len(time) > 1 else TICK_S
+    width = max(BIN_S, float(np.median(np.diff(time)))) if len(time) > 1 else BIN_S
     starts = np.unique(np.floor((time - time[0]) / width + 1e-9), return_index=True)[1]
     known = np.isfinite(residual)
     filled = np.where(known, residual, 0.0)
@@ -95,7 +97,7 @@ def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dic
     middle = (starts + np.append(starts[1:], len(time)) - 1) // 2
     conditions = _conditions(logged, held) | {"order": np.full(len(time), order)}
     found |= {name: each[middle] for name, each in conditions.items()}
-    spare = -len(starts) % PIECE_TICKS
+    spare = -len(starts) % PIECE_BINS
     return {name: _padded(each, spare) for name, each in found.items()}
 
 

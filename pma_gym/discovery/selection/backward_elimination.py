@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.fitting.covariance import clusters, covariance, widened
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.free_parameters import Own
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import FreeParameters
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
 
 Array = NDArray[np.float64]
@@ -31,38 +31,38 @@ ODDS = 20.0
 
 
 @dataclass(frozen=True)
-class Fewest:
+class Elimination:
     """The fewest parameters that explain trials.
 
     Attributes:
-        bench: on which they alone are free.
+        problem: on which they alone are free.
         fit: of them; the others are as they were given.
     """
 
-    bench: Bench
+    problem: FitProblem
     fit: Fitted
 
 
-def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
+def backward_elimination(problem: FitProblem, fit: Fitted) -> Elimination | None:
     """The fewest parameters that explain the trials.
 
     Args:
-        bench: the trials, with the noise that the fit leaves.
+        problem: the trials, with the noise that the fit leaves.
         fit: of all parameters, nothing added.
     Returns:
         They, or None where the sums are no numbers, or where chi-square grows by more than each
         parameter that was put back may cost, all together: a rig that is so far from the model is
         not to be judged by them.
     """
-    evidence = bench.evidence(fit.model)
-    pieces = evidence.pieces(fit.values, fit.steps, central=True)
+    whitened = problem.whitened_residuals(fit.model)
+    pieces = whitened.pieces(fit.values, fit.steps, central=True)
     if pieces is None:
         return None
     kept = np.arange(len(fit.paths))
     moves, room = np.empty(0), 0.0
     while kept.size:
-        moves, errors = _without_others(pieces, fit.values, evidence.centre, evidence.prior, kept)
-        occam = np.log(np.maximum(evidence.prior[kept] / errors, 1.0))
+        moves, errors = _without_others(pieces, fit.values, whitened.centre, whitened.prior, kept)
+        occam = np.log(np.maximum(whitened.prior[kept] / errors, 1.0))
         odds = 0.5 * (moves / errors) ** 2 - occam
         least = int(np.argmin(odds))
         if odds[least] > np.log(ODDS):
@@ -73,23 +73,25 @@ def fewest(bench: Bench, fit: Fitted) -> Fewest | None:
     if not np.isfinite(most):
         return None
     paths = tuple(fit.paths[i] for i in kept)
-    narrow = replace(bench, own=Own(paths, evidence.prior[kept]))
+    narrow = replace(problem, own=FreeParameters(paths, whitened.prior[kept]))
     if not paths:
-        given = as_given(bench)
+        given = as_given(problem)
         return given if given.fit.chi_square <= most else None
-    begun = np.clip(evidence.centre[kept] + moves, evidence.lower[kept], evidence.upper[kept])
-    found = narrow.fit(bench.given.replace(dict(zip(paths, map(float, begun), strict=True))))
+    begun = np.clip(whitened.centre[kept] + moves, whitened.lower[kept], whitened.upper[kept])
+    found = narrow.fit(problem.given.replace(dict(zip(paths, map(float, begun), strict=True))))
     if found is None or not found.chi_square <= most:
         return None
-    return Fewest(narrow, replace(found, covariance=covariance(narrow, found, ())))
+    return Elimination(narrow, replace(found, covariance=covariance(narrow, found, ())))
 
 
-def as_given(bench: Bench) -> Fewest:
+def as_given(problem: FitProblem) -> Elimination:
     """The model as it was given, with nothing free."""
     none = np.empty(0)
-    narrow = replace(bench, own=Own((), none))
-    left = narrow.evidence(bench.given).sums(none, none).chi_square
-    return Fewest(narrow, Fitted(bench.given, (), (), none, np.empty((0, 0)), left, none, True))
+    narrow = replace(problem, own=FreeParameters((), none))
+    left = narrow.whitened_residuals(problem.given).sums(none, none).chi_square
+    return Elimination(
+        narrow, Fitted(problem.given, (), (), none, np.empty((0, 0)), left, none, True)
+    )
 
 
 def _without_others(

@@ -1,19 +1,19 @@
-"""Fits of suspects beside what was found before: begun well, led out of hollows, and kept."""
+"""Fits of candidates beside what was found before: begun well, led out of hollows, and kept."""
 
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.screening.score_test import Baseline, Look, beginnings
+from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, starting_points
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
-"""How many fits of a suspect are begun, and how many where no suspect's came near the trials."""
+"""How many fits of a candidate are started, and how many where none came near the trials."""
 
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
@@ -24,39 +24,39 @@ def cost(fit: Fitted) -> float:
     return fit.chi_square + 2.0 * COST * len(fit.paths)
 
 
-def stripped(bench: Bench, before: Fitted) -> Model:
+def stripped(problem: FitProblem, before: Fitted) -> Model:
     """The given model with the parameters of a fit, without the effects that were added."""
-    own = {path: float(before.values[before.paths.index(path)]) for path in bench.own.free}
-    return bench.given.replace(own)
+    own = {path: float(before.values[before.paths.index(path)]) for path in problem.own.free}
+    return problem.given.replace(own)
 
 
 def fitted(
-    bench: Bench,
+    problem: FitProblem,
     baseline: Baseline,
     before: Fitted,
-    chosen: tuple[Suspect, ...],
-    each: Look,
+    chosen: tuple[CandidateEffect, ...],
+    each: ScreeningScore,
     journal: Journal,
     caught: bool = False,
 ) -> Fitted | None:
     """The best of fits from the probes that explain most; of more where others were caught."""
     begun_at = f"{before.names} {before.values.tolist()}"
-    key = f"{bench.noise} {begun_at} {each.suspect.name} {each.starts}{' caught' * caught}"
-    extra = (*chosen, each.suspect)
-    kept = journal.restored(key, lambda entry: restored(entry, bench, before, extra))
+    key = f"{problem.noise} {begun_at} {each.candidate.name} {each.starts}{' caught' * caught}"
+    extra = (*chosen, each.candidate)
+    kept = journal.restored(key, lambda entry: restored(entry, problem, before, extra))
     if kept is not None:
         return kept
     best: Fitted | None = None
-    evidence = bench.probed(stripped(bench, before), each.suspect)
-    for begun in beginnings(baseline, evidence, each)[: ALL_BEGUN if caught else BEGUN]:
-        found = bench.fit(before.model, extra, {each.suspect.name: begun})
+    whitened = problem.probed(stripped(problem, before), each.candidate)
+    for begun in starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]:
+        found = problem.fit(before.model, extra, {each.candidate.name: begun})
         if found is not None and caught:
-            found = bench.led_out(found, extra)
+            found = problem.led_out(found, extra)
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
         # As much as the look promised, or near at last: no other beginning is needed.
         if best is not None and (
-            not bench.far(best) if caught else before.chi_square - best.chi_square >= each.gain
+            not problem.far(best) if caught else before.chi_square - best.chi_square >= each.gain
         ):
             break
     if best is None or best.chi_square > before.chi_square:
@@ -66,59 +66,67 @@ def fitted(
     return best
 
 
-def led_nearer(
-    bench: Bench,
+def restarted_from_better(
+    problem: FitProblem,
     baseline: Baseline,
     before: Fitted,
-    chosen: tuple[Suspect, ...],
-    looks: Sequence[Look],
+    chosen: tuple[CandidateEffect, ...],
+    scores: Sequence[ScreeningScore],
     fits: dict[str, Fitted],
     journal: Journal,
     progress: Callable[[str, int, int], None],
 ) -> dict[str, Fitted]:
     """Better fits, the likeliest first, until one comes near the trials; none where one has."""
-    known = {each.suspect.name: each for each in looks}
+    known = {each.candidate.name: each for each in scores}
     better: dict[str, Fitted] = {}
-    if not all(map(bench.far, fits.values())):
+    if not all(map(problem.far, fits.values())):
         return better
     for number, name in enumerate(sorted(fits, key=lambda each: cost(fits[each]))):
         progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(fits))
-        found = fitted(bench, baseline, before, chosen, known[name], journal, caught=True)
+        found = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
         if found is not None and found.chi_square < fits[name].chi_square:
             better[name] = found
-        if name in better and not bench.far(better[name]):
+        if name in better and not problem.far(better[name]):
             break
     return better
 
 
-def better(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
+def better(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], journal: Journal
+) -> Fitted:
     """A fit, or a better one from a careful search: what it misses would look like an effect."""
 
     def search() -> Fitted:
-        given = dict(zip(bench.own.free, values(bench.given, bench.own.free).tolist(), strict=True))
-        found = bench.careful_fit(fit.model.replace(given), chosen)
+        given = dict(
+            zip(problem.own.free, values(problem.given, problem.own.free).tolist(), strict=True)
+        )
+        found = problem.careful_fit(fit.model.replace(given), chosen)
         best = fit if found is None or found.chi_square >= fit.chi_square else found
-        return bench.led_out(best, chosen)
+        return problem.led_out(best, chosen)
 
-    return _once("better", bench, fit, chosen, journal, search)
+    return _once("better", problem, fit, chosen, journal, search)
 
 
-def refit(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], journal: Journal) -> Fitted:
+def refit(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], journal: Journal
+) -> Fitted:
     """A fit, from where it is, beside the noise that the bench has now."""
-    return _once("again", bench, fit, chosen, journal, lambda: bench.fit(fit.model, chosen) or fit)
+    return _once(
+        "again", problem, fit, chosen, journal, lambda: problem.fit(fit.model, chosen) or fit
+    )
 
 
 def _once(
     what: str,
-    bench: Bench,
+    problem: FitProblem,
     fit: Fitted,
-    chosen: tuple[Suspect, ...],
+    chosen: tuple[CandidateEffect, ...],
     journal: Journal,
     search: Callable[[], Fitted],
 ) -> Fitted:
     """What a search from a fit found, from the journal where it was made before."""
-    key = f"{what} {bench.noise} {fit.names} {fit.values.tolist()}"
-    kept = journal.restored(key, lambda entry: restored(entry, bench, fit, chosen))
+    key = f"{what} {problem.noise} {fit.names} {fit.values.tolist()}"
+    kept = journal.restored(key, lambda entry: restored(entry, problem, fit, chosen))
     if kept is not None:
         return kept
     found = search()
@@ -127,17 +135,17 @@ def _once(
 
 
 def without_idle(
-    bench: Bench,
+    problem: FitProblem,
     best: Fitted,
-    chosen: tuple[Suspect, ...],
+    chosen: tuple[CandidateEffect, ...],
     refitted: Fitted,
     journal: Journal,
-) -> tuple[tuple[Suspect, ...], Fitted]:
+) -> tuple[tuple[CandidateEffect, ...], Fitted]:
     """The effects less those that nobody misses, and the fit of those that stay."""
     worst = refitted.chi_square
-    for suspect in chosen:
-        others = tuple(each for each in chosen if each is not suspect)
-        begun = stripped(bench, best)
+    for candidate in chosen:
+        others = tuple(each for each in chosen if each is not candidate)
+        begun = stripped(problem, best)
         starts = {
             each.name: np.array(
                 [best.model.at_the_door(p.split(".")[0])[p.split(".")[1]] for p in each.paths],
@@ -145,12 +153,12 @@ def without_idle(
             )
             for each in others
         }
-        found = bench.fit(begun, others, starts)
+        found = problem.fit(begun, others, starts)
         if found is None:
             continue
         missed = found.chi_square - best.chi_square
         if missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0)):
-            return others, refit(bench, found, others, journal)
+            return others, refit(problem, found, others, journal)
     return chosen, best
 
 
@@ -179,7 +187,9 @@ def kept_form(fit: Fitted) -> dict:
     }
 
 
-def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect]) -> Fitted:
+def restored(
+    kept: dict, problem: FitProblem, before: Fitted, extra: Sequence[CandidateEffect]
+) -> Fitted:
     """A fit from a journal.
 
     Raises:
@@ -187,17 +197,17 @@ def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect])
     """
     check_shape(kept, _KEPT)
     count = len(kept["paths"])
-    wanted = [*bench.own.free, *(path for each in extra for path in each.fitted_paths)]
+    wanted = [*problem.own.free, *(path for each in extra for path in each.fitted_paths)]
     shapes = (len(kept["values"]), len(kept["steps"]), np.shape(kept["covariance"]))
     if shapes != (count, count, (count, count)) or kept["paths"] != wanted:
         raise ValueError(f"it has {shapes} numbers of {count} parameters")
     model = before.model
-    for suspect in extra:
-        model = suspect.beside(model)
+    for candidate in extra:
+        model = candidate.beside(model)
         switched = {
             path: float(value)
             for path, value, free in zip(
-                suspect.paths, suspect.probes[0], suspect.fitted, strict=True
+                candidate.paths, candidate.probes[0], candidate.fitted, strict=True
             )
             if not free
         }
@@ -205,7 +215,7 @@ def restored(kept: dict, bench: Bench, before: Fitted, extra: Sequence[Suspect])
     found = dict(zip(kept["paths"], kept["values"], strict=True))
     return Fitted(
         model.replace(found),
-        tuple(suspect.name for suspect in extra),
+        tuple(candidate.name for candidate in extra),
         tuple(kept["paths"]),
         np.array(kept["values"]),
         np.array(kept["covariance"]),

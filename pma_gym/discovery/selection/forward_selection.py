@@ -1,31 +1,37 @@
-"""Selection: which suspects are added to the model, one after the other.
+"""Selection: which candidates are added to the model, one after the other.
 
-The gate is the look (`screening`): chance may explain as much, over the whole catalogue, in one of
-two hundred data sets. It opens too where the residual itself is no noise: where it is many times as
-large (`far_off`), where it is autocorrelated beyond the noise (`excess`), or bursts (`bursts`) and
-an effect explains the bursts. What passes is fitted together with the model's parameters; the
-likeliest is taken; then the same again beside it. Each effect is then left out once: one that is
-not missed goes. Noise is learnt anew only when all effects are found: before, an autoregression
-would take the next effect for noise.
+The gate is the score test: chance explains as much, over the whole catalogue, in one of two hundred
+data sets. It opens too where the residual itself is no noise: where it is many times as large
+(`far_off`), where it is autocorrelated beyond the noise (`autocorrelation`), or where single pieces
+are too large for noise (`scan_statistic`) and an effect explains them. What passes is fitted
+together with the model's parameters; the likeliest is added; then the same again beside it. Each
+effect is then left out once, and stays out if the fit is as good without it. The noise is estimated
+again only when all effects are selected: before, an autoregression would take the next effect for
+noise.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from pma_gym.discovery.diagnosis import Undetermined
-from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.screening.residuals import burst_of, far_off, relearnt, remembers
-from pma_gym.discovery.screening.scan_statistic import NO_BURSTS, Bursts
-from pma_gym.discovery.screening.score_test import Baseline, Look, closer, look
+from pma_gym.discovery.screening.residuals import (
+    far_off,
+    is_autocorrelated,
+    reestimated_noise,
+    scan_of_fit,
+)
+from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic
+from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, refined_score, screen
 from pma_gym.discovery.selection.candidate_fits import (
     better,
     cost,
     fitted,
-    led_nearer,
     refit,
+    restarted_from_better,
     stripped,
     without_idle,
 )
@@ -53,7 +59,7 @@ MOST_EFFECTS = 3
 """Most effects that are added."""
 
 TRIED, NEAR = 8, 0.05
-"""How many suspects are fitted at most, and the share of the best look's gain that one needs."""
+"""How many candidates are fitted at most, and the share of the best look's gain that one needs."""
 
 CARRIED = 0.5
 """Share of the bursts in a residual that a fit must explain, where they alone opened the gate:
@@ -67,24 +73,24 @@ class Stage:
     """One round of the selection.
 
     Attributes:
-        bench: with the noise of this round.
-        before: the model that suspects were tried beside.
+        problem: with the noise of this round.
+        before: the model that candidates were tried beside.
         baseline: the same, ready to be looked beside.
-        looks: at every suspect.
+        scores: at every candidate.
         fits: of those that were fitted, by name, each together with what was there before.
         gate: the looks that passed.
         missing: whether the residual says of itself that something is missing.
-        burst: pieces of it that opened the gate by themselves.
+        scan: pieces of it that opened the gate by themselves.
     """
 
-    bench: Bench
+    problem: FitProblem
     before: Fitted
     baseline: Baseline
-    looks: tuple[Look, ...]
+    scores: tuple[ScreeningScore, ...]
     fits: dict[str, Fitted]
-    gate: tuple[Look, ...]
+    gate: tuple[ScreeningScore, ...]
     missing: bool
-    burst: Bursts = NO_BURSTS
+    scan: ScanStatistic = NO_EXCESS
 
 
 @dataclass(frozen=True)
@@ -93,54 +99,54 @@ class Selection:
 
     Attributes:
         stages: the rounds.
-        chosen: the suspects in the model, in the order in which they came.
+        chosen: the candidates in the model, in the order in which they came.
         fit: the model with them.
-        bench: with the noise that it leaves.
+        problem: with the noise that it leaves.
         refitted: the model with its own parameters refitted alone; better than what the selection
             began with, where it had been caught.
         undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
     """
 
     stages: tuple[Stage, ...]
-    chosen: tuple[Suspect, ...]
+    chosen: tuple[CandidateEffect, ...]
     fit: Fitted
-    bench: Bench
+    problem: FitProblem
     refitted: Fitted
     undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
 
 def select(
-    bench: Bench,
+    problem: FitProblem,
     refitted: Fitted,
-    suspects: Sequence[Suspect],
+    candidates: Sequence[CandidateEffect],
     seed: int,
     journal: Journal,
     progress: Progress,
 ) -> Selection:
-    """Select suspects.
+    """Select candidates.
 
     Args:
-        bench: the trials.
+        problem: the trials.
         refitted: the model with its own parameters refitted.
-        suspects: the whole catalogue.
+        candidates: the whole catalogue.
         seed: of simulated residuals.
         journal: keeps fits.
         progress: called with a step's name, what is done and the total.
     """
-    chosen: tuple[Suspect, ...] = ()
+    chosen: tuple[CandidateEffect, ...] = ()
     stages: list[Stage] = []
     begun: list[str] = []
     best = refitted
     while len(chosen) < MOST_EFFECTS:
-        rest = [suspect for suspect in suspects if suspect not in chosen]
-        stage = _stage(bench, best, chosen, rest, seed, journal, progress)
+        rest = [candidate for candidate in candidates if candidate not in chosen]
+        stage = _stage(problem, best, chosen, rest, seed, journal, progress)
         stages.append(stage)
         added = _likeliest(stage, stages[0])
         if added is None:
             break
-        chosen = (*chosen, next(s for s in suspects if s.name == added))
-        best = better(bench, stage.fits[added], chosen, journal)
-        chosen, best = without_idle(bench, best, chosen, refitted, journal)
+        chosen = (*chosen, next(s for s in candidates if s.name == added))
+        best = better(problem, stage.fits[added], chosen, journal)
+        chosen, best = without_idle(problem, best, chosen, refitted, journal)
         if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
             # The refitted model had been caught in a hollow that any effect led out of.
             refitted, stages = best, []
@@ -148,78 +154,84 @@ def select(
         elif len(chosen) < len(stages):
             # One is not missed beside the other, and that is the end of it.
             break
-    bench = replace(bench, noise=relearnt(bench, best, chosen))
-    fit = refit(bench, best, chosen, journal)
-    fit = replace(fit, covariance=covariance(bench, fit, chosen))
-    return Selection(tuple(stages), chosen, fit, bench, refitted)
+    problem = replace(problem, noise=reestimated_noise(problem, best, chosen))
+    fit = refit(problem, best, chosen, journal)
+    fit = replace(fit, covariance=covariance(problem, fit, chosen))
+    return Selection(tuple(stages), chosen, fit, problem, refitted)
 
 
 def _stage(
-    bench: Bench,
+    problem: FitProblem,
     before: Fitted,
-    chosen: tuple[Suspect, ...],
-    rest: Sequence[Suspect],
+    chosen: tuple[CandidateEffect, ...],
+    rest: Sequence[CandidateEffect],
     seed: int,
     journal: Journal,
     progress: Progress,
 ) -> Stage:
     step = f"looking for effect {len(chosen) + 1}"
     progress(step, 0, len(rest))
-    baseline = Baseline.at(bench.evidence(before.model, chosen), before.values, before.steps)
-    plain = stripped(bench, before)
-    looks = look(
+    baseline = Baseline.at(
+        problem.whitened_residuals(before.model, chosen), before.values, before.steps
+    )
+    plain = stripped(problem, before)
+    scores = screen(
         baseline,
         rest,
         seed + len(chosen),
-        lambda suspect: bench.probed(plain, suspect),
+        lambda candidate: problem.probed(plain, candidate),
         lambda done: progress(step, done, len(rest)),
     )
-    looks.sort(key=lambda each: -each.gain)
+    scores.sort(key=lambda each: -each.gain)
     # Where the residual itself rules chance out, a look need not.
-    far = far_off(bench, before, chosen)
-    missing = far or remembers(bench, before, chosen)
-    gate = tuple(each for each in looks if passes(bench, each, far or (missing and not chosen)))
-    burst = NO_BURSTS if gate or chosen else burst_of(bench, before)
-    least, plainly = 0.0, looks
-    if burst.excess:
-        rows = sum(len(trial.time) for trial in bench.trials)
+    far = far_off(problem, before, chosen)
+    missing = far or is_autocorrelated(problem, before, chosen)
+    gate = tuple(each for each in scores if passes(problem, each, far or (missing and not chosen)))
+    scan = NO_EXCESS if gate or chosen else scan_of_fit(problem, before)
+    least, plainly = 0.0, scores
+    if scan.excess:
+        rows = sum(len(trial.time) for trial in problem.trials)
         # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
-        least = max(CARRIED * burst.excess, LEAST_CHANGE**2 * rows)
-        looks = _closer(bench, baseline, plain, looks, burst.chance, least)
-        gate = tuple(each for each in looks if each.starts)
+        least = max(CARRIED * scan.excess, LEAST_CHANGE**2 * rows)
+        scores = _refined_scores(problem, baseline, plain, scores, scan.chance, least)
+        gate = tuple(each for each in scores if each.starts)
     fits: dict[str, Fitted] = {}
     if gate:
-        worth = [each for each in looks if each.gain > NEAR * looks[0].gain and each.starts]
+        worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
             progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-            found = fitted(bench, baseline, before, chosen, each, journal)
+            found = fitted(problem, baseline, before, chosen, each, journal)
             if found is not None:
-                fits[each.suspect.name] = found
-        fits |= led_nearer(bench, baseline, before, chosen, worth, fits, journal, progress)
-    if burst.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
-        gate, fits, looks, burst = (), {}, plainly, NO_BURSTS
-    return Stage(bench, before, baseline, tuple(looks), fits, gate, missing, burst)
+                fits[each.candidate.name] = found
+        fits |= restarted_from_better(
+            problem, baseline, before, chosen, worth, fits, journal, progress
+        )
+    if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
+        gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
+    return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan)
 
 
-def _closer(
-    bench: Bench,
+def _refined_scores(
+    problem: FitProblem,
     baseline: Baseline,
     plain: Model,
-    looks: Sequence[Look],
+    scores: Sequence[ScreeningScore],
     chance: float,
     least: float,
-) -> list[Look]:
+) -> list[ScreeningScore]:
     """Closer looks, the best first; of one that explains bursts, chance is that of the bursts.
 
     Args:
-        bench: the trials.
+        problem: the trials.
         baseline: the refitted model.
-        plain: the same, as suspects are put into it.
-        looks: the looks so far.
+        plain: the same, as candidates are put into it.
+        scores: the looks so far.
         chance: that noise bursts so.
         least: chi-square that explains bursts.
     """
-    found = [closer(baseline, bench.probed(plain, each.suspect), each) for each in looks]
+    found = [
+        refined_score(baseline, problem.probed(plain, each.candidate), each) for each in scores
+    ]
     found = [
         replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
         for each in found
@@ -227,17 +239,17 @@ def _closer(
     return sorted(found, key=lambda each: -each.gain)
 
 
-def passes(bench: Bench, each: Look, missing: bool = False) -> bool:
+def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:
     """Whether chance, or arithmetic, would not show as much; chance may be ruled out already."""
-    least = COARSE_CHANGE if bench.coarse else LEAST_CHANGE
+    least = COARSE_CHANGE if problem.coarse else LEAST_CHANGE
     return (missing or each.p_value <= ALARM) and each.change >= least
 
 
 def _likeliest(stage: Stage, first: Stage) -> str | None:
-    """The suspect to add, or None."""
+    """The candidate to add, or None."""
     if not stage.gate or not stage.fits:
         return None
-    passed = {each.suspect.name for each in stage.gate}
+    passed = {each.candidate.name for each in stage.gate}
     most = stage.gate[0].gain
     # What did not pass may still explain more than what did: a look is linear, a fit is not.
     worth = {

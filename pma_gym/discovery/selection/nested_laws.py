@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pma_gym.discovery.diagnosis import Undetermined
-from pma_gym.discovery.fitting.candidate_effect import Suspect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
@@ -37,7 +37,7 @@ ROUNDS = 5
 HALVINGS = 5
 """How often the place where a profile leaves its flat is halved."""
 
-Chosen = tuple[Suspect, ...]
+Chosen = tuple[CandidateEffect, ...]
 
 
 @dataclass(frozen=True)
@@ -55,42 +55,42 @@ class Nested:
     undetermined: Mapping[str, Undetermined]
 
 
-def nested(bench: Bench, fit: Fitted, chosen: Chosen) -> Nested:
+def nested(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Nested:
     """Take from effects what the trials do not determine, one parameter after the other.
 
     Args:
-        bench: the trials, with the noise that the fit leaves.
+        problem: the trials, with the noise that the fit leaves.
         fit: of the model with the effects.
         chosen: the effects.
     """
     state = Nested(chosen, fit, {})
-    paths = [path for suspect in chosen for path in suspect.fitted_paths]
-    state = _all_tied(bench, state)
+    paths = [path for candidate in chosen for path in candidate.fitted_paths]
+    state = _all_tied(problem, state)
     for path in paths:
-        state = _left(bench, state, path) or state
+        state = _left(problem, state, path) or state
     # What only mattered together with a parameter that has left does nothing any more.
-    state = _all_tied(bench, state)
+    state = _all_tied(problem, state)
     if not state.undetermined:
         return state
-    fit = replace(state.fit, covariance=covariance(bench, state.fit, state.chosen))
+    fit = replace(state.fit, covariance=covariance(problem, state.fit, state.chosen))
     return replace(state, fit=fit)
 
 
-def _left(bench: Bench, state: Nested, path: str) -> Nested | None:
+def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
     """Without a parameter whose profile is flat up to a limit; None where it is determined."""
     place = _place(state.chosen, path)
-    suspect = state.chosen[place]
-    shape = not suspect.amplitudes[suspect.paths.index(path)]
-    if path not in suspect.fitted_paths or len(suspect.fitted_paths) < 2 or not shape:
+    candidate = state.chosen[place]
+    shape = not candidate.amplitudes[candidate.paths.index(path)]
+    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2 or not shape:
         return None
-    low, high = limits(bench, state.fit, state.chosen, path)
+    low, high = limits(problem, state.fit, state.chosen, path)
     value, error = state.fit.estimate(path)
     doubtful = [
         end
         for end in (low, high)
         if not np.isfinite(error) or abs(value - end) < UNSURE * error or _beyond(value, end, low)
     ]
-    held = {end: _held(bench, state, place, {path: end}) for end in doubtful}
+    held = {end: _held(problem, state, place, {path: end}) for end in doubtful}
     flat = {end: new for end, new in held.items() if new is not None and _flat(state.fit, new.fit)}
     if not flat:
         return None
@@ -98,7 +98,7 @@ def _left(bench: Bench, state: Nested, path: str) -> Nested | None:
     other = low if end == high else high
     bound = None
     if other not in flat:
-        bound = _bound(bench, state, place, path, (min(max(value, low), high), other))
+        bound = _bound(problem, state, place, path, (min(max(value, low), high), other))
     sides = (bound, None) if end == high else (None, bound)
     known = Undetermined(*sides, unit(path))
     return replace(flat[end], undetermined={**state.undetermined, path: known})
@@ -114,29 +114,29 @@ def _flat(best: Fitted, held: Fitted) -> bool:
 
 
 def _held(
-    bench: Bench,
+    problem: FitProblem,
     state: Nested,
     place: int,
     at: Mapping[str, float],
     begun: Mapping[str, float] | None = None,
 ) -> Nested | None:
     """The fit with some parameters of an effect held, others begun at values."""
-    suspect = state.chosen[place]
-    less = replace(suspect, left=(*suspect.left, *at))
+    candidate = state.chosen[place]
+    less = replace(candidate, left=(*candidate.left, *at))
     chosen = (*state.chosen[:place], less, *state.chosen[place + 1 :])
-    found = bench.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
+    found = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
     return None if found is None else replace(state, chosen=chosen, fit=found)
 
 
 def _bound(
-    bench: Bench, state: Nested, place: int, path: str, ends: tuple[float, float]
+    problem: FitProblem, state: Nested, place: int, path: str, ends: tuple[float, float]
 ) -> float | None:
     """Where a profile has risen by `FLAT`, between where it is flat and where it is not."""
     flat, steep = ends
     logarithmic = min(ends) > 0.0
     for _ in range(HALVINGS):
         middle = float(np.sqrt(flat * steep) if logarithmic else 0.5 * (flat + steep))
-        new = _held(bench, state, place, {path: middle})
+        new = _held(problem, state, place, {path: middle})
         if new is not None and _flat(state.fit, new.fit):
             flat = middle
         else:
@@ -144,24 +144,24 @@ def _bound(
     return steep
 
 
-def _all_tied(bench: Bench, state: Nested) -> Nested:
+def _all_tied(problem: FitProblem, state: Nested) -> Nested:
     """With the simpler law of each effect that has one and bears it."""
     for place in range(len(state.chosen)):
-        state = _tied(bench, state, place) or state
+        state = _tied(problem, state, place) or state
     return state
 
 
-def _tied(bench: Bench, state: Nested, place: int) -> Nested | None:
+def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
     """With the simpler law of an effect; None where it has none, or the trials refuse it."""
-    suspect = state.chosen[place]
-    doors = CATALOGUE[suspect.effect].names_at_the_door()
-    stems = {doors[path.partition(".")[2]]: path for path in suspect.fitted_paths}
-    for one, other, *idle in CATALOGUE[suspect.effect].ties:
+    candidate = state.chosen[place]
+    doors = CATALOGUE[candidate.effect].names_at_the_door()
+    stems = {doors[path.partition(".")[2]]: path for path in candidate.fitted_paths}
+    for one, other, *idle in CATALOGUE[candidate.effect].ties:
         path, twin = stems.get(one), stems.get(other)
         if path is None or twin is None:
             continue
         rest = [stems[stem] for stem in idle if stem in stems]
-        found = _equal(bench, state, place, (path, twin), rest)
+        found = _equal(problem, state, place, (path, twin), rest)
         # What the whole law explains more must be worth its parameters, as anywhere.
         if found is not None and cost(found.fit) < cost(state.fit):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
@@ -170,7 +170,7 @@ def _tied(bench: Bench, state: Nested, place: int) -> Nested | None:
 
 
 def _equal(
-    bench: Bench, state: Nested, place: int, pair: tuple[str, str], rest: list[str]
+    problem: FitProblem, state: Nested, place: int, pair: tuple[str, str], rest: list[str]
 ) -> Nested | None:
     """The best fit in which the first of two parameters equals the other, and some do nothing."""
     path, twin = pair
@@ -178,7 +178,7 @@ def _equal(
     best: Nested | None = None
     for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
         for _ in range(ROUNDS):
-            found = _held(bench, state, place, {path: size} | idle, {twin: size})
+            found = _held(problem, state, place, {path: size} | idle, {twin: size})
             if found is None:
                 break
             before, size = size, found.fit.estimate(twin)[0]
@@ -190,4 +190,4 @@ def _equal(
 
 
 def _place(chosen: Chosen, path: str) -> int:
-    return next(k for k, suspect in enumerate(chosen) if path in suspect.paths)
+    return next(k for k, candidate in enumerate(chosen) if path in candidate.paths)

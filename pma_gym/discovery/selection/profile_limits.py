@@ -7,8 +7,8 @@ Scales come from the trials and the model; where neither tells, the catalogue's 
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect, bounds
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.compiled_model import OUTPUTS
@@ -26,35 +26,37 @@ Array = NDArray[np.float64]
 
 
 def limits(
-    bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...], path: str
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], path: str
 ) -> tuple[float, float]:
     """Values of a parameter, in its unit, at which its law is at its limits.
 
     Args:
-        bench: the trials.
+        problem: the trials.
         fit: of a model with effects.
         chosen: the effects.
         path: the parameter.
     """
     (low,), (high,) = bounds([path])
-    largest = _scales(bench, fit, chosen).get(unit(path))
+    largest = _scales(problem, fit, chosen).get(unit(path))
     if largest is None:
         return float(low), float(high)
     ends = np.clip([FAR_BELOW * largest, FAR_ABOVE * largest], low, high)
     return (float(ends[0]), float(ends[1])) if ends[0] < ends[1] else (float(low), float(high))
 
 
-def _scales(bench: Bench, fit: Fitted, chosen: tuple[Suspect, ...]) -> dict[str, float]:
+def _scales(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> dict[str, float]:
     """The largest travel, speed, time and pressure in the trials, by the units they are given in.
 
     Force over speed or over travel needs none of its own: a force is an amplitude.
     """
-    evidence = bench.evidence_of(fit, chosen)
-    readings = evidence.readings(fit.values)
+    whitened = problem.whitened_at(fit, chosen)
+    readings = whitened.readings(fit.values)
     if readings is None:
         return {}
     travel, speed, pressure, seconds = 0.0, 0.0, 0.0, 0.0
-    for held, logged in zip(readings, evidence.logged, strict=True):
+    for held, logged in zip(readings, whitened.logged, strict=True):
         # A model that lacks much may run away; what was measured did not.
         contraction, time = _known(logged, held, "contraction")
         travel = max(travel, float(np.ptp(contraction)))

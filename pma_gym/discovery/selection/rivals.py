@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.forward_selection import Stage
 
@@ -29,66 +29,66 @@ class Rival:
     """Another effect in the place of one that was selected.
 
     Attributes:
-        suspect: it.
+        candidate: it.
         fit: of the model with it.
         behind: chi-square by which it explains less, counting parameters; negative where more.
         equal: whether the data cannot tell them apart.
     """
 
-    suspect: Suspect
+    candidate: CandidateEffect
     fit: Fitted
     behind: float
     equal: bool
 
 
 def rivals(
-    bench: Bench,
+    problem: FitProblem,
     best: Fitted,
-    chosen: Sequence[Suspect],
+    chosen: Sequence[CandidateEffect],
     stage: Stage,
     place: int,
-    suspects: Sequence[Suspect],
+    candidates: Sequence[CandidateEffect],
 ) -> list[Rival]:
     """Rivals of one effect, the nearest first.
 
     Args:
-        bench: with the noise that the selected model leaves.
+        problem: with the noise that the selected model leaves.
         best: the selected model's fit.
         chosen: its effects.
         stage: the round in which the effect was selected.
         place: its place among the chosen.
-        suspects: the whole catalogue.
+        candidates: the whole catalogue.
     """
     own = stage.fits.get(chosen[place].name)
     if own is None:
         return []
     gain = stage.before.chi_square - own.chi_square
-    taken = {suspect.name for suspect in chosen}
+    taken = {candidate.name for candidate in chosen}
     near = sorted(
         (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < CLOSE * gain),
         key=lambda name: cost(stage.fits[name]),
     )
     found = []
     for name in [name for name in near if name not in taken][:MOST]:
-        suspect = next(each for each in suspects if each.name == name)
+        candidate = next(each for each in candidates if each.name == name)
         others = [*chosen]
-        others[place] = suspect
+        others[place] = candidate
         starts = {each.name: _start(each, best, stage.fits[name]) for each in others}
-        begun = bench.given.replace(
-            {path: stage.fits[name].estimate(path)[0] for path in bench.own.free}
+        begun = problem.given.replace(
+            {path: stage.fits[name].estimate(path)[0] for path in problem.own.free}
         )
-        fit = bench.fit(begun, others, starts)
+        fit = problem.fit(begun, others, starts)
         if fit is None:
             continue
         behind = cost(fit) - cost(best)
-        found.append(Rival(suspect, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
+        found.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
     return sorted(found, key=lambda rival: rival.behind)
 
 
-def _start(suspect: Suspect, *fits: Fitted) -> np.ndarray:
-    """Values of a suspect's parameters in the last of some fits that has it."""
+def _start(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:
+    """Values of a candidate's parameters in the last of some fits that has it."""
     for fit in reversed(fits):
-        if suspect.effect in fit.model.parameters and suspect.name in fit.names:
-            table = fit.model.at_the_door(suspect.effect)
-            return np.array([table[path.partition(".")[2]] for path in suspect.paths], float)
-    return suspect.probes[0]
+        if candidate.effect in fit.model.parameters and candidate.name in fit.names:
+            table = fit.model.at_the_door(candidate.effect)
+            return np.array([table[path.partition(".")[2]] for path in candidate.paths], float)
+    return candidate.probes[0]

@@ -4,12 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.held_out import Unseen
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.held_out import HeldOutMisfit
 from pma_gym.discovery.preparation.initial_floors import Level
-from pma_gym.discovery.screening.score_test import Look
-from pma_gym.discovery.selection.backward_elimination import Fewest
+from pma_gym.discovery.screening.score_test import ScreeningScore
+from pma_gym.discovery.selection.backward_elimination import Elimination
 from pma_gym.discovery.selection.forward_selection import Selection
 from pma_gym.discovery.selection.rivals import Rival
 from pma_gym.discovery.verdict.adequacy import Adequacy
@@ -24,13 +24,14 @@ class Findings:
         named: the trials.
         given: the model.
         floors: noise of the four outputs.
-        bench: with the noise as seen at rest.
+        problem: with the noise as seen at rest.
         refitted: the model's own parameters refitted.
         selection: the effects.
-        suspects: the catalogue.
+        candidates: the catalogue.
         searched: whether effects were looked for.
         seed: of simulated chance.
-        fewest: the parameters that are off, where nothing else is; None where something may be.
+        elimination: the parameters that are off, where nothing else is; None where an effect may be
+            missing.
         rivals: of each effect.
         unseen: what the amended model says of trials that it was not fitted to.
         unseen_without: the same without the effects.
@@ -42,30 +43,30 @@ class Findings:
     named: tuple[NamedTrial, ...]
     given: Model
     floors: Sequence[Level]
-    bench: Bench
+    problem: FitProblem
     refitted: Fitted
     selection: Selection
-    suspects: tuple[Suspect, ...]
+    candidates: tuple[CandidateEffect, ...]
     searched: bool
     seed: int
-    fewest: Fewest | None = None
+    elimination: Elimination | None = None
     rivals: tuple[tuple[Rival, ...], ...] = ()
-    unseen: Unseen | None = None
-    unseen_without: Unseen | None = None
+    unseen: HeldOutMisfit | None = None
+    unseen_without: HeldOutMisfit | None = None
     discarded: tuple[float, float] | None = None
     adequacy: Adequacy = field(default_factory=lambda: Adequacy({}))
 
     @property
-    def looks(self) -> tuple[Look, ...]:
+    def scores(self) -> tuple[ScreeningScore, ...]:
         """The first looks at the whole catalogue, the most promising first."""
-        return self.selection.stages[0].looks if self.selection.stages else ()
+        return self.selection.stages[0].scores if self.selection.stages else ()
 
     @property
-    def proposed(self) -> tuple[Bench, Fitted]:
+    def proposed(self) -> tuple[FitProblem, Fitted]:
         """The fit that is proposed, and on which bench: the fewest's, else the selection's.
 
         Where no parameter is off, it is the given model with nothing free.
         """
-        if self.fewest is None:
-            return self.selection.bench, self.selection.fit
-        return self.fewest.bench, self.fewest.fit
+        if self.elimination is None:
+            return self.selection.problem, self.selection.fit
+        return self.elimination.problem, self.elimination.fit

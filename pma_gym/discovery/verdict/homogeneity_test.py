@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.preparation.whitened_residuals import Evidence, Pieces
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.preparation.whitened_residuals import Pieces, WhitenedResiduals
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.compiled_model import OUTPUTS
 
@@ -26,15 +26,15 @@ GROUPS = 4
 """Groups of equal size by each condition."""
 
 
-def spreads(
-    bench: Bench, fit: Fitted, chosen: Sequence[Suspect], place: int
+def homogeneity_test(
+    problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect], place: int
 ) -> Mapping[str, float]:
     """How much the size of an effect scatters beyond its errors, as a share of it.
 
     Every group of pieces is given a size of its own, to first order, with all parameters refitted.
 
     Args:
-        bench: the trials.
+        problem: the trials.
         fit: of a model with effects.
         chosen: the effects.
         place: of the one that is asked about.
@@ -43,34 +43,34 @@ def spreads(
         as simulated, by name; 0 where fewer than three groups show the effect, or where chance
         would scatter as much. Empty where the model cannot be simulated.
     """
-    evidence = bench.evidence_of(fit, chosen)
-    pieces = evidence.pieces(fit.values, fit.steps)
+    whitened = problem.whitened_at(fit, chosen)
+    pieces = whitened.pieces(fit.values, fit.steps)
     if pieces is None:
         return {}
     direction = _direction(fit, chosen[place])
     if not direction.any():
         return {}
-    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
+    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(whitened.prior**-2.0)
     own = inverse(curvature)
     across = pieces.products[:, 1:, 1:] @ direction
-    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(evidence, fit, pieces)
+    slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(whitened, fit, pieces)
     return {
         name: _scatter(slopes, across, direction, own, group)
-        for name, group in _groups(evidence, fit, pieces).items()
+        for name, group in _groups(whitened, fit, pieces).items()
     }
 
 
-def _last_step(evidence: Evidence, fit: Fitted, pieces: Pieces) -> Array:
+def _last_step(whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces) -> Array:
     """What was left of a fit's way to the least chi-square, shape (p,).
 
     It is some hundredths of an error. But where a group sees an effect a thousand times as sharply
     as the others (by the instant at which a cable tightens), that is a slope as large as theirs.
     """
     gradient = pieces.products[:, 1:, 0].sum(axis=0)
-    gradient += (fit.values - evidence.centre) / evidence.prior**2
-    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(evidence.prior**-2.0)
-    out = (fit.values <= evidence.lower) & (gradient > 0.0)
-    out |= (fit.values >= evidence.upper) & (gradient < 0.0)
+    gradient += (fit.values - whitened.centre) / whitened.prior**2
+    curvature = pieces.products[:, 1:, 1:].sum(axis=0) + np.diag(whitened.prior**-2.0)
+    out = (fit.values <= whitened.lower) & (gradient > 0.0)
+    out |= (fit.values >= whitened.upper) & (gradient < 0.0)
     return newton_step(gradient, curvature, ~out)
 
 
@@ -91,30 +91,32 @@ def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> A
     return step
 
 
-def _direction(fit: Fitted, suspect: Suspect) -> Array:
+def _direction(fit: Fitted, candidate: CandidateEffect) -> Array:
     """How a fit's parameters move where the effect as a whole grows."""
     direction = np.zeros(len(fit.paths))
-    rows = zip(suspect.paths, suspect.absent, suspect.amplitudes, strict=True)
+    rows = zip(candidate.paths, candidate.absent, candidate.amplitudes, strict=True)
     for path, absent, scales in rows:
-        if path in suspect.fitted_paths and (scales or len(suspect.paths) == 1):
+        if path in candidate.fitted_paths and (scales or len(candidate.paths) == 1):
             at = fit.paths.index(path)
-            size = fit.values[at] - (absent if suspect.fitted.all() and scales else 0.0)
+            size = fit.values[at] - (absent if candidate.fitted.all() and scales else 0.0)
             direction[at] = size
     return direction
 
 
-def _groups(evidence: Evidence, fit: Fitted, pieces: Pieces) -> dict[str, NDArray[np.int64]]:
+def _groups(
+    whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces
+) -> dict[str, NDArray[np.int64]]:
     """Group of every piece, by trial and by conditions."""
     found: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
-    readings = evidence.readings(fit.values)
+    readings = whitened.readings(fit.values)
     if readings is None:
         return found
     for channel, name in enumerate(OUTPUTS):
         if name == "rotation":
             continue
         means = []
-        for logged, held in zip(evidence.logged, readings, strict=True):
-            edges = evidence.edges(logged)
+        for logged, held in zip(whitened.logged, readings, strict=True):
+            edges = whitened.edges(logged)
             means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
         ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
         found[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.noise import slow_part, sparse
 from pma_gym.discovery.preparation.quantisation import is_coarse
-from pma_gym.discovery.screening.autocorrelation import memory, tone
+from pma_gym.discovery.screening.autocorrelation import autocorrelation_test, tone
 from pma_gym.discovery.screening.residuals import residuals
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.plant.compiled_model import OUTPUTS
@@ -18,7 +18,7 @@ LEAST_SLOW = 0.02
 
 
 @dataclass(frozen=True)
-class Left:
+class ResidualFraction:
     """What the selected effects leave, as shares over all signals; 0 where there was nothing.
 
     Attributes:
@@ -35,29 +35,29 @@ class Left:
         return max(self.slow, self.remembered)
 
 
-def leftover(found: Findings) -> Left:
+def residual_fraction(findings: Findings) -> ResidualFraction:
     """What the selected effects leave."""
-    bench, selection = found.bench, found.selection
-    begun = residuals(bench.evidence(found.refitted.model), found.refitted)
-    before = _slow(found, begun)
-    evidence = selection.bench.evidence(selection.fit.model, selection.chosen)
-    after = _slow(found, residuals(evidence, selection.fit))
+    problem, selection = findings.problem, findings.selection
+    begun = residuals(problem.whitened_residuals(findings.refitted.model), findings.refitted)
+    before = _slow(findings, begun)
+    whitened = selection.problem.whitened_residuals(selection.fit.model, selection.chosen)
+    after = _slow(findings, residuals(whitened, selection.fit))
     # What may be chance before has no share afterwards. Of a few readings no memory is known, and
     # a slide's starts are taken from readings, whose noise it remembers.
     seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
-    free = found.given.plant == "slide"
+    free = findings.given.plant == "slide"
     there = (before[1] > 0.0) | np.array(seldom) | free
     shares = [
         float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0
         for then, now in zip(before, after, strict=True)
     ]
-    return Left(*shares)
+    return ResidualFraction(*shares)
 
 
-def tones(found: Findings) -> dict[str, float]:
+def tones(findings: Findings) -> dict[str, float]:
     """Frequency (Hz) of each signal, by column, whose residual after the refit rings."""
-    evidence = found.bench.evidence(found.refitted.model)
-    left, rate, heard = residuals(evidence, found.refitted), _rate(found), {}
+    whitened = findings.problem.whitened_residuals(findings.refitted.model)
+    left, rate, heard = residuals(whitened, findings.refitted), _rate(findings), {}
     for channel, name in enumerate(OUTPUTS):
         kept = tone([part[channel] for part in left], rate)
         if kept is not None:
@@ -65,19 +65,19 @@ def tones(found: Findings) -> dict[str, float]:
     return heard
 
 
-def _rate(found: Findings) -> float:
+def _rate(findings: Findings) -> float:
     """Usual readings a second."""
-    return float(np.median([1.0 / np.median(np.diff(each.trial.time)) for each in found.named]))
+    return float(np.median([1.0 / np.median(np.diff(each.trial.time)) for each in findings.named]))
 
 
-def _slow(found: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float64]:
+def _slow(findings: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float64]:
     """Mean squares of the four signals over those of their noise: slow ones, remembered ones."""
-    rate = _rate(found)
+    rate = _rate(findings)
     shares = np.zeros((2, 4))
-    for channel, floor in enumerate(found.floors):
+    for channel, floor in enumerate(findings.floors):
         parts = [part[channel] for part in left]
         shares[0, channel] = slow_part(parts, rate, floor.level) / floor.level**2
-        kept = memory(parts, rate)
+        kept = autocorrelation_test(parts, rate)
         # What a coarse sensor loses between its steps follows the motion, and no effect carries it.
         if kept.sure and not is_coarse(floor):
             shares[1, channel] = kept.share * kept.variance / floor.level**2

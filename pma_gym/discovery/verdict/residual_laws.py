@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.diagnosis import ResidualLaw
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant import sensors
 from pma_gym.units import SI_FACTORS
@@ -36,47 +36,49 @@ drawn."""
 
 
 @dataclass(frozen=True)
-class Drawn:
+class EstimatedLaw:
     """A law that was fitted.
 
     Attributes:
         name: its effect in the catalogue.
-        suspect: it, with its ends where the data end.
+        candidate: it, with its ends where the data end.
         fit: the model with it.
         gain: fall of chi-square.
     """
 
     name: str
-    suspect: Suspect
+    candidate: CandidateEffect
     fit: Fitted
     gain: float
 
 
-def drawn_laws(bench: Bench, refitted: Fitted) -> list[Drawn]:
+def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
     """Every law fitted, the one that explains most first; none for a slide, which lacks a muscle.
 
     They are laws of a muscle and of a drive that only pulls.
     """
-    if bench.given.plant == "slide":
+    if problem.given.plant == "slide":
         return []
-    before = bench.evidence(refitted.model).sums(refitted.values, np.empty(0)).chi_square
-    ranges = _ranges(bench, refitted)
+    before = (
+        problem.whitened_residuals(refitted.model).sums(refitted.values, np.empty(0)).chi_square
+    )
+    ranges = _ranges(problem, refitted)
     found = []
     for name in LAWS:
-        suspect = _suspect(bench, name, ranges[name])
-        fit = bench.fit(refitted.model, (suspect,), {name: suspect.absent})
+        candidate = _candidate(problem, name, ranges[name])
+        fit = problem.fit(refitted.model, (candidate,), {name: candidate.absent})
         if fit is not None:
-            found.append(Drawn(name, suspect, fit, before - fit.chi_square))
+            found.append(EstimatedLaw(name, candidate, fit, before - fit.chi_square))
     return sorted(found, key=lambda law: -law.gain)
 
 
-def residual_law(drawn: Drawn) -> ResidualLaw:
+def residual_law(drawn: EstimatedLaw) -> ResidualLaw:
     """A law as the report shows it, less what is a straight line or a constant of the model's."""
     quantity, variable, _ = LAWS[drawn.name]
     table = drawn.fit.model.at_the_door(drawn.name)
     first, reach = (float(value) for value in list(table.values())[:2])  # type: ignore[arg-type]
-    at = np.linspace(first, first + reach, len(drawn.suspect.fitted_paths))
-    places = [drawn.fit.paths.index(path) for path in drawn.suspect.fitted_paths]
+    at = np.linspace(first, first + reach, len(drawn.candidate.fitted_paths))
+    places = [drawn.fit.paths.index(path) for path in drawn.candidate.fitted_paths]
     law = drawn.fit.values[places]
     covariance = drawn.fit.covariance[np.ix_(places, places)]
     spread = np.sqrt(np.diag(covariance))
@@ -119,19 +121,19 @@ def words(at: Array, law: Array, errors: Array, variable: str) -> str:
     return f"it bends over {name}; {shape}"
 
 
-def _ranges(bench: Bench, refitted: Fitted) -> dict[str, tuple[float, float]]:
+def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, float]]:
     """Where the data of each law's variable begin and end, at the door."""
-    evidence = bench.evidence(refitted.model)
-    readings = evidence.readings(refitted.values)
+    whitened = problem.whitened_residuals(refitted.model)
+    readings = whitened.readings(refitted.values)
     assert readings is not None
     speeds = np.concatenate(
         [
             np.gradient(held[0], logged.time)
-            for held, logged in zip(readings, evidence.logged, strict=True)
+            for held, logged in zip(readings, whitened.logged, strict=True)
         ]
     )
-    drive = bench.given.parameters["drive"]
-    motor = [sensors.voltages(bench.given, trial)[0] for trial in bench.trials]
+    drive = problem.given.parameters["drive"]
+    motor = [sensors.voltages(problem.given, trial)[0] for trial in problem.trials]
     loads = drive.gain * np.concatenate(motor) + drive.offset
     seen = {
         "residual_force_of_contraction": np.concatenate([held[0] for held in readings]),
@@ -147,17 +149,17 @@ def _ranges(bench: Bench, refitted: Fitted) -> dict[str, tuple[float, float]]:
     return ranges
 
 
-def _suspect(bench: Bench, name: str, ends: tuple[float, float]) -> Suspect:
+def _candidate(problem: FitProblem, name: str, ends: tuple[float, float]) -> CandidateEffect:
     """A law that does nothing, between its ends."""
     effect = CATALOGUE[name]
     doors = list(effect.names_at_the_door())
     heights = doors[2:]
     table = dict(zip(doors, (ends[0], ends[1] - ends[0], *([0.0] * len(heights))), strict=True))
     zero = np.zeros(len(heights))
-    return Suspect(
+    return CandidateEffect(
         name,
         name,
-        bench.given.with_effects({name: table}),
+        problem.given.with_effects({name: table}),
         tuple(f"{name}.{door}" for door in heights),
         np.ones(len(heights), bool),
         zero,

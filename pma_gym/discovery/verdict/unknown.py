@@ -8,12 +8,12 @@ import numpy as np
 
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.screening.autocorrelation import SURE
-from pma_gym.discovery.screening.residuals import memories
+from pma_gym.discovery.screening.residuals import autocorrelation_tests
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
 from pma_gym.discovery.verdict.findings import Findings
-from pma_gym.discovery.verdict.homogeneity_test import spreads
-from pma_gym.discovery.verdict.residual_fraction import Left
-from pma_gym.discovery.verdict.residual_laws import Drawn, drawn_laws
+from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
+from pma_gym.discovery.verdict.residual_laws import EstimatedLaw, estimated_laws
 
 MOST_LEFT = 0.35
 """Share of what was slow in the residual that may be left by effects that explain it."""
@@ -78,112 +78,120 @@ class Reason:
     gain: float = 0.0
 
 
-def why_unknown(found: Findings, left: Left, laws: Sequence[Drawn]) -> Reason | None:
+def why_unknown(
+    findings: Findings, left: ResidualFraction, laws: Sequence[EstimatedLaw]
+) -> Reason | None:
     """Why something is missing that no effect of the catalogue carries; None where that is not so.
 
     Args:
-        found: what the steps found.
+        findings: what the steps found.
         left: what the effects leave of the residual.
         laws: laws without a shape of their own, the one that explains most first.
     """
-    reason = _beyond(found, left, laws)
-    if reason is None and not found.selection.chosen:
-        reason = _inadequate(found)
+    reason = _beyond(findings, left, laws)
+    if reason is None and not findings.selection.chosen:
+        reason = _inadequate(findings)
     if reason is None:
         return None
-    chosen = tuple(suspect.name for suspect in found.selection.chosen)
+    chosen = tuple(candidate.name for candidate in findings.selection.chosen)
     if chosen:
         return replace(reason, effects=chosen, leaves=left.slow)
-    if not found.selection.stages:
+    if not findings.selection.stages:
         return reason
-    nearest, leaves = _nearest(found)
+    nearest, leaves = _nearest(findings)
     return replace(reason, nearest=nearest, leaves=leaves)
 
 
-def _beyond(found: Findings, left: Left, laws: Sequence[Drawn]) -> Reason | None:
+def _beyond(
+    findings: Findings, left: ResidualFraction, laws: Sequence[EstimatedLaw]
+) -> Reason | None:
     """The first figure beyond its limit, cheap ones first."""
-    if not found.selection.chosen and _missing(found):
-        return _unexplained(found)
-    if not gate(found):
+    if not findings.selection.chosen and _missing(findings):
+        return _unexplained(findings)
+    if not gate(findings):
         return None
     if left.slow > MOST_LEFT:
         return Reason("slow", left.slow, MOST_LEFT)
     if left.remembered > MOST_REMEMBERED:
         return Reason("remembered", left.remembered, MOST_REMEMBERED)
-    return _scatters(found, left) or _outdone(found, laws)
+    return _scatters(findings, left) or _outdone(findings, laws)
 
 
-def gate(found: Findings) -> bool:
+def gate(findings: Findings) -> bool:
     """Whether anything passed the gate."""
-    return bool(found.selection.stages and found.selection.stages[0].gate)
+    return bool(findings.selection.stages and findings.selection.stages[0].gate)
 
 
-def _missing(found: Findings) -> bool:
+def _missing(findings: Findings) -> bool:
     """Whether the residual says of itself that something is missing."""
-    return bool(found.selection.stages and found.selection.stages[0].missing)
+    return bool(findings.selection.stages and findings.selection.stages[0].missing)
 
 
-def _inadequate(found: Findings) -> Reason | None:
+def _inadequate(findings: Findings) -> Reason | None:
     """The residual is no noise: by its size, or by what a flexible regression explains of it."""
-    if found.adequacy.structure is None:
+    if findings.adequacy.structure is None:
         return None
-    name, signal = found.adequacy.structure
+    name, signal = findings.adequacy.structure
     column = BY_QUANTITY[name].name
     if signal.fault == "explained":
         return Reason("explained", signal.explained, MOST_EXPLAINED, of=column)
     return Reason("misfit", signal.fitted, MOST_FLOORS, of=column)
 
 
-def _unexplained(found: Findings) -> Reason | None:
+def _unexplained(findings: Findings) -> Reason | None:
     """The residual is no noise: by the signal whose autocorrelation is surest."""
-    stage = found.selection.stages[0]
-    sure = {name: each for name, each in memories(stage.bench, stage.before).items() if each.sure}
+    stage = findings.selection.stages[0]
+    sure = {
+        name: each
+        for name, each in autocorrelation_tests(stage.problem, stage.before).items()
+        if each.sure
+    }
     if not sure:
-        return _inadequate(found)
+        return _inadequate(findings)
     signal = max(sure, key=lambda name: sure[name].score)
     return Reason("unexplained", sure[signal].score, SURE, of=BY_QUANTITY[signal].name)
 
 
-def _nearest(found: Findings) -> tuple[str, float]:
+def _nearest(findings: Findings) -> tuple[str, float]:
     """The likeliest effect where none was added, and the share of chi-square that it leaves."""
-    stage = found.selection.stages[0]
+    stage = findings.selection.stages[0]
     before = stage.before.chi_square
     gains = {name: before - fit.chi_square for name, fit in stage.fits.items()}
-    gains = gains or {look.suspect.name: look.gain for look in stage.looks}
+    gains = gains or {score.candidate.name: score.gain for score in stage.scores}
     if not gains:
         return "", 1.0
     name = max(gains, key=lambda each: gains[each])
     return name, 1.0 - gains[name] / before
 
 
-def shapeless_laws(found: Findings, left: Left) -> list[Drawn]:
+def shapeless_laws(findings: Findings, left: ResidualFraction) -> list[EstimatedLaw]:
     """Laws without a shape of their own, where the effects leave room for one."""
-    if not (gate(found) or _missing(found)):
+    if not (gate(findings) or _missing(findings)):
         return []
-    if left.most < DOUBTFUL and _scatters(found, left) is None:
+    if left.most < DOUBTFUL and _scatters(findings, left) is None:
         return []
-    return drawn_laws(found.selection.bench, found.refitted)
+    return estimated_laws(findings.selection.problem, findings.refitted)
 
 
-def _scatters(found: Findings, left: Left) -> Reason | None:
+def _scatters(findings: Findings, left: ResidualFraction) -> Reason | None:
     """The first effect that was selected whose size differs by trial or by condition, and how."""
-    selection, most = found.selection, np.inf if left.most >= DOUBTFUL else EXTRAPOLATED
-    for place, suspect in enumerate(selection.chosen):
-        by = spreads(selection.bench, selection.fit, selection.chosen, place)
+    selection, most = findings.selection, np.inf if left.most >= DOUBTFUL else EXTRAPOLATED
+    for place, candidate in enumerate(selection.chosen):
+        by = homogeneity_test(selection.problem, selection.fit, selection.chosen, place)
         wide = {name: scatter for name, scatter in by.items() if MOST_SPREAD < scatter <= most}
         if wide:
             most = max(wide, key=lambda name: wide[name])
-            return Reason("scatters", wide[most], MOST_SPREAD, of=suspect.name, by=most)
+            return Reason("scatters", wide[most], MOST_SPREAD, of=candidate.name, by=most)
     return None
 
 
-def _outdone(found: Findings, laws: Sequence[Drawn]) -> Reason | None:
+def _outdone(findings: Findings, laws: Sequence[EstimatedLaw]) -> Reason | None:
     """A law without a shape of its own that explains more than the effects do."""
     if not laws:
         return None
-    selection = found.selection
-    evidence = selection.bench.evidence(found.refitted.model)
-    before = evidence.sums(found.refitted.values, np.empty(0)).chi_square
+    selection = findings.selection
+    whitened = selection.problem.whitened_residuals(findings.refitted.model)
+    before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
     gain = before - selection.fit.chi_square
     limit = max(BETTER * gain, gain + BETTER_BY)
     if laws[0].gain > limit:
@@ -191,11 +199,11 @@ def _outdone(found: Findings, laws: Sequence[Drawn]) -> Reason | None:
     return None
 
 
-def telling(found: Findings, laws: Sequence[Drawn]) -> bool:
+def telling(findings: Findings, laws: Sequence[EstimatedLaw]) -> bool:
     """Whether the best law without a shape of its own explains enough to be drawn."""
     if not laws:
         return False
-    evidence = found.selection.bench.evidence(found.refitted.model)
-    count = sum(logged.count for logged in evidence.logged)
-    before = evidence.sums(found.refitted.values, np.empty(0)).chi_square
+    whitened = findings.selection.problem.whitened_residuals(findings.refitted.model)
+    count = sum(logged.count for logged in whitened.logged)
+    before = whitened.sums(findings.refitted.values, np.empty(0)).chi_square
     return laws[0].gain > max(BETTER_BY, WORTH_DRAWING * (before - count))

@@ -80,7 +80,7 @@ CABLE = Effect(
     parameters=Cable,
     held=("damping",),
     law=tension,
-    switch=tightness,
-    bend=full_damping,
+    event=tightness,
+    breakpoint=full_damping,
     signature="potentiometer minus LVDT proportional to tension; dead travel at low tension",
 )

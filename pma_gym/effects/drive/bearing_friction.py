@@ -70,7 +70,7 @@ BEARING_FRICTION = Effect(
     parameters=BearingFriction,
     law=bearing_drag,
     rate=bearing_rate,
-    bend=bearing_turn,
+    breakpoint=bearing_turn,
     signature=(
         "load cell reads less while the motor winds in than while it lets go, at the same voltage, "
         "by the same force at every speed and load; friction at the slide shows in the position"

@@ -56,7 +56,7 @@ HYSTERESIS = Effect(
     port="muscle_force",
     parameters=Hysteresis,
     law=hysteresis_force,
-    path=hysteresis_path,
+    rate_independent_law=hysteresis_path,
     signature=(
         "loops whose area does not depend on rate, with nested minor loops; the force lags behind "
         "the way over some millimetres after a turn, where dry friction turns at once"

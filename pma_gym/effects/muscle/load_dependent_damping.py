@@ -73,6 +73,6 @@ LOAD_DEPENDENT_DAMPING = Effect(
         "force_intercept",
     ),
     law=load_factor,
-    bend=load_bend,
+    breakpoint=load_bend,
     signature="force proportional to speed, by a factor that depends on the load",
 )

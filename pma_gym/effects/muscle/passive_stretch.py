@@ -71,6 +71,6 @@ PASSIVE_STRETCH = Effect(
     parameters=PassiveStretch,
     held=("resting_length",),
     law=stretch_force,
-    switch=slackness,
+    event=slackness,
     signature="force misfit at negative contraction only, single-valued",
 )

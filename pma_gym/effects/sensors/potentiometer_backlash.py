@@ -71,7 +71,7 @@ POTENTIOMETER_BACKLASH = Effect(
     parameters=PotentiometerBacklash,
     law=play,
     rate=play_rate,
-    bend=play_turn,
+    breakpoint=play_turn,
     signature=(
         "measured rotation stands still after every turn, over the same angle at every load and "
         "rate, while LVDT and load cell go on"

@@ -114,9 +114,9 @@ COULOMB_FRICTION = Effect(
     held=("presliding",),
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
-    path=friction_path,
-    path_bend=friction_bend,
-    bend=stribeck_bend,
+    rate_independent_law=friction_path,
+    path_breakpoint=friction_bend,
+    breakpoint=stribeck_bend,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "
         "under small changes of load. Stribeck: static over dynamic, the step is higher within "

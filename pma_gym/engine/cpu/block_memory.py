@@ -19,7 +19,7 @@ from pma_gym.codegen.machine.control import (
     integer,
     offset,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.graph.control_step_graph import ControlStepGraph
 from pma_gym.engine.graph.scoring import Sampling
@@ -110,14 +110,16 @@ class BlockMemory:
         at = b.add(self._row(b, name), integer(lane))
         return offset(b, records, at, self.element)
 
-    def _lanes(self, width: int) -> Lanes:
-        """Lanes for what is not the march."""
-        return Lanes(width, fused=FUSED)
+    def _lanes(self, width: int) -> SimdEmitter:
+        """The emitter for what is not the integration."""
+        return SimdEmitter(width, fused=FUSED)
 
-    def _load(self, b: Builder, lanes: Lanes, where: Operand, kind: Kind) -> Operand:
+    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
         return lanes.load(b, where, 0, kind)
 
-    def _keep(self, b: Builder, lanes: Lanes, number: Operand, where: Operand, kind: Kind) -> None:
+    def _keep(
+        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+    ) -> None:
         lanes.store(b, number, where, 0, kind)
 
     def _count(self, b: Builder, where: Operand) -> Operand:
@@ -127,11 +129,11 @@ class BlockMemory:
     def _exact_times(
         self, b: Builder, one: Sampling, known: dict[int, Operand]
     ) -> dict[int, Operand]:
-        """Times of a sample that are not left to the march's precision."""
+        """Times of a sample that are not left to the integration's precision."""
         return {}
 
     def _fixed(
-        self, b: Builder, lanes: Lanes, tables: Operand, lane: Operand | int
+        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         """The table of a block, or of one lane of it."""
         known = {}
@@ -145,7 +147,7 @@ class BlockMemory:
     def _known(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         values: Sequence[Value],
         records: Operand,
         tables: Operand,
@@ -166,7 +168,7 @@ class BlockMemory:
     def _store(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         found: dict[int, Operand],
         values: dict[str, Value],
         records: Operand,
@@ -188,7 +190,7 @@ class BlockMemory:
         )
         return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
 
-    def _gathered(self, b: Builder, lanes: Lanes, numbers: Sequence[Operand]) -> Operand:
+    def _gathered(self, b: Builder, lanes: SimdEmitter, numbers: Sequence[Operand]) -> Operand:
         if lanes.width == 1:
             return lanes.spread(b, numbers[0])
         vector = ir.Constant(lanes.real, ir.Undefined)
@@ -199,7 +201,7 @@ class BlockMemory:
     def _references(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         given: dict[str, Operand],
         records: Operand,
         lane: Operand | int,
@@ -221,7 +223,7 @@ class BlockMemory:
     def _put_observation(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         given: dict[str, Operand],
         found: dict[int, Operand],
         entries: Sequence[Value],

@@ -18,7 +18,7 @@ class Kernel:
         state_layout: places of an environment's numbers.
         table: the observation's entries.
         width: lanes of a block; records lie as [block, place, lane].
-        single: whether the march runs in single precision.
+        single: whether the integration runs in single precision.
 
     Attributes:
         draws: whether `begin` can draw pressures and settle by itself: one station, undisturbed,

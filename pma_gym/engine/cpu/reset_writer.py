@@ -14,7 +14,7 @@ from pma_gym.codegen.machine.control import (
     loop,
     offset,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.random import philox, uniform
 from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, widened
@@ -77,12 +77,12 @@ class ResetWriter(BlockMemory):
     def _begin(self) -> None:
         """Begin trials of environments, at rest wherever their states are not set already.
 
-        It is a function for a `Crew`, which takes no other part itself.
+        It is a function for a `ThreadPool`, which takes no other part itself.
         """
         both = [("arguments", POINTER), ("crew", POINTER)]
         b, (arguments, _) = function(self.module, "begin", both, INTEGER)
         given = self._arguments(b, arguments)
-        lanes = Lanes(1, fused=FUSED)
+        lanes = SimdEmitter(1, fused=FUSED)
         settles = b.icmp_signed("!=", given["settles"], integer(0))
         with loop(b, given["last"], given["first"]) as row:
             index = b.load(offset(b, given["indices"], row, INTEGER), typ=INTEGER)
@@ -105,7 +105,7 @@ class ResetWriter(BlockMemory):
         row: Operand,
     ) -> None:
         """Draw a pressure, find the rest there and write it down; in double precision."""
-        exact = Lanes(1)
+        exact = SimdEmitter(1)
         known = self._fixed(b, exact, tables, lane)
         before = self._count(b, self._cell(b, records, "episode", lane))
         episode = b.and_(b.add(before, integer(1)), integer(0xFFFFFFFF))
@@ -191,7 +191,7 @@ class ResetWriter(BlockMemory):
     def _first(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         given: dict[str, Operand],
         records: Operand,
         tables: Operand,

@@ -1,4 +1,4 @@
-"""Writes the control step of environments: command, march, sensors, reward."""
+"""Writes the control step of environments: command, integration, sensors, reward."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -22,15 +22,15 @@ from pma_gym.codegen.machine.control import (
     variable,
 )
 from pma_gym.codegen.machine.native import pairs
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.threads.thread_pool import write_another
 from pma_gym.codegen.trace import split
 from pma_gym.engine.cpu.block_memory import BEFORE, KernelSpec, narrowed, widened
 from pma_gym.engine.cpu.python_step import write_advance
 from pma_gym.engine.cpu.reset_writer import ResetWriter
 from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
-from pma_gym.integrator.integration import FUSED, Lane, Layout, march, memory
-from pma_gym.integrator.step_attempt import attempt
+from pma_gym.integrator.integration import FUSED, Lane, Layout, integrate_lanes, memory
+from pma_gym.integrator.step_attempt import step_attempt
 from pma_gym.plant.model import PLANTS
 
 BAD_ACTION = 4
@@ -38,7 +38,7 @@ BAD_ACTION = 4
 
 
 class Numbers(Protocol):
-    """Numbers of their own that lanes keep during the march."""
+    """Numbers of their own that lanes keep during the integration."""
 
     def vector(self, what: str) -> Operand:
         """All lanes' numbers of a name."""
@@ -54,9 +54,9 @@ class Writer(ResetWriter):
 
     def __init__(self, kernel: KernelSpec) -> None:
         super().__init__(kernel)
-        self.attempt = attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
+        self.attempt = step_attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
         self.course: Course = course(self.eq, self.attempt, kernel.state_layout.task)
-        extra = [*self.course.values, self.attempt.taken, self.attempt.length]
+        extra = [*self.course.values, self.attempt.accepted, self.attempt.length]
         layout = Layout.of(self.attempt, extra)
         self.extra = extra
         self.commanded = self.step_graph.command()
@@ -83,7 +83,7 @@ class Writer(ResetWriter):
     def _table(self) -> None:
         b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
         known = self.kernel.program.parameters(b, vector, self.fixed)
-        found = Lanes(1).emit(b, self.fixed, known)
+        found = SimdEmitter(1).emit(b, self.fixed, known)
         for i, value in enumerate(self.fixed):
             b.store(found[value.id], offset(b, out, i))
         b.ret_void()
@@ -96,7 +96,7 @@ class Writer(ResetWriter):
         """Whether all actions are finite, which a step takes for granted."""
         b, (arguments,) = function(self.module, "check", [("arguments", POINTER)], INTEGER)
         given = self._arguments(b, arguments)
-        bad, lanes = memory(b, INTEGER), Lanes(self.width)
+        bad, lanes = memory(b, INTEGER), SimdEmitter(self.width)
         b.store(integer(0), bad)
         with loop(b, given["last"], given["first"]) as block:
             for i in range(self.state_layout.actions):
@@ -114,13 +114,13 @@ class Writer(ResetWriter):
         with loop(b, given["last"], given["first"]) as block:
             self._command(b, given, block)
         b.ret_void()
-        both = [("part", POINTER), ("crew", POINTER)]
-        b, (part, crew) = function(self.module, "step", both, INTEGER)
+        both = [("part", POINTER), ("pool", POINTER)]
+        b, (part, pool) = function(self.module, "step", both, INTEGER)
         b.call(self.module.get_global("command"), [part])
         b.store(integer(0), offset(b, part, BEFORE, INTEGER))
         newest = variable(b, INTEGER, b.ptrtoint(part, INTEGER))
         given = self._arguments(b, part)
-        self._march(b, given, lambda: self._take_part(b, crew, newest))
+        self._march(b, given, lambda: self._take_part(b, pool, newest))
         ended = memory(b, INTEGER)
         b.store(integer(0), ended)
         with repeat(b) as leave_if:
@@ -133,10 +133,10 @@ class Writer(ResetWriter):
             b.store(b.load(offset(b, part, BEFORE, INTEGER), typ=INTEGER), newest)
         b.ret(b.load(ended, typ=INTEGER))
 
-    def _take_part(self, b: Builder, crew: Operand, newest: Operand) -> tuple[Operand, Operand]:
+    def _take_part(self, b: Builder, pool: Operand, newest: Operand) -> tuple[Operand, Operand]:
         """Take another part, if there is one, and command it; its first job and the one behind."""
         first, stop = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
-        address = write_another(b, crew)
+        address = write_another(b, pool)
         with b.if_then(b.icmp_signed("!=", address, integer(0))):
             part = b.inttoptr(address, POINTER)
             b.store(b.load(newest, typ=INTEGER), offset(b, part, BEFORE, INTEGER))
@@ -159,7 +159,7 @@ class Writer(ResetWriter):
         return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
 
     def _actions(
-        self, b: Builder, lanes: Lanes, given: dict[str, Operand], block: Operand, i: int
+        self, b: Builder, lanes: SimdEmitter, given: dict[str, Operand], block: Operand, i: int
     ) -> Operand:
         first = b.mul(block, integer(self.width))
         return self._gathered(
@@ -185,7 +185,7 @@ class Writer(ResetWriter):
         take_part: Callable[[], tuple[Operand, Operand]],
     ) -> None:
         real, paired = "float" if self.kernel.single else "double", pairs(self.width)
-        lanes = Lanes(self.width, real, FUSED, paired)
+        lanes = SimdEmitter(self.width, real, FUSED, paired)
         sums = [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
         lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
         period = self.state_layout.options.period
@@ -250,13 +250,13 @@ class Writer(ResetWriter):
         def watch(found: dict[int, Operand]) -> None:
             self._sample(b, lanes, lane, found, given)
 
-        made = march(lane, self.attempt, take, proceed, watch, self.extra)
+        made = integrate_lanes(lane, self.attempt, take, proceed, watch, self.extra)
         b.store(b.load(made, typ=INTEGER), given["attempts"])
 
     def _sample(
         self,
         b: Builder,
-        lanes: Lanes,
+        lanes: SimdEmitter,
         lane: Numbers,
         found: dict[int, Operand],
         given: dict[str, Operand],
@@ -269,7 +269,7 @@ class Writer(ResetWriter):
         for name, value in zip(COURSE, self.course.values, strict=True):
             known[graph.input(f"course.{name}", 2).id] = found[value.id]
         known[graph.input("length", 2).id] = found[self.attempt.length.id]
-        known[graph.input("taken", 2, "truth").id] = found[self.attempt.taken.id]
+        known[graph.input("accepted", 2, "truth").id] = found[self.attempt.accepted.id]
         known[graph.input("clock", HELD).id] = lane.vector("clock")
         phases = task.protocol.phases
         with repeat(b) as leave_if:
@@ -295,7 +295,7 @@ class Writer(ResetWriter):
                 lane.put_vector(f"sum_{phase.name}", taken[value.id])
 
     def _ideals(
-        self, b: Builder, lanes: Lanes, given: dict[str, Operand], samples: Operand
+        self, b: Builder, lanes: SimdEmitter, given: dict[str, Operand], samples: Operand
     ) -> Operand:
         """Ideal position at the next sample of every lane, from the table."""
         found = []
@@ -334,7 +334,7 @@ class Writer(ResetWriter):
             for name, truth in (("terminated", is_over), ("truncated", truncated)):
                 flag = b.zext(lanes.extract(b, found[truth.id], k), ir.IntType(8))
                 b.store(flag, offset(b, given[name], index, ir.IntType(8)))
-        # Lanes beyond the last environment never end: their records are copies of a rest.
+        # SimdEmitter beyond the last environment never end: their records are copies of a rest.
         any_over = b.zext(lanes.any(b, found[is_over.id]), INTEGER)
         any_end = b.zext(lanes.any(b, found[truncated.id]), INTEGER)
         both = b.or_(any_over, b.shl(any_end, integer(1)))

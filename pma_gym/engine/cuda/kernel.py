@@ -1,8 +1,8 @@
 """The control step as one GPU kernel, one thread an environment, and its stand-in for tests.
 
-Two functions take the same arguments: `step` (command, march, sensors, reward, end) and `begin`
-(new episodes where one has ended). The stand-in is the very same code for the processor, with the
-number of the thread counted by a loop.
+Two functions take the same arguments: `step` (command, integration, sensors, reward, end) and
+`begin` (new episodes where one has ended). The stand-in is the very same code for the processor,
+with the number of the thread counted by a loop.
 """
 
 import ctypes
@@ -199,7 +199,7 @@ class CudaKernel:
 
 
 class _Shared:
-    """The threads of a warp share the marches of their environments.
+    """The threads of a warp share the integrations of their environments.
 
     They are those that these threads command and sense: of numbers 0-31 the first of each thread,
     of 32-63 the second, and so on.
@@ -221,7 +221,7 @@ class _Shared:
 
 
 def shared_job(b: Builder, turn: Operand, first: Operand, threads: Operand) -> Operand:
-    """Write the number of the environment that a warp marches as its n-th.
+    """Write the number of the environment that a warp integrates as its n-th.
 
     Args:
         b: where to write.
@@ -234,7 +234,7 @@ def shared_job(b: Builder, turn: Operand, first: Operand, threads: Operand) -> O
 
 
 class _Alone:
-    """A thread marches its own environments."""
+    """A thread integrates its own environments."""
 
     def __init__(self, builder: Builder, threads: Operand) -> None:
         self._builder, self._threads = builder, threads

@@ -15,7 +15,7 @@ from pma_gym.codegen.machine.control import (
     integer,
     offset,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import KernelSpec, narrowed
 from pma_gym.engine.cpu.step_writer import Writer
@@ -64,7 +64,7 @@ class ThreadMemory(Writer):
 
     @property
     def layout_values(self) -> list[Value]:
-        """What the march computes."""
+        """What the integration computes."""
         return [*self.attempt.states, self.attempt.next_size, *self.extra]
 
     @property
@@ -88,13 +88,15 @@ class ThreadMemory(Writer):
     def _row(self, b: Builder, name: str, lane: int = 0) -> Operand:
         return b.mul(self._spacing, integer(self.offsets[name]))
 
-    def _lanes(self, width: int) -> Lanes:
-        return Lanes(width, self.real, FUSED)
+    def _lanes(self, width: int) -> SimdEmitter:
+        return SimdEmitter(width, self.real, FUSED)
 
-    def _load(self, b: Builder, lanes: Lanes, where: Operand, kind: Kind) -> Operand:
+    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
         return self._count(b, where) if kind == "integer" else super()._load(b, lanes, where, kind)
 
-    def _keep(self, b: Builder, lanes: Lanes, number: Operand, where: Operand, kind: Kind) -> None:
+    def _keep(
+        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+    ) -> None:
         if kind != "integer":
             super()._keep(b, lanes, number, where, kind)
         else:
@@ -107,7 +109,7 @@ class ThreadMemory(Writer):
         return b.load(where, typ=INTEGER)
 
     def _fixed(
-        self, b: Builder, lanes: Lanes, tables: Operand, lane: Operand | int
+        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         known = {}
         for i, value in enumerate(self.fixed):

@@ -2,8 +2,8 @@
 
 The arithmetic is the processor's own, by the same methods; only memory differs. A thread commands
 and senses environments thread, thread + threads, and so on. In between, the threads of a warp share
-the marches of theirs: who is done takes the next, so that none waits long for a neighbour whose
-steps are short.
+the integrations of theirs: who is done takes the next, so that none waits long for a neighbour
+whose steps are short.
 """
 
 from typing import Protocol
@@ -22,7 +22,7 @@ from pma_gym.codegen.machine.control import (
     offset,
     repeat,
 )
-from pma_gym.codegen.machine.simd import Lanes
+from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.engine.cpu.block_memory import narrowed, widened
 from pma_gym.engine.cuda.reset_writer import CudaResetWriter
@@ -31,7 +31,7 @@ from pma_gym.integrator.integration import FUSED, memory
 
 
 class Turns(Protocol):
-    """Which environment a thread marches next, and what threads of a warp do together."""
+    """Which environment a thread integrates next, and what threads of a warp do together."""
 
     def following(self, job: Operand) -> Operand:
         """Write the number of the environment after one; beyond the last if there is none."""
@@ -157,12 +157,12 @@ class ThreadWriter(CudaResetWriter):
         wide = {i: widened(b, number) for i, number in wide.items()}
         wide[self.eq.graph.input("clock", HELD).id] = b.load(self._clock, typ=DOUBLE)
         # What an attempt's samples share is asked for, or it would be a part of each one's sum.
-        found = Lanes(1, fused=FUSED).emit(b, [one.done, one.when], wide)
+        found = SimdEmitter(1, fused=FUSED).emit(b, [one.done, one.when], wide)
         return {one.when.id: narrowed(b, found[one.when.id], self.element)}
 
 
 class _Cells:
-    """A thread's numbers during the march: registers, once compiled."""
+    """A thread's numbers during the integration: registers, once compiled."""
 
     def __init__(self, builder: Builder, element: ir.Type) -> None:
         self.builder, self.element = builder, element

@@ -17,7 +17,7 @@ from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
 from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
 from pma_gym.integrator.step_attempt import first_size
-from pma_gym.integrator.system import at_rest
+from pma_gym.integrator.system import step_start_values
 from pma_gym.plant import sensors
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
@@ -112,7 +112,7 @@ class ControlStepGraph(StepInputs):
         """True outputs at the plant's state."""
         eq = self.equations
         outputs = [eq.outputs[name] for name in TRUTH]
-        return dict(zip(TRUTH, substitute(outputs, at_rest(eq)), strict=True))
+        return dict(zip(TRUTH, substitute(outputs, step_start_values(eq)), strict=True))
 
     def read(self, stream: int, count: Value) -> list[Value]:
         """What the four sensors say (SI), by random numbers of a stream."""

@@ -9,8 +9,8 @@ from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import FILTER_STATE, NOISE, profile_at_offsets
-from pma_gym.tasks import PACE, Human, MomentProfile, OperatorState, unsafe
-from pma_gym.tasks.human import FORESIGHT_S, operator_step, unsteady
+from pma_gym.tasks import PACE, MomentProfile, Operator, OperatorState, unsafe
+from pma_gym.tasks.operator import FORESIGHT_S, operator_step, unsteady
 from pma_gym.tasks.safety_filter import MOMENT_FILTER_S, SPEED_FILTER_S, filtered_pressure
 from pma_gym.units import SI_FACTORS
 
@@ -37,9 +37,9 @@ class ExerciseStep:
     # -- what the rig's computer knows -------------------------------------------------------------
 
     @property
-    def human(self) -> Human:
+    def human(self) -> Operator:
         """The operator's numbers, as inputs."""
-        return Human(*(self.inputs.slot(f"human_{name}") for name in Human._fields))  # type: ignore[arg-type]
+        return Operator(*(self.inputs.slot(f"human_{name}") for name in Operator._fields))  # type: ignore[arg-type]
 
     @property
     def plan(self) -> MomentProfile:

@@ -9,7 +9,7 @@ from pma_gym.codegen.substitute import substitute
 from pma_gym.engine.observation import Prescribed
 from pma_gym.engine.state_layout import START, profile_at_offsets
 from pma_gym.integrator.equations import Equations
-from pma_gym.integrator.step_attempt import Attempt
+from pma_gym.integrator.step_attempt import StepAttempt
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.tasks import MomentProfile, Task
 
@@ -41,7 +41,7 @@ class Course:
         return [self.start, self.speed, self.acceleration, self.end, self.end_speed]
 
 
-def course(eq: Equations, attempt: Attempt, task: Task) -> Course:
+def course(eq: Equations, attempt: StepAttempt, task: Task) -> Course:
     """How the task's position moves during an attempt."""
     position = position_of(eq, task, eq.outputs)
     speed = _rate(eq, position)
@@ -107,7 +107,7 @@ class Sampling:
     ideal: Value | None = None
 
 
-def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Sampling:
+def sampling(eq: Equations, attempt: StepAttempt, task: Task, period: float) -> Sampling:
     """A sample in an attempt, from `course` and the record's numbers given as inputs.
 
     The quartic through both ends' positions and rates, and the first's second rate: its error goes
@@ -120,7 +120,7 @@ def sampling(eq: Equations, attempt: Attempt, task: Task, period: float) -> Samp
     done = period - attempt.left
     when = sample * SAMPLE_PERIOD - clock - done
     share = when * (1.0 / length)
-    due = attempt_due(graph.input("taken", CHANGING, "truth"), share)
+    due = attempt_due(graph.input("accepted", CHANGING, "truth"), share)
     b, d = c.speed * length, 0.5 * c.acceleration * (length * length)
     # p(s) = start + b s + d s^2 + e s^3 + f s^4 with p(1) = end and p'(1) = end_speed * length.
     rest = c.end - c.start - b - d

@@ -21,7 +21,7 @@ from pma_gym.plant.exercise_device.prescription import (
     follow_from,
 )
 from pma_gym.plant.model import Model
-from pma_gym.tasks import PLAN_ANGLES, Exercise, Human, MomentProfile, Task, moment_profile
+from pma_gym.tasks import PLAN_ANGLES, Exercise, MomentProfile, Operator, Task, moment_profile
 
 ANGLES = np.radians(np.arange(0.0, 91.0, 10.0))
 """Where a prescription is compared with what the device can give (rad)."""
@@ -142,7 +142,7 @@ def operators(
     exercise = task.exercise
     assert exercise is not None
     people = _people(exercise, options, keys, episodes)
-    found = {f"human_{name}": people[:, i] for i, name in enumerate(Human._fields)}
+    found = {f"human_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
     rise = found["human_rise"]
     found["human_share"] = -np.expm1(-options.period / rise)
     known = plans(exercise, model, pressures)
@@ -175,7 +175,7 @@ def _people(
     if options.human == "random":
         return exercise.population.draw(keys, episodes * 4 + DRAW)
     typical = exercise.population.typical
-    one = options.human if isinstance(options.human, Human) else typical
+    one = options.human if isinstance(options.human, Operator) else typical
     return np.tile(np.array(one), (len(keys), 1))
 
 

@@ -14,12 +14,15 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from pma_gym.envs.rendering.history import History
+from pma_gym.envs.rendering.picture_size import USUAL_WIDTH
 from pma_gym.envs.rendering.rig_drawing import FAINT, INK, REFERENCE, RigDrawing
 from pma_gym.envs.rendering.scene import Scene
 from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
-WIDTH, HEIGHT, DPI = 800, 400, 100
+DPI = 100
+"""Pixels of an inch of a picture of the usual width: wider ones show the same, larger."""
+
 ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
 MOST_RATE_HZ = 100.0
 """Positions are drawn at most at about this rate: more than there are pixels."""
@@ -34,12 +37,17 @@ class Picture:
 
     Args:
         task: the task, which says what the plot's axes are.
+        width: width of the picture (pixels); it is half as high.
     """
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, width: int = USUAL_WIDTH) -> None:
         """Draw what never changes."""
         self._factor = SI_FACTORS[task.protocol.unit]
-        self._figure = Figure(figsize=(WIDTH / DPI, HEIGHT / DPI), dpi=DPI, facecolor="white")
+        self._figure = Figure(
+            figsize=(USUAL_WIDTH / DPI, 0.5 * USUAL_WIDTH / DPI),
+            dpi=DPI * width / USUAL_WIDTH,
+            facecolor="white",
+        )
         self._canvas = FigureCanvasAgg(self._figure)
         self._rig = RigDrawing(self._figure.add_axes((0.0, 0.0, 0.47, 1.0)), task)
         self._moving: list[tuple[Axes, Artist]] = [(self._rig.axes, a) for a in self._rig.moving]
@@ -57,7 +65,7 @@ class Picture:
             scene: an environment of the task, in or after an episode.
             history: the course of its episode.
         Returns:
-            RGB of shape (400, 800, 3), a new array each time.
+            RGB of shape (width / 2, width, 3), a new array each time.
         """
         self._rig.update(scene)
         stride = _stride(history.time)

@@ -60,8 +60,8 @@ def write_equations(equations: PlantEquations) -> None:
     eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)
-    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
-    eq.add_bends()
+    eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
+    eq.add_breakpoints()
 
 
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:

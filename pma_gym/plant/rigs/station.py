@@ -132,9 +132,9 @@ def _write_states(eq: PlantEquations) -> None:
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
     eq.add_memories(tuple(PORTS))
     eq.add_sensors(SCALES)
-    eq.add_switch("turning", eq["velocity"], TURNING_M, turning=True)
+    eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
     for effect in (*eq.at("cable"), *eq.at("muscle_force")):
-        if effect.switch:
-            name = effect.switch.__name__
-            eq.add_switch(name, eq.call(effect, effect.switch), TIGHTENING_M)
-    eq.add_bends()
+        if effect.event:
+            name = effect.event.__name__
+            eq.add_event(name, eq.call(effect, effect.event), TIGHTENING_M)
+    eq.add_breakpoints()

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.bounds.cache import BOUNDS, Bounds
+from benchmarks.executors.local import Background
 from benchmarks.report.verdicts import largest_excess
-from benchmarks.runner.background import Background
 
 
 def test_as_few_bounds_as_are_needed_give_the_largest_excess():

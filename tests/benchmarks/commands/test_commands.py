@@ -7,6 +7,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.executors.choice import local
 from benchmarks.reproduction import job
 from benchmarks.reproduction.execution import Execution
 from benchmarks.suites.reproduction import load_suite
@@ -66,7 +67,7 @@ def test_ctrl_c_before_the_first_case_says_that_nothing_was_measured(tmp_path, m
     monkeypatch.setattr(job, "execute", lambda *_: Execution((), {}, False))
     with (tmp_path / "terminal.txt").open("w") as terminal:
         console = Console(file=terminal, width=200)
-        assert job.run_job(load_suite(), tmp_path / "out", 2, console) == 130
+        assert job.run_job(load_suite(), tmp_path / "out", local(2), console) == 130
     words = (tmp_path / "terminal.txt").read_text()
     assert "before the first case was done: nothing was measured, and nothing is written" in words
     assert not list((tmp_path / "out").iterdir())

@@ -1,7 +1,6 @@
 """Somebody's own controller: scored beside the others, or told in plain words what to mend."""
 
 import json
-from functools import partial
 
 import numpy as np
 import pytest
@@ -13,13 +12,10 @@ from benchmarks.comparison.scores import print_clipping
 from benchmarks.runner.case import Case, run_case
 from benchmarks.runner.controller_spec import Contender, ControllerError
 from benchmarks.runner.journal import Journal
-from benchmarks.runner.processes import run_all
 from benchmarks.runner.rollout import rollout
 from benchmarks.runner.user_controller import Guarded, LateError
-from benchmarks.runner.worker import ProcessDied, TookTooLong
 from benchmarks.suites.frozen import NOMINAL, Episode
 from pma_gym.envs import PMAEnv
-from tests.benchmarks.pieces import exits, is_quick, loops
 
 SUITE = """
 schema = 2
@@ -103,17 +99,6 @@ def test_a_guard_lets_everything_through(tmp_path):
     controller = Guarded(contender, 0.01)
     assert controller.name == "My own"
     assert not hasattr(controller, "repetitions")
-
-
-def test_what_takes_too_long_is_ended_and_the_others_are_not():
-    results = {}
-    works = [partial(loops, 0.3), is_quick, partial(exits, 3), is_quick]
-    assert run_all(works, 2, results.__setitem__, wary=True)
-    assert results[1] == results[3] == "quick"
-    assert isinstance(results[0], TookTooLong)
-    assert str(results[0]).startswith("thinking took over 0.3 s and was ended; look for an endless")
-    # Of works that are not trusted none is run twice.
-    assert isinstance(results[2], ProcessDied) and "again" not in str(results[2])
 
 
 def invoke(folder, *arguments):

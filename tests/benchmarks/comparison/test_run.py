@@ -17,14 +17,17 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.comparison.job import chosen, run_comparison
 from benchmarks.comparison.scores import SCORES, TIMES
+from benchmarks.executors.choice import ExecutorName, executor_named
+from benchmarks.executors.executor import ThisProcess
+from benchmarks.executors.failures import ProcessDied
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
 from benchmarks.runner.execution import execute, plan
 from benchmarks.runner.journal import JOURNAL, Journal, read_rows
 from benchmarks.runner.provenance import finished_rows, read_run
-from benchmarks.runner.worker import ProcessDied
 from benchmarks.suites.frozen import frozen_suite
 
+ONE = ThisProcess()
 ROOT = Path(__file__).parents[3]
 
 SUITE = """
@@ -75,10 +78,10 @@ def own(folder, name, sleep=0.0):
     return f"{path}:{name}"
 
 
-def run(suite, controllers, out, jobs=1):
+def run(suite, controllers, out, executor=ONE):
     words = io.StringIO()
     entries = chosen(suite, controllers)
-    code = run_comparison(suite, entries, out, jobs, Console(file=words, width=200))
+    code = run_comparison(suite, entries, out, executor, Console(file=words, width=200))
     return code, words.getvalue()
 
 
@@ -167,13 +170,17 @@ def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeyp
     assert {row["controller"] for row in finished_rows(out)} == {"pid"}
 
 
+def is_package(name):
+    return (ROOT / name.replace(".", "/")).is_dir()
+
+
 def test_a_figure_depends_on_no_file_that_its_key_leaves_out():
     code = "import sys, benchmarks.runner.case\nprint(*sys.modules)"
     listed = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
     files = {
         f"{name.replace('.', '/')}.py"
         for name in listed.stdout.split()
-        if name.startswith("benchmarks.") and name not in ("benchmarks.runner", "benchmarks.suites")
+        if name.startswith("benchmarks.") and not is_package(name)
     }
     # What a suite asks of its controllers moves no figure.
     assert files - {"benchmarks/suites/target.py"} <= set(fingerprint.SOURCES)
@@ -218,10 +225,42 @@ def test_a_case_whose_process_died_is_run_again(suite, tmp_path):
     assert len(plan(suite, entries, tmp_path).missing) == 5
 
 
+def test_a_line_that_was_changed_is_no_row(tmp_path, capsys):
+    path = tmp_path / JOURNAL
+    with Journal(path) as journal:
+        for case in range(3):
+            journal.append({"case": case, "rmse": 0.5})
+    # What older versions wrote has no checksum.
+    lines = [*path.read_bytes().splitlines(keepends=True), b'{"case": 7}\n']
+    path.write_bytes(lines[0] + lines[1].replace(b"0.5", b"0.4") + b"".join(lines[2:]))
+    rows = list(read_rows(path))
+    assert rows == [{"case": 0, "rmse": 0.5}, {"case": 2, "rmse": 0.5}, {"case": 7}]
+    words = capsys.readouterr().err
+    assert words.count("line 2 is not what was written: its checksum does not fit") == 1
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_a_ray_cluster_writes_the_rows_of_one_process(suite, tmp_path):
+    ray = pytest.importorskip("ray")
+    mine = own(tmp_path, "Mine")
+    executor = executor_named(ExecutorName.RAY, 2)
+    try:
+        code, _ = run(suite, f"pid,{mine}", tmp_path / "ray", executor)
+    finally:
+        ray.shutdown()
+    assert code == 0 and run(suite, f"pid,{mine}", tmp_path / "one")[0] == 0
+    assert table(tmp_path / "ray") == table(tmp_path / "one")
+    # What is done on the one is done for the other.
+    code, words = run(suite, "pid", tmp_path / "ray")
+    assert code == 0 and "6 cases are done in" in words
+
+
 def test_a_full_disk_ends_the_run_with_what_is_there(suite, tmp_path, monkeypatch):
     monkeypatch.setattr(os, "write", lambda file, line: len(line) // 2)
     with pytest.raises(OSError, match="bytes of a row could be written"):
-        execute(plan(suite, chosen(suite, "pid"), tmp_path), 1, tmp_path, lambda row: None)
+        execute(
+            plan(suite, chosen(suite, "pid"), tmp_path), ThisProcess(), tmp_path, lambda row: None
+        )
 
 
 def test_all_means_the_controllers_of_the_suite(suite):

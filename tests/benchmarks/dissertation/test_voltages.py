@@ -39,7 +39,7 @@ def written(path) -> Trial:
 def test_the_file_moves_the_station_as_the_controller_does(controller, task, quantity, tmp_path):
     path = tmp_path / "volts.csv"
     assert voltages(path, controller, task, 400).exit_code == 0
-    trial = Plant("station").simulate(written(path), noise=False, joined=False)
+    trial = Plant("station").simulate(written(path), noise=False, interpolation="zoh")
     environment = make_environment(task, "station", 400, noise=False)
     driven = rollout(environment, CONTROLLERS[controller](), seed=0)
     # Every 0.25 s is a row of the file and a sample at 384 Hz; voltages are written to a microvolt.

@@ -15,7 +15,7 @@ from benchmarks.exercise.lag.swing import swings, unhindered
 from benchmarks.exercise.lag.tables import bound_tables
 from pma_gym.envs import PMAVectorEnv
 from pma_gym.plant.model import load_model
-from pma_gym.tasks.human import PACED
+from pma_gym.tasks.operator import PACED
 
 STATION = load_model("station")
 TYPICAL = PACED.typical

@@ -8,6 +8,8 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import ThisProcess
 from benchmarks.exercise.safety_layer.adversarial import KINDS, PUMPING, kind_of, planned, pumped
 from benchmarks.exercise.safety_layer.episodes import SETS, measure
 from benchmarks.exercise.safety_layer.job import read_safety, run_safety, safety_words
@@ -37,7 +39,9 @@ def test_pumping_pulls_on_the_way_back_and_lets_go_on_the_way_out():
 def test_the_layer_saves_operators_from_wild_commands(tmp_path):
     said = io.StringIO()
     console = Console(file=said, width=120)
-    found = run_safety(episodes=42, bare=42, seed=0, out=tmp_path, console=console)
+    found = run_safety(
+        episodes=42, bare=42, seed=0, out=tmp_path, console=console, executor=ThisProcess()
+    )
     assert found.total(True)[:2] == (42, 0)
     episodes, broken, _ = found.total(False)
     assert episodes == 42 and broken > 21
@@ -53,9 +57,10 @@ def test_the_layer_saves_operators_from_wild_commands(tmp_path):
 
 
 def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():
-    few = {(t.task, t.stations, t.agent): t for t in measure(42, 5, True)}
-    assert few == {(t.task, t.stations, t.agent): t for t in measure(42, 5, True)}
-    more = {(t.task, t.stations, t.agent): t for t in measure(84, 5, True)}
+    few = {(t.task, t.stations, t.agent): t for t in measure(42, 5, True, ThisProcess())}
+    # The same counts from several processes.
+    assert few == {(t.task, t.stations, t.agent): t for t in measure(42, 5, True, local(2))}
+    more = {(t.task, t.stations, t.agent): t for t in measure(84, 5, True, ThisProcess())}
     for name, tally in few.items():
         assert more[name].peak_speed_deg_s >= tally.peak_speed_deg_s
 

@@ -26,8 +26,8 @@ from benchmarks.hidden_effects.generation import files
 from benchmarks.hidden_effects.generation.cases import draw_case
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.discovery import workflow
-from pma_gym.discovery.fitting.fit_problem import Bench
-from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening import residuals, scan_statistic
 from pma_gym.discovery.selection import forward_selection
@@ -133,7 +133,7 @@ def test_the_forest_learns_from_no_judged_case(folder, tmp_path):
 
 
 def test_a_table_of_signatures_names_what_is_lacking(tmp_path):
-    with pytest.raises(FileNotFoundError, match="ways train"):
+    with pytest.raises(FileNotFoundError, match="baselines train"):
         forest.read_table(tmp_path / "none.csv")
 
 
@@ -144,8 +144,12 @@ CHEAP = ("bic_stepwise", "sparse_regression", "gaussian_process", "random_forest
 @pytest.mark.parametrize("way", CHEAP)
 def test_every_way_sees_much_creep(way, folder, dataset, monkeypatch):
     # The whole catalogue, pair by pair, would take a minute to compile and fit.
-    few = [each for each in preparation.suspects(load_model(dataset.model)) if each.name in FEW]
-    monkeypatch.setattr(preparation, "suspects", lambda model, orders: few)
+    few = [
+        each
+        for each in preparation.candidate_effects(load_model(dataset.model))
+        if each.name in FEW
+    ]
+    monkeypatch.setattr(preparation, "candidate_effects", lambda model, orders: few)
     monkeypatch.setattr(gaussian_process, "MOST_TICKS", 60)
     for name in WAYS[way].needs:
         pytest.importorskip(name)
@@ -163,9 +167,9 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     seen = {}
 
     def spied(*_, **__):
-        own = workflow.own_parameters(ready.bench.given)
+        own = workflow.free_parameters(ready.problem.given)
         noise = residuals.autoregression([np.sin(np.arange(400.0))], 0.1)
-        seen.update(prior=own.prior, noise=noise, chance=forward_selection.look()[0].p_value)
+        seen.update(prior=own.prior, noise=noise, chance=forward_selection.screen()[0].p_value)
         seen["bursts"] = scan_statistic.autoregression([np.sin(np.arange(400.0))], 0.1)
 
         class Nothing:
@@ -174,8 +178,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
         return Nothing()
 
-    found = forward_selection.Look(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
-    monkeypatch.setattr(forward_selection, "look", lambda: [found])
+    found = forward_selection.ScreeningScore(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
+    monkeypatch.setattr(forward_selection, "screen", lambda: [found])
     monkeypatch.setattr(ablations, "diagnose", spied)
     ablations.ours(dataset, 0, 1)
     prior, memory = seen["prior"], seen["noise"].coefficients
@@ -186,9 +190,9 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
     ablations.no_whitening(dataset, 0, 1)
     assert seen["bursts"] == seen["noise"] == white_noise(pytest.approx(np.sqrt(0.5), rel=0.01))
     assert seen["chance"] == 0.3
-    whole = forward_selection.look
+    whole = forward_selection.screen
     ablations.no_gate(dataset, 0, 1)
-    assert seen["chance"] == 0.0 and forward_selection.look is whole
+    assert seen["chance"] == 0.0 and forward_selection.screen is whole
     ablations.ours(dataset, 0, 1)
     assert np.array_equal(seen["prior"], prior) and seen["noise"].coefficients == memory
 
@@ -240,25 +244,25 @@ def test_the_true_noise_is_whitened():
 
 def test_the_distance_is_that_of_a_known_change(ready, dataset):
     """A wave on one signal that no parameter may follow: d^2 = sum of (wave / noise)^2."""
-    given = ready.bench.given
-    own = own_parameters(given)
+    given = ready.problem.given
+    own = free_parameters(given)
     held = replace(own, prior=1e-6 * own.prior)
     noise = tuple(white_noise(level) for level in (2e-5, 2e-3, 0.5, 300.0))
-    evidence = Bench(ready.bench.trials, given, held, noise).evidence(given)
-    clean = evidence.readings(evidence.start)
+    whitened = FitProblem(ready.problem.trials, given, held, noise).whitened_residuals(given)
+    clean = whitened.readings(whitened.start)
     size, square = 30.0, 0.0
     for channel, name in ((3, "pressure"), (0, "contraction")):
         trials, square = [], 0.0
-        for trial, held_there in zip(ready.bench.trials, clean, strict=True):
+        for trial, held_there in zip(ready.problem.trials, clean, strict=True):
             readings = held_there.copy()
             wave = np.sin(2.0 * np.pi * 3.0 * (trial.time - trial.time[0]))
             readings[channel] += size * noise[channel].level / 300.0 * wave
             centred = wave - (wave.mean() if name == "contraction" else 0.0)
             square += float(np.sum((size / 300.0 * centred) ** 2))
             trials.append(bound._read(trial, readings.T))
-        bench = Bench(trials, given, held, noise)
-        fit = bench.fit(given)
-        assert bound.left_by(bench, fit) == pytest.approx(np.sqrt(square), rel=1e-3)
+        problem = FitProblem(trials, given, held, noise)
+        fit = problem.fit(given)
+        assert bound.left_by(problem, fit) == pytest.approx(np.sqrt(square), rel=1e-3)
 
 
 def test_the_ideal_test_is_that_of_neyman_and_pearson():

@@ -179,8 +179,9 @@ def test_an_effect_of_size_0_is_absent(commands):
 
 def test_the_simulation_imports_nothing_of_the_package():
     folder = Path(physics.__file__).parent
-    sources = [*folder.glob("*.py"), *(folder.parent / f"{n}.py" for n in ("effects", "protocols"))]
-    for path in [*sources, folder.parent / "size.py", folder.parent / "cases.py"]:
+    generation = folder.parent / "generation"
+    modules = ("cases", "effect_size", "effects", "excitation")
+    for path in [*folder.glob("*.py"), *(generation / f"{name}.py" for name in modules)]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []

@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.executors.choice import local
 from benchmarks.hidden_effects import job
 from benchmarks.hidden_effects.evaluation import scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Answer
@@ -78,7 +79,7 @@ def test_an_interrupted_run_keeps_its_cases_and_goes_on_to_the_same_figures(
 
 
 def test_two_processes_find_what_one_finds(whole, tmp_path):
-    found = run_block(order(tmp_path, jobs=2))
+    found = run_block(order(tmp_path, executor=local(2)))
     assert found is not None and timeless(found) == timeless(whole[1])
 
 

@@ -36,7 +36,7 @@ from pma_gym.data.serres2008 import load_table
 from pma_gym.discovery.diagnosis import ADDED
 from pma_gym.discovery.preparation.initial_floors import initial_floors
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant.model import load_model
 
@@ -252,8 +252,8 @@ def test_a_pulley_of_another_size_is_found_in_the_summaries():
     chosen = np.where(whole.rotation, whole.pressure == 275.0, whole.pressure == 550.0)
     parts = whole.trials[8:10], whole.tasks[8:10], whole.pressure[chosen], whole.rotation[chosen]
     noise = tuple(white_noise(1.0) for _ in range(4))
-    evidence = Evidence(model, parts[0], (path,), noise, np.array([np.inf]))
-    made = Summary(*parts, np.zeros(chosen.sum())).residuals(evidence, np.array([28.0]))
+    whitened = WhitenedResiduals(model, parts[0], (path,), noise, np.array([np.inf]))
+    made = Summary(*parts, np.zeros(chosen.sum())).residuals(whitened, np.array([28.0]))
     found = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
     assert found.values[path] == pytest.approx(28.0, abs=0.05)
     assert found.left_out_mm < 0.05

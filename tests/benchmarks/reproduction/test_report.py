@@ -9,6 +9,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
+from benchmarks.executors.executor import ThisProcess
 from benchmarks.reproduction.execution import Execution
 from benchmarks.reproduction.job import run_job
 from benchmarks.reproduction.replay import ReplayError
@@ -44,7 +45,7 @@ def run(tmp_path_factory):
     controllers = [suite.controllers[0], Contender("Half", path=str(path))]
     suite = suite.select(["serres2008"], controllers, ["displacement"], [350, 550])
     with (folder / "terminal.txt").open("w") as terminal:
-        code = run_job(suite, folder / "out", 1, Console(file=terminal, width=120))
+        code = run_job(suite, folder / "out", ThisProcess(), Console(file=terminal, width=120))
     return code, folder / "out", (folder / "terminal.txt").read_text()
 
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.executors.choice import local
+from benchmarks.executors.executor import ThisProcess, run_all
 from benchmarks.reproduction.execution import execute
 from benchmarks.reproduction.results import Results, csv_text
 from benchmarks.runner.controller_spec import Contender, ControllerError
-from benchmarks.runner.processes import run_all
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.reproduction import load_suite
 from pma_gym.plant.model import load_model
@@ -117,7 +118,7 @@ def test_an_array_of_one_volt_is_a_voltage():
 def test_any_number_of_processes_gives_the_same_bits(tmp_path):
     contender = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
     suite = small_suite(contender)
-    one, two = (execute(suite, jobs) for jobs in (1, 2))
+    one, two = (execute(suite, local(jobs)) for jobs in (1, 2))
     assert one.complete and two.complete
     texts = [csv_text(Results(suite, run, {}).scores) for run in (one, two)]
     assert texts[0] == texts[1]
@@ -126,7 +127,7 @@ def test_any_number_of_processes_gives_the_same_bits(tmp_path):
 
 def test_a_case_that_fails_loses_only_itself(tmp_path):
     suite = small_suite(controller_file(tmp_path, "return 1 / (self.pressure - 300)"))
-    failed, done = (outcome.score for outcome in execute(suite, 1).outcomes)
+    failed, done = (outcome.score for outcome in execute(suite, ThisProcess()).outcomes)
     assert "act raised ZeroDivisionError: division by zero (line 7 of written.py" in failed.failure
     assert not failed.phases
     assert done.phases and not done.failure
@@ -134,7 +135,7 @@ def test_a_case_that_fails_loses_only_itself(tmp_path):
 
 def test_a_limit_of_the_rig_is_the_failure_of_its_case():
     suite = small_suite(Contender("Full", path=__file__), (150,))
-    (outcome,) = execute(suite, 1).outcomes
+    (outcome,) = execute(suite, ThisProcess()).outcomes
     assert "by a physical limit: muscle stretched over 12 mm" in outcome.score.failure
 
 
@@ -153,7 +154,7 @@ def test_an_interrupt_leaves_what_is_done():
         if index == 1:
             raise KeyboardInterrupt
 
-    assert not run_all([int, int, int], 1, on_done)
+    assert not run_all([int, int, int], ThisProcess(), on_done)
     assert kept == [0, 1]
 
 

@@ -6,15 +6,15 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import diagnose
-from pma_gym.discovery.experiments.detectability import chance_to_show, for_blind
+from pma_gym.discovery.experiments.detectability import chance_to_show, experiment_to_detect
 from pma_gym.discovery.experiments.excitation import is_safe, library
-from pma_gym.discovery.experiments.next_experiment import Contest, next_experiment
-from pma_gym.discovery.fitting.candidate_effect import Suspect
-from pma_gym.discovery.fitting.fit_problem import Bench, Fitted
-from pma_gym.discovery.fitting.free_parameters import Own, prior
+from pma_gym.discovery.experiments.next_experiment import Discrimination, next_experiment
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, prior
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN, Baseline, look
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.score_test import SHOWN_GAIN, Baseline, screen
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
@@ -60,22 +60,22 @@ def nearly_constant(model: Model) -> list[Trial]:
     return found
 
 
-def bench(trials: list[Trial]) -> Bench:
+def fit_problem(trials: list[Trial]) -> FitProblem:
     model = station()
-    own = Own(FREE, np.array([prior(model, path) for path in FREE]))
+    own = FreeParameters(FREE, np.array([prior(model, path) for path in FREE]))
     noise = tuple(white_noise(float(each)) for each in sensors.noise_levels(model))
-    return Bench(trials, model, own, noise)
+    return FitProblem(trials, model, own, noise)
 
 
 @cache
-def every() -> dict[str, Suspect]:
-    return {each.name: each for each in suspects(station())}
+def every() -> dict[str, CandidateEffect]:
+    return {each.name: each for each in candidate_effects(station())}
 
 
-def fitted(on: Bench, name: str) -> Fitted:
-    suspect = every()[name]
-    usual = suspect.probes[len(suspect.probes) // 2]
-    found = on.fit(station(), [suspect], {name: usual})
+def fitted(on: FitProblem, name: str) -> Fitted:
+    candidate = every()[name]
+    usual = candidate.probes[len(candidate.probes) // 2]
+    found = on.fit(station(), [candidate], {name: usual})
     assert found is not None
     return found
 
@@ -83,12 +83,12 @@ def fitted(on: Bench, name: str) -> Fitted:
 @cache
 def case(true: str):
     truth = station().with_effects({true: TRUTHS[true]})
-    on = bench(nearly_constant(truth))
+    on = fit_problem(nearly_constant(truth))
     rivals = [(fitted(on, name), (every()[name],)) for name in TRUTHS]
     return truth, on, rivals, next_experiment(on, rivals, 0)
 
 
-def lead(on: Bench, name: str) -> float:
+def lead(on: FitProblem, name: str) -> float:
     """Log-likelihood of the true one beyond the other's, both fitted to all trials."""
     other = next(each for each in TRUTHS if each != name)
     return 0.5 * (fitted(on, other).chi_square - fitted(on, name).chi_square)
@@ -106,21 +106,21 @@ def test_proposed_trial_tells_what_was_promised(true):
 
 def test_it_tells_more_a_minute_than_most_of_the_library():
     _, on, rivals, found = case("hysteresis")
-    contest = Contest.of(on, rivals, 0)
+    discrimination = Discrimination.of(on, rivals, 0)
     hopes = {
-        each.name: float(np.min(contest.odds([each], contest.pairs()))) / each.minutes
-        for each in library([*contest.models, on.given], 0)
+        each.name: float(np.min(discrimination.odds([each], discrimination.pairs()))) / each.minutes
+        for each in library([*discrimination.models, on.given], 0)
     }
     assert found is not None
-    others = [rate for name, rate in hopes.items() if name != found.protocol]
-    assert hopes[found.protocol] > np.median(others)
+    others = [rate for name, rate in hopes.items() if name != found.excitation]
+    assert hopes[found.excitation] > np.median(others)
 
 
 def test_the_same_seed_proposes_the_same_trial():
     _, on, rivals, found = case("hysteresis")
     again = next_experiment(on, rivals, 0)
     assert found is not None and again is not None
-    assert (again.protocol, again.expected_odds) == (found.protocol, found.expected_odds)
+    assert (again.excitation, again.expected_odds) == (found.excitation, found.expected_odds)
     for name, volts in again.trial.commands.items():
         np.testing.assert_array_equal(volts, found.trial.commands[name])
 
@@ -171,15 +171,15 @@ def test_effects_that_were_hidden_are_made_to_show():
     fit = on.fit(station())
     assert fit is not None
     wanted = [every()[name] for name in ("hysteresis", "creep", "drive_saturation")]
-    baseline = Baseline.at(on.evidence(fit.model), fit.values, fit.steps)
-    looks = look(baseline, wanted, 0, lambda suspect: on.probed(fit.model, suspect))
-    hidden = [each.suspect.name for each in looks if (each.resolvable or np.inf) > 1.0]
+    baseline = Baseline.at(on.whitened_residuals(fit.model), fit.values, fit.steps)
+    scores = screen(baseline, wanted, 0, lambda candidate: on.probed(fit.model, candidate))
+    hidden = [each.candidate.name for each in scores if (each.resolvable or np.inf) > 1.0]
     assert "creep" in hidden
-    found = for_blind(on, fit, wanted, looks)
+    found = experiment_to_detect(on, fit, wanted, scores)
     assert found is not None and "creep" in found.separates
     assert set(found.separates) <= set(hidden)
     assert found.expected_odds >= np.exp(12.5)
-    assert for_blind(on, fit, wanted, []) is None
+    assert experiment_to_detect(on, fit, wanted, []) is None
 
 
 def test_the_chance_to_show_counts_sizes_in_proportion():

@@ -8,11 +8,11 @@ import pytest
 from pma_gym.discovery.experiments.predicted_trials import columns
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.plant.plant import Plant
-from tests.discovery.laboratory import STATION, bench, measured
+from tests.discovery.laboratory import STATION, fit_problem, measured
 
 TRIALS = measured(STATION, 2, rate=32.0, seconds=3.0, kinds=(0, 2), kpa=(200.0, 280.0))
-BENCH = bench(TRIALS)
-FREE = BENCH.own.free
+PROBLEM = fit_problem(TRIALS)
+FREE = PROBLEM.own.free
 AT = values(STATION, FREE)
 MOVED = np.stack([AT, 1.01 * AT, 0.99 * AT])
 SOFTER = "stiffness.high_slope_n_per_mm_per_kpa"
@@ -20,7 +20,7 @@ SOFTER = "stiffness.high_slope_n_per_mm_per_kpa"
 
 
 def found(trials, tried=MOVED):
-    return columns(BENCH, STATION, FREE, trials, tried)
+    return columns(PROBLEM, STATION, FREE, trials, tried)
 
 
 def commanded(trial, kpa, volts, rows):

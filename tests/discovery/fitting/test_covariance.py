@@ -10,18 +10,18 @@ from scipy.signal import lfilter
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.preparation.whitened_residuals import Pieces
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.verdict.homogeneity_test import newton_step, spreads
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.verdict.homogeneity_test import homogeneity_test, newton_step
 from pma_gym.plant.plant import Plant
-from tests.discovery.laboratory import HYSTERESIS, STATION, bench, commanded, measured
+from tests.discovery.laboratory import HYSTERESIS, STATION, commanded, fit_problem, measured
 
-LAW = next(each for each in suspects(STATION) if each.name == "hysteresis")
+LAW = next(each for each in candidate_effects(STATION) if each.name == "hysteresis")
 START = {"hysteresis": np.array([6.0, 1.0])}
 
 
 def widened(trials):
     """By how much errors exceed those of the curvature, for what the data determine."""
-    shared = bench(trials)
+    shared = fit_problem(trials)
     fit = shared.fit(STATION)
     assert fit is not None
     known = np.isfinite(np.diag(fit.covariance))
@@ -61,10 +61,10 @@ def scatter(*forces):
             zip(models, commanded(len(forces), kinds=(0,)), strict=True)
         )
     ]
-    shared = bench(trials)
+    shared = fit_problem(trials)
     fit = shared.fit(STATION, (LAW,), START)
     assert fit is not None
-    return spreads(shared, fit, (LAW,), 0)
+    return homogeneity_test(shared, fit, (LAW,), 0)
 
 
 def test_an_effect_of_one_size_does_not_scatter():
@@ -95,7 +95,7 @@ def linear(sizes, sharpness, away):
     values = best + away / np.sqrt(np.diag(curvature))
     stacked = [np.column_stack([c @ values - m, c]) for c, m in zip(columns, measured, strict=True)]
     trial = np.arange(len(sizes))
-    evidence = SimpleNamespace(
+    whitened = SimpleNamespace(
         pieces=lambda *_: Pieces(np.array([s.T @ s for s in stacked]), trial, 0 * trial + rows),
         readings=lambda *_: None,
         prior=np.full(2, np.inf),
@@ -108,7 +108,9 @@ def linear(sizes, sharpness, away):
         paths=("law.size",), fitted_paths=["law.size"], absent=none, amplitudes=one, fitted=one
     )
     fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
-    return spreads(SimpleNamespace(evidence_of=lambda *_: evidence), fit, (law,), 0)["trial"]
+    return homogeneity_test(SimpleNamespace(whitened_at=lambda *_: whitened), fit, (law,), 0)[
+        "trial"
+    ]
 
 
 def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():

@@ -7,7 +7,7 @@ from scipy.stats import multivariate_normal
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting import predictive_density
 from pma_gym.discovery.fitting.fit_problem import Fitted
-from pma_gym.discovery.fitting.predictive_density import Whole, freedom, unabsorbed
+from pma_gym.discovery.fitting.predictive_density import PredictiveDensity, freedom, unabsorbed
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.estimation.residuals import Sums
 from pma_gym.plant.plant import Plant
@@ -56,7 +56,7 @@ class Straight:
 
 def surprised(residual, by, seen, **options):
     some, every = (Straight(residual[:k], by[:, :k], **options) for k in (seen, len(residual)))
-    return Whole(every.fit, freedom(every, every.fit)).surprise(some, some.fit)
+    return PredictiveDensity(every.fit, freedom(every, every.fit)).surprise(some, some.fit)
 
 
 def test_surprise_is_the_likelihood_given_what_seen_trials_say_of_parameters(monkeypatch):
@@ -84,7 +84,7 @@ def test_what_the_seen_trials_do_not_hold_costs_its_freedom_alone():
 def test_trials_that_cannot_be_simulated_surprise_without_end():
     residual, by = np.ones(12), np.ones((2, 12))
     every, seen = Straight(residual, by), Straight(residual[:5], by[:, :5])
-    whole = Whole(every.fit, freedom(every, every.fit))
+    whole = PredictiveDensity(every.fit, freedom(every, every.fit))
     seen.curvature = np.full((2, 2), np.nan)
     assert whole.surprise(seen, seen.fit) == np.inf
 

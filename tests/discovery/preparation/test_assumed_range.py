@@ -12,7 +12,7 @@ from pma_gym.discovery.preparation.assumed_range import (
     needed_reach,
 )
 from pma_gym.discovery.workflow import refit
-from tests.discovery.laboratory import STATION, bench, measured
+from tests.discovery.laboratory import STATION, fit_problem, measured
 
 GAIN = "drive.gain_n_per_v"
 
@@ -46,19 +46,19 @@ def test_what_lies_beyond_needs_as_many_doublings_as_hold_it():
 
 def test_a_fit_goes_beyond_what_was_assumed_where_the_trials_ask_for_it():
     trials, gain = strong_drive(2.0)
-    shared = bench(trials)
+    shared = fit_problem(trials)
     found = shared.fit(STATION)
     assert found is not None
     assert found.estimate(GAIN)[0] == pytest.approx(gain, rel=0.01)
     assert found.reach[GAIN] == 2.0
-    assert not shared.evidence_of(found).at_assumed_edge(found.values)
+    assert not shared.whitened_at(found).at_assumed_edge(found.values)
 
 
 def test_a_fit_from_beyond_stays_there():
     trials, _ = strong_drive(2.0)
-    first = bench(trials).fit(STATION)
+    first = fit_problem(trials).fit(STATION)
     assert first is not None
-    again = bench(trials).fit(first.model, trials=[0])
+    again = fit_problem(trials).fit(first.model, trials=[0])
     assert again is not None and again.reach == first.reach
     assert again.estimate(GAIN)[0] == pytest.approx(first.estimate(GAIN)[0], rel=0.02)
 

@@ -6,7 +6,7 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.assumed_range import FARTHEST
 from pma_gym.discovery.preparation.noise import Whitening, white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from tests.discovery.laboratory import LEVELS, OFF, STATION, measured
 
 FREE = tuple(OFF)
@@ -27,8 +27,8 @@ def smooth():
     return measured(STATION, 3, rate=64.0, noise=False)
 
 
-def evidence(trials, noise=NOISE, prior=PRIOR, **kept):
-    return Evidence(STATION, trials, FREE, noise, prior, **kept)
+def whitened_residuals(trials, noise=NOISE, prior=PRIOR, **kept):
+    return WhitenedResiduals(STATION, trials, FREE, noise, prior, **kept)
 
 
 def changed(trial, **measurements):
@@ -36,7 +36,7 @@ def changed(trial, **measurements):
 
 
 def test_chi_square_of_the_truth_is_the_number_of_readings():
-    found = evidence(measured(STATION, 4, rate=128.0))
+    found = whitened_residuals(measured(STATION, 4, rate=128.0))
     chi_square = found.sums(found.start, np.empty(0)).chi_square
     # Two zeros of each trial are free.
     expected = found.count - 2 * found.trials
@@ -44,7 +44,7 @@ def test_chi_square_of_the_truth_is_the_number_of_readings():
 
 
 def test_zeros_of_contraction_and_rotation_are_free(trials):
-    before = evidence(trials).sums(evidence(trials).start, STEPS)
+    before = whitened_residuals(trials).sums(whitened_residuals(trials).start, STEPS)
     moved = [
         changed(
             trial,
@@ -53,22 +53,22 @@ def test_zeros_of_contraction_and_rotation_are_free(trials):
         )
         for k, trial in enumerate(trials)
     ]
-    after = evidence(moved).sums(evidence(moved).start, STEPS)
+    after = whitened_residuals(moved).sums(whitened_residuals(moved).start, STEPS)
     assert after.chi_square == pytest.approx(before.chi_square, rel=1e-9)
     np.testing.assert_allclose(after.gradient, before.gradient, rtol=1e-6)
 
 
 def test_zeros_of_load_and_pressure_are_not_free(trials):
-    found = evidence(trials)
+    found = whitened_residuals(trials)
     before = found.sums(found.start, np.empty(0)).chi_square
     for name, size in (("load", 5.0), ("pressure", 5e3)):
         moved = [changed(trials[0], **{name: trials[0].measurements[name] + size}), *trials[1:]]
-        assert evidence(moved).sums(found.start, np.empty(0)).chi_square > before + 100
+        assert whitened_residuals(moved).sums(found.start, np.empty(0)).chi_square > before + 100
 
 
 @pytest.mark.parametrize("noise", [NOISE, COLOURED])
 def test_pieces_sum_to_sums(trials, noise):
-    found = evidence(trials, noise)
+    found = whitened_residuals(trials, noise)
     values = found.start + np.array([0.1, 0.01])
     pieces, sums = found.pieces(values, STEPS), found.sums(values, STEPS)
     assert pieces is not None
@@ -85,16 +85,16 @@ def test_pieces_sum_to_sums(trials, noise):
 
 
 def test_each_trial_counts_for_itself(trials):
-    whole = evidence(trials).pieces(evidence(trials).start, STEPS)
+    whole = whitened_residuals(trials).pieces(whitened_residuals(trials).start, STEPS)
     for k, trial in enumerate(trials):
-        alone = evidence([trial])
+        alone = whitened_residuals([trial])
         pieces = alone.pieces(alone.start, STEPS)
         np.testing.assert_allclose(pieces.total(), whole.total([k]), rtol=1e-9)
 
 
 @pytest.mark.parametrize("noise", [NOISE, COLOURED])
 def test_gradient_is_that_of_chi_square(trials, noise):
-    found = evidence(trials, noise)
+    found = whitened_residuals(trials, noise)
     values = found.start + np.array([0.2, -0.02])
     sums = found.sums(values, STEPS, central=True)
     for k, step in enumerate(STEPS):
@@ -104,7 +104,7 @@ def test_gradient_is_that_of_chi_square(trials, noise):
 
 
 def test_curvature_is_that_of_chi_square_where_the_model_is_right(smooth):
-    found = evidence(smooth)
+    found = whitened_residuals(smooth)
     sums = found.sums(found.start, STEPS, central=True)
     for k, step in enumerate(20 * STEPS):
         move = step * np.eye(2)[k]
@@ -117,10 +117,12 @@ def test_curvature_is_that_of_chi_square_where_the_model_is_right(smooth):
 def test_values_of_its_own_change_a_trial_alone(trials):
     here = 1e-3 * STATION.at_the_door("rotor")["radius_mm"]
     plain, own = (
-        evidence(trials, own={"rotor.radius_mm": row}).pieces(evidence(trials).start, STEPS)
+        whitened_residuals(trials, own={"rotor.radius_mm": row}).pieces(
+            whitened_residuals(trials).start, STEPS
+        )
         for row in ([here] * 3, [here, 1.05 * here, here])
     )
-    none = evidence(trials).pieces(evidence(trials).start, STEPS)
+    none = whitened_residuals(trials).pieces(whitened_residuals(trials).start, STEPS)
     np.testing.assert_allclose(plain.products, none.products, rtol=1e-12)
     there = own.trial == 1
     assert np.array_equal(own.products[~there], plain.products[~there])
@@ -132,30 +134,34 @@ def test_gaps_count_for_nothing(trials):
     gone = {}
     for name, row in trials[0].measurements.items():
         gone[name] = np.where(generator.random(len(row)) < 0.3, np.nan, row)
-    found = evidence([changed(trials[0], **gone), *trials[1:]], COLOURED)
+    found = whitened_residuals([changed(trials[0], **gone), *trials[1:]], COLOURED)
     pieces = found.pieces(found.start, STEPS)
     assert pieces is not None and np.isfinite(pieces.products).all()
     missing = sum(int(np.isnan(row).sum()) for row in gone.values())
-    assert pieces.readings() == evidence(trials).count - missing
-    plain = evidence([changed(trials[0], **gone)]).sums(found.start, np.empty(0)).chi_square
+    assert pieces.readings() == whitened_residuals(trials).count - missing
+    plain = (
+        whitened_residuals([changed(trials[0], **gone)]).sums(found.start, np.empty(0)).chi_square
+    )
     count = pieces.readings([0]) - 2
     assert abs(plain - count) < 4 * np.sqrt(2 * count)
 
 
 def test_a_prior_pulls_and_bounds():
-    found = evidence(measured(STATION, 1))
+    found = whitened_residuals(measured(STATION, 1))
     assert np.all(found.upper <= found.start + FARTHEST * PRIOR)
     assert np.all(found.lower >= found.start - FARTHEST * PRIOR)
     values = found.start + PRIOR
     held = found.sums(values, np.empty(0)).chi_square
-    loose = evidence(measured(STATION, 1), prior=np.full(2, np.inf))
+    loose = whitened_residuals(measured(STATION, 1), prior=np.full(2, np.inf))
     free = loose.sums(values, np.empty(0)).chi_square
     assert held - free == pytest.approx(2.0, abs=1e-6 * free)
 
 
 def test_threads_change_no_bit(trials):
     one, two = (
-        evidence(trials, COLOURED, threads=threads).sums(evidence(trials).start, STEPS)
+        whitened_residuals(trials, COLOURED, threads=threads).sums(
+            whitened_residuals(trials).start, STEPS
+        )
         for threads in (1, 2)
     )
     assert one.chi_square == two.chi_square
@@ -163,6 +169,8 @@ def test_threads_change_no_bit(trials):
 
 
 def test_what_cannot_be_simulated_is_infinitely_bad(trials):
-    found = Evidence(STATION, trials, ("contractile_force.intercept_n",), NOISE, np.full(1, np.inf))
+    found = WhitenedResiduals(
+        STATION, trials, ("contractile_force.intercept_n",), NOISE, np.full(1, np.inf)
+    )
     sums = found.sums(np.array([1e9]), np.ones(1))
     assert sums.chi_square == np.inf

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pma_gym.discovery.diagnosis import Estimate, Moved, NamedEffect
-from pma_gym.discovery.fitting.free_parameters import Own, unit
+from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.summary import print_fit
 from pma_gym.discovery.report.tables import effect_table, moved_table
 from pma_gym.discovery.report.text import estimate_words
@@ -22,7 +22,7 @@ KNOWN = Estimate(1.25, 1.05, 1.45, "1")
 def hardly_held(path):
     """Why a parameter is not determined that trials hold to 0.3, and 0.4 was assumed."""
     fit = SimpleNamespace(paths=(path,), covariance=np.array([[0.09]]))
-    return unidentified(path, fit, Own((path,), np.array([0.4])))
+    return unidentified(path, fit, FreeParameters((path,), np.array([0.4])))
 
 
 def refused(quantity, value):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pma_gym.discovery.screening.autocorrelation import memory, tone
+from pma_gym.discovery.screening.autocorrelation import autocorrelation_test, tone
 
 RATE = 128.0
 ROWS = 1024
@@ -21,7 +21,7 @@ def noise(seed, memory_=0.0, parts=6):
 @pytest.mark.parametrize("coefficient", [0.0, 0.5])
 def test_noise_with_a_short_memory_is_never_sure(coefficient):
     for seed in range(60):
-        found = memory(noise(seed, coefficient), RATE)
+        found = autocorrelation_test(noise(seed, coefficient), RATE)
         assert not found.sure
         assert found.score < 5.5
         assert found.variance == pytest.approx(1.0, abs=0.1)
@@ -32,7 +32,7 @@ def test_a_sine_as_large_as_half_the_noise_is_seen_at_its_size(hertz):
     time = np.arange(ROWS) / RATE
     parts = [part + np.sqrt(0.5) * np.sin(2 * np.pi * hertz * time + k)
              for k, part in enumerate(noise(1))]  # fmt: skip
-    found = memory(parts, RATE)
+    found = autocorrelation_test(parts, RATE)
     assert found.sure
     # Its autocorrelation is its share of the variance, at a lag of whole or half periods.
     assert found.share == pytest.approx(0.25 / 1.25, abs=0.05)
@@ -40,15 +40,15 @@ def test_a_sine_as_large_as_half_the_noise_is_seen_at_its_size(hertz):
 
 def test_missing_readings_count_for_nothing():
     parts = noise(2)
-    whole = memory(parts, RATE)
+    whole = autocorrelation_test(parts, RATE)
     torn = [np.where(np.arange(ROWS) % 3 == 0, np.nan, part) for part in parts]
-    found = memory(torn, RATE)
+    found = autocorrelation_test(torn, RATE)
     assert found.variance == pytest.approx(whole.variance, abs=0.05)
     assert not found.sure
 
 
 def test_few_readings_say_nothing():
-    found = memory([np.ones(50)], RATE)
+    found = autocorrelation_test([np.ones(50)], RATE)
     assert (found.share, found.score, found.sure) == (0.0, 0.0, False)
 
 

@@ -1,17 +1,17 @@
-"""Suspects: the whole catalogue, absent where it does nothing, grown within bounds."""
+"""Candidates: the whole catalogue, absent where it does nothing, grown within bounds."""
 
 import numpy as np
 import pytest
 
 from pma_gym.discovery.fitting.candidate_effect import bounds
-from pma_gym.discovery.screening.candidates import FAR, STAND_INS, suspects
+from pma_gym.discovery.screening.candidates import FAR, REPLACING_LAWS, candidate_effects
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE, user_effects
 from pma_gym.effects.user_effects import load_effects
-from tests.discovery.laboratory import LEVELS, OFF, STATION, bench, laboratory, measured
+from tests.discovery.laboratory import LEVELS, OFF, STATION, fit_problem, laboratory, measured
 
-SUSPECTS = suspects(STATION, [0.0, 1.0])
-BY_NAME = {suspect.name: suspect for suspect in SUSPECTS}
+CANDIDATES = candidate_effects(STATION, [0.0, 1.0])
+BY_NAME = {candidate.name: candidate for candidate in CANDIDATES}
 
 OWN = '''
 from typing import Annotated, NamedTuple
@@ -47,49 +47,49 @@ def catalogue():
         known.update(before)
 
 
-def test_every_effect_that_can_be_absent_is_a_suspect_or_a_stand_in():
-    effects = {suspect.effect for suspect in SUSPECTS}
+def test_every_effect_that_can_be_absent_is_a_candidate_or_replaces_another_law():
+    effects = {candidate.effect for candidate in CANDIDATES}
     for name, effect in CATALOGUE.items():
-        if name in STAND_INS:
+        if name in REPLACING_LAWS:
             assert name not in effects
         elif effect.law and effect.neutral is not None and name not in STATION.parameters:
             assert name in effects, name
 
 
 def test_stand_ins_are_in_the_catalogue():
-    assert set(CATALOGUE) >= STAND_INS
+    assert set(CATALOGUE) >= REPLACING_LAWS
 
 
 def test_names_are_unique_and_none_is_already_in_the_model():
-    names = [suspect.name for suspect in SUSPECTS]
+    names = [candidate.name for candidate in CANDIDATES]
     assert len(names) == len(set(names))
-    for suspect in SUSPECTS:
-        if suspect.effect in STATION.parameters:
+    for candidate in CANDIDATES:
+        if candidate.effect in STATION.parameters:
             # Then it is a number at its neutral value, or a sensor's bandwidth.
-            assert suspect.name != suspect.effect
-            assert len(suspect.paths) == 1
+            assert candidate.name != candidate.effect
+            assert len(candidate.paths) == 1
 
 
-def test_what_a_model_has_is_no_suspect():
+def test_what_a_model_has_is_no_candidate():
     having = STATION.with_effects({"hysteresis": {"force_n": 3.0, "distance_mm": 1.0}})
-    assert "hysteresis" not in {suspect.name for suspect in suspects(having)}
+    assert "hysteresis" not in {candidate.name for candidate in candidate_effects(having)}
 
 
 def test_a_warm_up_needs_repeats_in_order():
     counted = [name for name, effect in CATALOGUE.items() if "repeat" in effect.quantities]
     assert counted
     for orders in (None, [0.0, 0.0]):
-        assert not set(counted) & {each.name for each in suspects(STATION, orders)}
+        assert not set(counted) & {each.name for each in candidate_effects(STATION, orders)}
     for name in counted:
         assert list(BY_NAME[name].own.values()) == [[0.0, 1.0]]
 
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_absent_values_change_nothing(name, trials):
-    shared, suspect = bench(trials), BY_NAME[name]
-    base = shared.evidence(STATION)
+    shared, candidate = fit_problem(trials), BY_NAME[name]
+    base = shared.whitened_residuals(STATION)
     expected = base.readings(base.start)
-    found = shared.probed(STATION, suspect).readings(suspect.absent)
+    found = shared.probed(STATION, candidate).readings(candidate.absent)
     assert found is not None
     for one, other in zip(found, expected, strict=True):
         # An effect with a memory takes other steps: that much is the integrator's tolerance.
@@ -98,81 +98,81 @@ def test_absent_values_change_nothing(name, trials):
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_probes_lie_within_bounds_and_are_each_different(name):
-    suspect = BY_NAME[name]
-    lower, upper = bounds(suspect.paths)
-    assert np.all((suspect.probes >= lower) & (suspect.probes <= upper))
-    assert len({tuple(row) for row in suspect.probes}) == len(suspect.probes)
-    assert not any(np.array_equal(row, suspect.absent) for row in suspect.probes)
-    assert len(suspect.probes) == len(suspect.signs)
-    for probe in range(len(suspect.probes)):
+    candidate = BY_NAME[name]
+    lower, upper = bounds(candidate.paths)
+    assert np.all((candidate.probes >= lower) & (candidate.probes <= upper))
+    assert len({tuple(row) for row in candidate.probes}) == len(candidate.probes)
+    assert not any(np.array_equal(row, candidate.absent) for row in candidate.probes)
+    assert len(candidate.probes) == len(candidate.signs)
+    for probe in range(len(candidate.probes)):
         for factor in (-8.0, -1.0, 0.1, 8.0, 1e6):
-            if factor > 0.0 or suspect.signs[probe]:
-                grown = suspect.grown(probe, factor)
+            if factor > 0.0 or candidate.signs[probe]:
+                grown = candidate.grown(probe, factor)
                 assert np.all((grown >= lower) & (grown <= upper))
                 assert np.isfinite(grown).all()
 
 
 @pytest.mark.parametrize("name", BY_NAME)
 def test_growing_by_one_changes_nothing(name):
-    suspect = BY_NAME[name]
-    for probe, row in enumerate(suspect.probes):
-        np.testing.assert_allclose(suspect.grown(probe, 1.0), row, rtol=1e-12)
+    candidate = BY_NAME[name]
+    for probe, row in enumerate(candidate.probes):
+        np.testing.assert_allclose(candidate.grown(probe, 1.0), row, rtol=1e-12)
 
 
 def test_growing_scales_the_size_and_not_the_shape():
-    suspect = BY_NAME["hysteresis"]
-    size, shape = (suspect.paths.index(f"hysteresis.{p}") for p in ("force_n", "distance_mm"))
-    for probe, row in enumerate(suspect.probes):
-        grown = suspect.grown(probe, 1.5)
+    candidate = BY_NAME["hysteresis"]
+    size, shape = (candidate.paths.index(f"hysteresis.{p}") for p in ("force_n", "distance_mm"))
+    for probe, row in enumerate(candidate.probes):
+        grown = candidate.grown(probe, 1.5)
         assert grown[size] == pytest.approx(1.5 * row[size])
         assert grown[shape] == row[shape]
 
 
 def test_the_opposite_of_a_wave_is_half_a_period_later():
-    suspect = BY_NAME["torque_ripple"]
-    phase = suspect.paths.index("torque_ripple.phase_deg")
-    size = suspect.paths.index("torque_ripple.amplitude_percent")
-    for probe, row in enumerate(suspect.probes):
-        grown = suspect.grown(probe, -0.5)
+    candidate = BY_NAME["torque_ripple"]
+    phase = candidate.paths.index("torque_ripple.phase_deg")
+    size = candidate.paths.index("torque_ripple.amplitude_percent")
+    for probe, row in enumerate(candidate.probes):
+        grown = candidate.grown(probe, -0.5)
         assert grown[size] == pytest.approx(0.5 * row[size])
         assert abs(grown[phase] - row[phase]) == 180.0
         assert np.cos(np.radians(grown[phase])) == pytest.approx(-np.cos(np.radians(row[phase])))
 
 
 def test_a_delay_grows_from_nothing():
-    suspect = BY_NAME["regulator_delay"]
-    delay = suspect.paths.index("regulator_delay.delay_ms")
-    assert suspect.fitted_paths == ["regulator_delay.delay_ms"]
-    for probe, row in enumerate(suspect.probes):
-        assert suspect.grown(probe, 0.5)[delay] == pytest.approx(0.5 * row[delay])
+    candidate = BY_NAME["regulator_delay"]
+    delay = candidate.paths.index("regulator_delay.delay_ms")
+    assert candidate.fitted_paths == ["regulator_delay.delay_ms"]
+    for probe, row in enumerate(candidate.probes):
+        assert candidate.grown(probe, 0.5)[delay] == pytest.approx(0.5 * row[delay])
 
 
 def test_limits_are_looked_for_over_a_range_and_do_not_scale():
     limits = [
-        suspect
-        for suspect in SUSPECTS
-        if len(suspect.paths) == 1 and suspect.absent[0] > FAR * suspect.probes[0, 0]
+        candidate
+        for candidate in CANDIDATES
+        if len(candidate.paths) == 1 and candidate.absent[0] > FAR * candidate.probes[0, 0]
     ]
     assert limits
-    for suspect in limits:
-        assert len(suspect.probes) > 10
-        assert not suspect.amplitudes.any()
-        assert not suspect.signs.any()
+    for candidate in limits:
+        assert len(candidate.probes) > 10
+        assert not candidate.amplitudes.any()
+        assert not candidate.signs.any()
 
 
 def test_beside_another_model_keeps_its_parameters():
     off = STATION.replace(OFF)
-    for suspect in SUSPECTS:
-        beside = suspect.beside(off)
+    for candidate in CANDIDATES:
+        beside = candidate.beside(off)
         assert beside.at_the_door("drive")["gain_n_per_v"] == OFF["drive.gain_n_per_v"]
-        assert suspect.effect in beside.parameters
+        assert candidate.effect in beside.parameters
 
 
 def test_an_effect_of_ones_own_takes_part(catalogue, tmp_path):
     path = tmp_path / "mine.py"
     path.write_text(OWN, encoding="utf-8")
     load_effects(path)
-    assert "swirl" in {suspect.name for suspect in suspects(STATION)}
+    assert "swirl" in {candidate.name for candidate in candidate_effects(STATION)}
     truth = STATION.with_effects({"swirl": {"factor_n_s2_per_mm2": 0.05}})
     found = diagnose(measured(truth, 4), STATION)
     assert [effect.name for effect in found.effects] == ["swirl"]

@@ -6,7 +6,7 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.preparation.whitened_residuals import Evidence
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.localisation import adjusted, localise
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
@@ -44,10 +44,10 @@ def noisy(found: list[Trial], gap=lambda trial: 0.0, seed: int = 0) -> list[Tria
 def localised(made: list[Trial], seed: int = 0):
     model = load_model("serres2008")
     noise = [white_noise(float(level)) for level in LEVELS]
-    evidence = Evidence(model, made, FREE, noise, np.ones(1))
+    whitened = WhitenedResiduals(model, made, FREE, noise, np.ones(1))
     one = np.ones(1)
-    fit = Fitted(model, (), FREE, evidence.start, np.eye(1), 0.0, one, True)
-    return localise(evidence, fit, LEVELS, seed)
+    fit = Fitted(model, (), FREE, whitened.start, np.eye(1), 0.0, one, True)
+    return localise(whitened, fit, LEVELS, seed)
 
 
 def test_noise_alone_lies_nowhere():

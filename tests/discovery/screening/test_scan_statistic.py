@@ -8,10 +8,10 @@ from scipy.signal import lfilter
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.screening.scan_statistic import (
     CHANCE,
-    NO_BURSTS,
+    NO_EXCESS,
     autocorrelation,
-    bursts,
     noise_of,
+    scan_statistic,
     tail,
 )
 
@@ -28,7 +28,7 @@ def noise(seed, memory=0.0):
 
 
 def found(parts, level=1.0, step=0.0):
-    return bursts(list(parts), EDGES, level, step)
+    return scan_statistic(list(parts), EDGES, level, step)
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5, 0.8])
@@ -106,9 +106,9 @@ def test_missing_readings_count_for_nothing_and_few_say_nothing():
     parts[2, 330:334] += BEAT
     parts[2, 331:333] = np.nan
     assert np.isfinite(found(parts).chance)
-    assert found(np.full((PARTS, ROWS), np.nan)) == NO_BURSTS
-    assert bursts([np.ones(60)], [[0, 30, 60]], 1.0, 0.0) == NO_BURSTS
-    assert bursts([100.0 * np.ones(200)], [[0, 200]], 1.0, 0.0) == NO_BURSTS
+    assert found(np.full((PARTS, ROWS), np.nan)) == NO_EXCESS
+    assert scan_statistic([np.ones(60)], [[0, 30, 60]], 1.0, 0.0) == NO_EXCESS
+    assert scan_statistic([100.0 * np.ones(200)], [[0, 200]], 1.0, 0.0) == NO_EXCESS
 
 
 def test_autocorrelation_is_that_of_the_noise():

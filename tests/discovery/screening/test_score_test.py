@@ -1,4 +1,4 @@
-"""Screening: chance is fair, the right suspect stands out, what parameters can do is taken out."""
+"""Score test: chance is fair, the hidden effect stands out, what parameters do is taken out."""
 
 from dataclasses import replace
 
@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from pma_gym.discovery.screening import score_test
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.screening.score_test import Baseline, beginnings, look
-from tests.discovery.laboratory import DELAY, HYSTERESIS, STATION, bench, measured
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.score_test import Baseline, screen, starting_points
+from tests.discovery.laboratory import DELAY, HYSTERESIS, STATION, fit_problem, measured
 
-SUSPECTS = suspects(STATION)
+CANDIDATES = candidate_effects(STATION)
 HIDDEN = {
     "hysteresis": HYSTERESIS,
     "regulator_delay": DELAY,
@@ -22,33 +22,33 @@ HIDDEN = {
 
 @pytest.fixture(scope="module")
 def quiet():
-    """Trials without noise, and what each suspect changes in them."""
-    shared = bench(measured(STATION, 4, rate=32.0, noise=False))
+    """Trials without noise, and what each candidate changes in them."""
+    shared = fit_problem(measured(STATION, 4, rate=32.0, noise=False))
     return shared, Remembered(shared)
 
 
 class Remembered:
-    """Evidence of suspects whose simulations are kept."""
+    """Whitened residuals of candidates whose simulations are kept."""
 
     def __init__(self, shared):
         self.shared, self.kept = shared, {}
 
-    def __call__(self, suspect):
-        evidence = self.shared.probed(STATION, suspect)
+    def __call__(self, candidate):
+        whitened = self.shared.probed(STATION, candidate)
 
         def columns(tried):
-            if suspect.name not in self.kept:
-                self.kept[suspect.name] = type(evidence).columns(evidence, tried)
-            return self.kept[suspect.name]
+            if candidate.name not in self.kept:
+                self.kept[candidate.name] = type(whitened).columns(whitened, tried)
+            return self.kept[candidate.name]
 
-        evidence.columns = columns
-        return evidence
+        whitened.columns = columns
+        return whitened
 
 
 def baseline(shared):
-    evidence = shared.evidence(STATION)
-    steps = 1e-3 * np.maximum(np.abs(evidence.start), 0.01)
-    return Baseline.at(evidence, evidence.start, steps)
+    whitened = shared.whitened_residuals(STATION)
+    steps = 1e-3 * np.maximum(np.abs(whitened.start), 0.01)
+    return Baseline.at(whitened, whitened.start, steps)
 
 
 def with_residual(base, rows):
@@ -66,19 +66,19 @@ def noise(base, seed):
     return [generator.standard_normal(part[0].shape) for part in base.columns]
 
 
-def looks_by_name(looks):
-    return {each.suspect.name: each for each in looks}
+def scores_by_name(scores):
+    return {each.candidate.name: each for each in scores}
 
 
 def test_chance_is_fair(quiet):
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
     least = np.array(
         [
             min(
                 each.p_value
-                for each in look(
-                    with_residual(base, noise(base, seed)), SUSPECTS, seed, evidence_of
+                for each in screen(
+                    with_residual(base, noise(base, seed)), CANDIDATES, seed, whitened_of
                 )
             )
             for seed in range(30)
@@ -92,17 +92,17 @@ def test_chance_is_fair(quiet):
 
 @pytest.mark.parametrize("name", HIDDEN)
 def test_what_is_hidden_stands_out(name):
-    shared = bench(measured(STATION.with_effects(HIDDEN[name]), 4))
-    found = look(baseline(shared), SUSPECTS, 0, lambda s: shared.probed(STATION, s))
+    shared = fit_problem(measured(STATION.with_effects(HIDDEN[name]), 4))
+    found = screen(baseline(shared), CANDIDATES, 0, lambda s: shared.probed(STATION, s))
     best = max(found, key=lambda each: each.gain)
-    assert best.suspect.name == name
+    assert best.candidate.name == name
     assert best.gain > 100
     assert best.change > 0.3
     assert best.probe >= 0 and best.starts[0][0] == best.probe
 
 
 def test_what_parameters_can_do_is_not_an_effects(quiet):
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
     for path in ("drive.gain_n_per_v", "contractile_force.slope_n_per_kpa", "rotor.radius_mm"):
         at = shared.own.free.index(path)
@@ -110,43 +110,43 @@ def test_what_parameters_can_do_is_not_an_effects(quiet):
         size = np.sqrt(sum(np.sum(row**2) for row in shape))
         moved = with_residual(base, [1000.0 * row / size for row in shape])
         # A million of chi-square, of which no effect may take any: the prior holds a little.
-        assert max(each.gain for each in look(moved, SUSPECTS, 0, evidence_of)) < 25.0
+        assert max(each.gain for each in screen(moved, CANDIDATES, 0, whitened_of)) < 25.0
 
 
 def test_what_an_effect_does_is_all_its_own(quiet):
     """A residual that is a probe's change to the letter is explained by factor 1."""
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
-    suspect = next(each for each in SUSPECTS if each.name == "hysteresis")
-    probe = int(np.argmax(suspect.probes[:, 0]))
-    looked = look(base, [suspect], 0, evidence_of)
+    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
+    probe = int(np.argmax(candidate.probes[:, 0]))
+    looked = screen(base, [candidate], 0, whitened_of)
     assert looked[0].gain < 25.0
-    rows = [-part[1 + probe].astype(float) for part in evidence_of.kept["hysteresis"]]
-    found = look(with_residual(base, rows), SUSPECTS, 0, evidence_of)
+    rows = [-part[1 + probe].astype(float) for part in whitened_of.kept["hysteresis"]]
+    found = screen(with_residual(base, rows), CANDIDATES, 0, whitened_of)
     best = max(found, key=lambda each: each.gain)
-    assert best.suspect.name == "hysteresis"
+    assert best.candidate.name == "hysteresis"
     assert best.probe == probe
     assert best.factor == pytest.approx(1.0, rel=1e-3)
 
 
 def test_an_effect_of_one_sign_does_not_explain_its_opposite(quiet):
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
-    suspect = next(each for each in SUSPECTS if each.name == "hysteresis")
-    assert not suspect.signs.any()
-    look(base, [suspect], 0, evidence_of)
-    rows = [part[1].astype(float) for part in evidence_of.kept["hysteresis"]]
-    found = look(with_residual(base, rows), [suspect], 0, evidence_of)[0]
-    towards = look(with_residual(base, [-row for row in rows]), [suspect], 0, evidence_of)[0]
+    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
+    assert not candidate.signs.any()
+    screen(base, [candidate], 0, whitened_of)
+    rows = [part[1].astype(float) for part in whitened_of.kept["hysteresis"]]
+    found = screen(with_residual(base, rows), [candidate], 0, whitened_of)[0]
+    towards = screen(with_residual(base, [-row for row in rows]), [candidate], 0, whitened_of)[0]
     assert found.gain < 0.05 * towards.gain
 
 
 def test_what_no_trial_excites_is_never_resolved(quiet):
     """Pressure of a resting regulator says nothing of its delay."""
     trials = [measured(STATION, 4)[k] for k in (0, 2, 3)]
-    shared = bench(trials)
-    found = looks_by_name(
-        look(baseline(shared), SUSPECTS, 0, lambda suspect: shared.probed(STATION, suspect))
+    shared = fit_problem(trials)
+    found = scores_by_name(
+        screen(baseline(shared), CANDIDATES, 0, lambda candidate: shared.probed(STATION, candidate))
     )
     blind = found["regulator_delay"]
     assert blind.gain == 0.0 and blind.p_value == 1.0 and blind.resolvable is None
@@ -154,12 +154,14 @@ def test_what_no_trial_excites_is_never_resolved(quiet):
 
 
 def test_larger_effects_are_resolved_sooner(quiet):
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
-    plain = looks_by_name(look(base, SUSPECTS, 0, evidence_of))
+    plain = scores_by_name(screen(base, CANDIDATES, 0, whitened_of))
     doubled = replace(shared, trials=[*shared.trials, *shared.trials])
-    twice = looks_by_name(
-        look(baseline(doubled), SUSPECTS, 0, lambda suspect: doubled.probed(STATION, suspect))
+    twice = scores_by_name(
+        screen(
+            baseline(doubled), CANDIDATES, 0, lambda candidate: doubled.probed(STATION, candidate)
+        )
     )
     for name in ("hysteresis", "creep", "regulator_delay"):
         ratio = twice[name].resolvable / plain[name].resolvable
@@ -167,37 +169,37 @@ def test_larger_effects_are_resolved_sooner(quiet):
 
 
 def test_fits_begin_where_most_is_explained():
-    shared = bench(measured(STATION.with_effects(HYSTERESIS), 4))
+    shared = fit_problem(measured(STATION.with_effects(HYSTERESIS), 4))
     base = baseline(shared)
-    suspect = next(each for each in SUSPECTS if each.name == "hysteresis")
-    evidence = shared.probed(STATION, suspect)
-    found = look(base, [suspect], 0, lambda _: evidence)[0]
-    begun = beginnings(base, evidence, found)
-    force = suspect.paths.index("hysteresis.force_n")
+    candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
+    whitened = shared.probed(STATION, candidate)
+    found = screen(base, [candidate], 0, lambda _: whitened)[0]
+    begun = starting_points(base, whitened, found)
+    force = candidate.paths.index("hysteresis.force_n")
     assert begun
     assert 3.0 < begun[0][force] < 12.0
 
 
 def test_the_seed_alone_draws_chance(quiet):
-    shared, evidence_of = quiet
+    shared, whitened_of = quiet
     base = baseline(shared)
     base = with_residual(base, noise(base, 5))
-    one, same, other = (look(base, SUSPECTS, seed, evidence_of) for seed in (1, 1, 2))
+    one, same, other = (screen(base, CANDIDATES, seed, whitened_of) for seed in (1, 1, 2))
     assert [each.p_value for each in one] == [each.p_value for each in same]
     assert [each.p_value for each in one] != [each.p_value for each in other]
     assert [each.gain for each in one] == [each.gain for each in other]
 
 
 def test_probes_change_what_each_does_alone_beside_one_that_has_no_balance():
-    shared = bench(measured(STATION, 2, rate=32.0))
-    evidence = shared.evidence(STATION)
-    tried = np.tile(evidence.start, (4, 1))
+    shared = fit_problem(measured(STATION, 2, rate=32.0))
+    whitened = shared.whitened_residuals(STATION)
+    tried = np.tile(whitened.start, (4, 1))
     # A muscle that pushes holds no load.
     tried[1:, shared.own.free.index("contractile_force.slope_n_per_kpa")] *= [1.01, -4.0, 0.99]
-    assert evidence.columns(tried) is None
-    assert evidence.balanced.tolist() == [True, True, False, True]
-    together = score_test._balanced(evidence, tried)
-    alone = score_test._one_by_one(evidence, tried)
+    assert whitened.columns(tried) is None
+    assert whitened.balanced.tolist() == [True, True, False, True]
+    together = score_test._balanced(whitened, tried)
+    alone = score_test._one_by_one(whitened, tried)
     for ours, theirs in zip(together, alone, strict=True):
         np.testing.assert_allclose(ours, theirs, rtol=1e-6, atol=1e-9)
         assert ours[1].any() and ours[3].any() and not ours[2].any()

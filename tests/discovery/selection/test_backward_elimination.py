@@ -7,17 +7,17 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery import workflow
-from pma_gym.discovery.fitting.free_parameters import own_parameters, values
-from pma_gym.discovery.screening.residuals import relearnt
-from pma_gym.discovery.selection.backward_elimination import fewest
+from pma_gym.discovery.fitting.free_parameters import free_parameters, values
+from pma_gym.discovery.screening.residuals import reestimated_noise
+from pma_gym.discovery.selection.backward_elimination import backward_elimination
 from pma_gym.discovery.verdict import decision
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import (
     STATION,
-    bench,
     commanded,
     diagnosed,
+    fit_problem,
     laboratory,
     measured,
 )
@@ -28,13 +28,13 @@ NAMED = "Parameters that are off: "
 
 def found(model, seed):
     """The fewest parameters that are off in trials of a model, as the station sees them."""
-    shared = bench(measured(model, 4, rate=32.0, seed=seed))
+    shared = fit_problem(measured(model, 4, rate=32.0, seed=seed))
     fit = shared.fit(STATION)
     assert fit is not None
-    shared = replace(shared, noise=relearnt(shared, fit, ()))
+    shared = replace(shared, noise=reestimated_noise(shared, fit, ()))
     fit = shared.fit(fit.model)
     assert fit is not None
-    few = fewest(shared, fit)
+    few = backward_elimination(shared, fit)
     assert few is not None
     return few.fit, fit
 
@@ -74,11 +74,11 @@ def test_what_is_off_is_estimated_more_surely_where_nothing_else_is_free():
 @pytest.mark.parametrize("less", [1e6, np.nan])
 def test_a_given_model_that_explains_too_little_is_not_kept(less):
     """It is looked at as any other, even where no parameter is missed."""
-    shared = bench(measured(STATION, 4, rate=32.0, seed=5))
+    shared = fit_problem(measured(STATION, 4, rate=32.0, seed=5))
     fit = shared.fit(STATION)
     assert fit is not None
-    assert fewest(shared, fit) is not None
-    assert fewest(shared, replace(fit, chi_square=fit.chi_square - less)) is None
+    assert backward_elimination(shared, fit) is not None
+    assert backward_elimination(shared, replace(fit, chi_square=fit.chi_square - less)) is None
 
 
 def said(diagnosis):
@@ -116,7 +116,7 @@ def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
 
 def test_intervals_hold_where_all_numbers_are_a_little_off():
     """Of named parameters some nine in ten, and far more than if the others were exact."""
-    own, held = own_parameters(STATION), []
+    own, held = free_parameters(STATION), []
     for seed in (21, 22, 24, 25, 31, 36):
         chance = np.random.default_rng(seed)
         off = {

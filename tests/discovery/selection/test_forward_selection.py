@@ -7,30 +7,30 @@ import pytest
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.screening.candidates import suspects
-from pma_gym.discovery.screening.residuals import burst_of, remembers
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.residuals import is_autocorrelated, scan_of_fit
 from pma_gym.discovery.selection import forward_selection
 from pma_gym.discovery.selection.candidate_fits import cost, kept_form, restored
 from pma_gym.discovery.selection.forward_selection import ALARM, passes, select
 from pma_gym.plant.plant import Plant
-from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, bench, commanded, laboratory
+from tests.discovery.laboratory import HYSTERESIS, OFF, STATION, commanded, fit_problem, laboratory
 
-SUSPECTS = suspects(STATION)
+CANDIDATES = candidate_effects(STATION)
 
 
 @cache
 def selected(case, seed=0):
     trials = laboratory(case)[0]
-    shared = bench(trials)
+    shared = fit_problem(trials)
     refitted = shared.careful_fit(STATION)
     assert refitted is not None
     journal = Journal(None, trials, STATION, "")
-    return shared, refitted, select(shared, refitted, SUSPECTS, seed, journal, lambda *_: None)
+    return shared, refitted, select(shared, refitted, CANDIDATES, seed, journal, lambda *_: None)
 
 
 def test_hysteresis_is_found_with_its_size():
     _, refitted, found = selected("hysteresis")
-    assert [suspect.name for suspect in found.chosen] == ["hysteresis"]
+    assert [candidate.name for candidate in found.chosen] == ["hysteresis"]
     for path, truth in (("hysteresis.force_n", 6.0), ("hysteresis.distance_mm", 1.0)):
         value, error = found.fit.estimate(path)
         assert abs(value - truth) < 3.0 * error
@@ -58,19 +58,19 @@ def test_nothing_hidden_nothing_found(case):
     assert found.chosen == ()
     assert len(found.stages) == 1
     assert found.stages[0].gate == () and found.stages[0].fits == {}
-    expected = shared.evidence(refitted.model).count
+    expected = shared.whitened_residuals(refitted.model).count
     assert abs(refitted.chi_square - expected) < 5 * np.sqrt(2 * expected)
 
 
 def test_the_chosen_lead_their_rounds():
     _, _, found = selected("hysteresis")
     first = found.stages[0]
-    assert all(passes(first.bench, each, first.missing) for each in first.gate)
+    assert all(passes(first.problem, each, first.missing) for each in first.gate)
     assert first.missing or all(each.p_value <= ALARM for each in first.gate)
-    assert "hysteresis" in {each.suspect.name for each in first.gate}
+    assert "hysteresis" in {each.candidate.name for each in first.gate}
     assert min(first.fits, key=lambda name: cost(first.fits[name])) == "hysteresis"
-    assert [each.gain for each in first.looks] == sorted(
-        (each.gain for each in first.looks), reverse=True
+    assert [each.gain for each in first.scores] == sorted(
+        (each.gain for each in first.scores), reverse=True
     )
 
 
@@ -86,13 +86,13 @@ def test_every_fit_explains_more_than_without():
 def test_what_was_added_is_not_looked_for_again():
     _, _, found = selected("hysteresis")
     assert len(found.stages) == 2
-    assert "hysteresis" not in {each.suspect.name for each in found.stages[1].looks}
+    assert "hysteresis" not in {each.candidate.name for each in found.stages[1].scores}
 
 
 def test_learnt_noise_is_never_less_than_at_rest():
     for case in ("hysteresis", "nothing"):
         shared, _, found = selected(case)
-        for before, after in zip(shared.noise, found.bench.noise, strict=True):
+        for before, after in zip(shared.noise, found.problem.noise, strict=True):
             assert after.level >= before.level
             assert after.level < 1.15 * before.level
 
@@ -111,7 +111,7 @@ def test_a_fit_comes_back_from_its_journal_bit_by_bit():
 
 def test_a_delay_comes_back_from_its_journal_switched_on():
     shared, refitted, _ = selected("hysteresis")
-    delay = next(each for each in SUSPECTS if each.name == "regulator_delay")
+    delay = next(each for each in CANDIDATES if each.name == "regulator_delay")
     fit = shared.fit(refitted.model, (delay,), {"regulator_delay": delay.probes[0]})
     again = restored(kept_form(fit), shared, refitted, (delay,))
     assert again.model.at_the_door("regulator_delay") == fit.model.at_the_door("regulator_delay")
@@ -123,9 +123,9 @@ def test_the_truth_is_hardly_better_than_what_was_found():
     shared, _, found = selected("hysteresis")
     truth = STATION.replace(OFF)
     truth = truth.with_effects(HYSTERESIS)
-    evidence = shared.evidence(truth, found.chosen)
-    begun = np.array([_value(truth, each.path) for each in evidence.free])
-    there = evidence.sums(begun, np.empty(0)).chi_square
+    whitened = shared.whitened_residuals(truth, found.chosen)
+    begun = np.array([_value(truth, each.path) for each in whitened.free])
+    there = whitened.sums(begun, np.empty(0)).chi_square
     fitted = found.stages[0].fits["hysteresis"]
     assert fitted.chi_square < there + 10.0
 
@@ -153,35 +153,35 @@ def taut(effects, rate=128.0):
 
 
 def by_bursts_alone(trials, monkeypatch):
-    """A selection for which no look passes as such."""
+    """A selection for which no score passes the gate."""
     monkeypatch.setattr(forward_selection, "ALARM", -1.0)
-    shared = bench(trials)
+    shared = fit_problem(trials)
     refitted = shared.careful_fit(STATION)
-    assert not remembers(shared, refitted)
+    assert not is_autocorrelated(shared, refitted)
     found = select(
-        shared, refitted, SUSPECTS, 0, Journal(None, trials, STATION, ""), lambda *_: None
+        shared, refitted, CANDIDATES, 0, Journal(None, trials, STATION, ""), lambda *_: None
     )
-    return burst_of(shared, refitted), found
+    return scan_of_fit(shared, refitted), found
 
 
 def readings(trials):
-    return bench(trials).evidence(STATION).count
+    return fit_problem(trials).whitened_residuals(STATION).count
 
 
 def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
     trials = taut({"drive_dead_zone": {"width_n": 5.0, "slope": 2.0}})
-    burst, found = by_bursts_alone(trials, monkeypatch)
-    assert burst.chance < 1e-6 and burst.excess > 300.0
-    assert [suspect.name for suspect in found.chosen] == ["drive_dead_zone"]
-    assert found.stages[0].looks[0].p_value <= burst.chance
-    assert found.stages[0].burst == burst and found.stages[1].burst.excess == 0.0
+    scan, found = by_bursts_alone(trials, monkeypatch)
+    assert scan.chance < 1e-6 and scan.excess > 300.0
+    assert [candidate.name for candidate in found.chosen] == ["drive_dead_zone"]
+    assert found.stages[0].scores[0].p_value <= scan.chance
+    assert found.stages[0].scan == scan and found.stages[1].scan.excess == 0.0
     assert found.fit.estimate("drive_dead_zone.width_n")[0] == pytest.approx(5.0, rel=0.15)
     assert found.fit.chi_square < 1.05 * readings(trials)
 
 
 def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
-    burst, found = by_bursts_alone(taut({}), monkeypatch)
-    assert burst.chance == 1.0 and burst.excess == 0.0
+    scan, found = by_bursts_alone(taut({}), monkeypatch)
+    assert scan.chance == 1.0 and scan.excess == 0.0
     assert found.chosen == () and found.stages[0].gate == ()
 
 
@@ -192,7 +192,7 @@ def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
         rows = slice(200, 264)
         row["load"][rows] += 3.0 * generator.standard_normal(64)
         trials.append(Trial(trial.time, trial.commands, row))
-    burst, found = by_bursts_alone(trials, monkeypatch)
-    assert burst.excess > 300.0
+    scan, found = by_bursts_alone(trials, monkeypatch)
+    assert scan.excess > 300.0
     assert found.chosen == () and found.stages[0].gate == () and found.stages[0].fits == {}
-    assert all(each.p_value > 1e-3 for each in found.stages[0].looks)
+    assert all(each.p_value > 1e-3 for each in found.stages[0].scores)

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.fitting.fit_problem import Bench
-from pma_gym.discovery.fitting.free_parameters import own_parameters
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
 from pma_gym.discovery.preparation.noise import white_noise
-from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.selection import profile_limits
 from pma_gym.discovery.selection.nested_laws import FLAT, nested
 from pma_gym.discovery.selection.profile_limits import limits
@@ -24,7 +24,7 @@ SLIDE = load_model(FROZEN / "driven_slide" / "model.toml")
 STATIC, DYNAMIC, SPEED = (
     f"coulomb_friction.{name}" for name in ("static_n", "dynamic_n", "stribeck_speed_mm_per_s")
 )
-DRY = next(each for each in suspects(SLIDE) if each.name == "coulomb_friction")
+DRY = next(each for each in candidate_effects(SLIDE) if each.name == "coulomb_friction")
 
 
 @cache
@@ -44,7 +44,7 @@ def fit_of(static, dynamic, speed, begun):
     """A fit of such trials with the whole law, begun at values, and on which bench."""
     logs, _ = rubbing(static, dynamic, speed)
     noise = tuple(map(white_noise, (2e-5, 1.0, 1.0, 1.0)))
-    bench = Bench(logs, SLIDE, own_parameters(SLIDE), noise)
+    bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     start = np.array([*begun, *DRY.absent[len(begun) :]])
     found = bench.fit(SLIDE, (DRY,), {DRY.name: start})
     assert found is not None
@@ -74,7 +74,7 @@ def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     """A static friction that hardly falls: the fall's speed is above something, no more."""
     logs, truth = rubbing(12.0, 4.0, 900.0)
     noise = tuple(map(white_noise, (2e-4, 1.0, 1.0, 1.0)))
-    bench = Bench(logs, SLIDE, own_parameters(SLIDE), noise)
+    bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     table = truth.at_the_door("coulomb_friction")
     begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)
     fit = bench.fit(SLIDE, (DRY,), {DRY.name: begun})

@@ -5,9 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pma_gym.discovery.verdict.residual_laws import drawn_laws, residual_law, words
+from pma_gym.discovery.verdict.residual_laws import estimated_laws, residual_law, words
 from pma_gym.discovery.workflow import diagnose
-from tests.discovery.laboratory import BUMP, OFF, STATION, bench, laboratory, measured
+from tests.discovery.laboratory import BUMP, OFF, STATION, fit_problem, laboratory, measured
 
 AT = np.linspace(0.0, 40.0, 9)
 ERRORS = np.full(9, 0.1)
@@ -17,10 +17,10 @@ CONTRACTION = "contraction (mm)"
 
 @cache
 def drawn():
-    shared = bench(laboratory("bump", 4)[0])
+    shared = fit_problem(laboratory("bump", 4)[0])
     refitted = shared.careful_fit(STATION)
     assert refitted is not None
-    return drawn_laws(shared, refitted)
+    return estimated_laws(shared, refitted)
 
 
 def test_the_law_that_is_missing_explains_most():

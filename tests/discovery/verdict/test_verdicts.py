@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.report.verdict_text import sentence
-from pma_gym.discovery.screening.autocorrelation import SURE, Memory
+from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
-from pma_gym.discovery.verdict.residual_fraction import Left
+from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
@@ -129,11 +130,11 @@ def test_what_never_moves_decides_nothing():
     found = standing()
     assert found.verdict == "undecidable"
     assert found.next_experiment is not None
-    assert found.next_experiment.protocol in found.sentence
+    assert found.next_experiment.excitation in found.sentence
     assert found.next_experiment.separates
     moves = found.next_experiment.trial.commands
     assert any(np.ptp(row) > 0.0 for row in moves.values())
-    assert len(found.blind) > 10
+    assert len(found.not_detectable) > 10
 
 
 def test_what_stands_still_does_not_identify_what_moves():
@@ -252,18 +253,18 @@ def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limi
 
 
 def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
-    """Findings of which the best look, or fit, takes `gain` off a chi-square of 1000."""
+    """Findings of which the best score, or fit, takes `gain` off a chi-square of 1000."""
     fit = SimpleNamespace(chi_square=1000.0 - gain)
     stage = SimpleNamespace(
         gate=("some",) if gate else (),
         missing=missing,
-        bench=None,
+        problem=None,
         before=SimpleNamespace(chi_square=1000.0),
         fits={"creep": fit, "filling": SimpleNamespace(chi_square=990.0)} if gate else {},
-        looks=[SimpleNamespace(suspect=SimpleNamespace(name="lvdt_error"), gain=gain)],
+        scores=[SimpleNamespace(candidate=SimpleNamespace(name="lvdt_error"), gain=gain)],
     )
     before = SimpleNamespace(
-        evidence=lambda _: SimpleNamespace(
+        whitened_residuals=lambda _: SimpleNamespace(
             sums=lambda *_: SimpleNamespace(chi_square=1000.0), logged=()
         )
     )
@@ -271,7 +272,7 @@ def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
         stages=(stage,),
         chosen=tuple(SimpleNamespace(name=name) for name in chosen),
         fit=fit,
-        bench=before,
+        problem=before,
     )
     return SimpleNamespace(
         adequacy=Adequacy({}),
@@ -287,12 +288,17 @@ def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
 def same_size(monkeypatch):
     """The scatter of each effect's size, by condition; as many as are in it, in turn."""
     sizes = [{"trial": 0.12, "load": 0.0}, {"trial": 0.0, "load": 0.1}]
-    monkeypatch.setattr(unknown, "spreads", lambda bench, fit, chosen, place: sizes[place])
+    monkeypatch.setattr(
+        unknown, "homogeneity_test", lambda problem, fit, chosen, place: sizes[place]
+    )
     return sizes
 
 
 def test_what_is_within_its_limits_is_not_unknown(same_size):
-    left, law = Left(unknown.MOST_LEFT, unknown.MOST_REMEMBERED), SimpleNamespace(gain=260.0)
+    left, law = (
+        ResidualFraction(unknown.MOST_LEFT, unknown.MOST_REMEMBERED),
+        SimpleNamespace(gain=260.0),
+    )
     found = made_up()
     assert unknown.why_unknown(found, left, [law]) is None
     assert decision.verdict_of(found, None, (), False, False) == "effect"
@@ -301,8 +307,8 @@ def test_what_is_within_its_limits_is_not_unknown(same_size):
 @pytest.mark.parametrize(
     ("left", "why", "figure", "limit"),
     [
-        (Left(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
-        (Left(0.1, 0.5), "remembered", 0.5, unknown.MOST_REMEMBERED),
+        (ResidualFraction(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
+        (ResidualFraction(0.1, 0.5), "remembered", 0.5, unknown.MOST_REMEMBERED),
     ],
 )
 def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):
@@ -315,7 +321,7 @@ def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, f
 
 def test_a_size_that_scatters_is_told_by_where_it_scatters_most(same_size):
     same_size[1].update(pressure=0.2, contraction=0.5)
-    reason = unknown.why_unknown(made_up(("creep", "filling")), Left(0.01, 0.0), [])
+    reason = unknown.why_unknown(made_up(("creep", "filling")), ResidualFraction(0.01, 0.0), [])
     assert (reason.why, reason.of, reason.by) == ("scatters", "filling", "contraction")
     assert (reason.figure, reason.limit) == (0.5, unknown.MOST_SPREAD)
 
@@ -323,7 +329,7 @@ def test_a_size_that_scatters_is_told_by_where_it_scatters_most(same_size):
 @pytest.mark.parametrize(("gain", "limit"), [(200.0, 260.0), (600.0, 690.0)])
 def test_a_law_that_explains_more_is_named_with_both_gains(same_size, gain, limit):
     law = SimpleNamespace(gain=limit + 1.0, name="residual_load")
-    reason = unknown.why_unknown(made_up(gain=gain), Left(0.1, 0.0), [law])
+    reason = unknown.why_unknown(made_up(gain=gain), ResidualFraction(0.1, 0.0), [law])
     assert (reason.why, reason.of) == ("outdone", "residual_load")
     assert (reason.figure, reason.limit, reason.gain) == (law.gain, pytest.approx(limit), gain)
 
@@ -333,11 +339,16 @@ def test_what_remembers_itself_with_nothing_added_is_told_by_its_surest_signal(
     monkeypatch, gate, nearest
 ):
     kept = {"contraction": 7.0, "rotation": 30.0, "load": 40.0, "pressure": 9.0}
-    memories = {
-        name: Memory(0.0 if name == "load" else 0.2, score, 1.0) for name, score in kept.items()
+    autocorrelation_tests = {
+        name: AutocorrelationTest(0.0 if name == "load" else 0.2, score, 1.0)
+        for name, score in kept.items()
     }
-    monkeypatch.setattr(unknown, "memories", lambda bench, fit: memories)
-    reason = unknown.why_unknown(made_up((), gate=gate, missing=True), Left(0.0, 0.0), [])
+    monkeypatch.setattr(
+        unknown, "autocorrelation_tests", lambda problem, fit: autocorrelation_tests
+    )
+    reason = unknown.why_unknown(
+        made_up((), gate=gate, missing=True), ResidualFraction(0.0, 0.0), []
+    )
     assert (reason.why, reason.of) == ("unexplained", "rotation_deg")
     assert (reason.figure, reason.limit) == (30.0, SURE)
     assert (reason.effects, reason.nearest) == ((), nearest)
@@ -345,8 +356,8 @@ def test_what_remembers_itself_with_nothing_added_is_told_by_its_surest_signal(
 
 
 def test_nothing_added_and_nothing_slow_is_for_other_verdicts(same_size):
-    assert unknown.why_unknown(made_up(()), Left(0.0, 0.0), []) is None
-    assert unknown.why_unknown(made_up((), gate=False), Left(1.0, 1.0), []) is None
+    assert unknown.why_unknown(made_up(()), ResidualFraction(0.0, 0.0), []) is None
+    assert unknown.why_unknown(made_up((), gate=False), ResidualFraction(1.0, 1.0), []) is None
 
 
 def test_nothing_is_held_out_of_a_single_trial():
@@ -364,12 +375,12 @@ def test_every_trial_has_its_curves():
         assert np.array_equal(record.measured[:, 2], trial.measurements["load"])
 
 
-def test_every_suspect_is_accounted_for():
+def test_every_candidate_is_accounted_for():
     found = diagnosed("hysteresis")
     assert len(found.candidates) > 25
     assert len({each.name for each in found.candidates}) == len(found.candidates)
     assert all(each.why for each in found.candidates)
-    assert set(found.blind) <= {each.name for each in found.candidates}
+    assert set(found.not_detectable) <= {each.name for each in found.candidates}
 
 
 def _given(path):
@@ -380,7 +391,17 @@ def _given(path):
 def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(same_size):
     # A dead zone with a smooth edge: its size scatters with the pressure by 586 %, to first order.
     same_size[0].update(pressure=5.86)
-    assert unknown.why_unknown(made_up(), Left(0.004, 0.0), []) is None
-    left = Left(2.0 * unknown.DOUBTFUL, 0.0)
+    assert unknown.why_unknown(made_up(), ResidualFraction(0.004, 0.0), []) is None
+    left = ResidualFraction(2.0 * unknown.DOUBTFUL, 0.0)
     reason = unknown.why_unknown(made_up(), left, [])
     assert (reason.why, reason.by, reason.figure) == ("scatters", "pressure", 5.86)
+
+
+def test_old_names_of_the_answer_are_read_with_a_warning():
+    diagnosis = diagnosed("hysteresis")
+    with pytest.warns(DeprecationWarning, match=r"Diagnosis\.blind is now not_detectable") as said:
+        assert diagnosis.blind == diagnosis.not_detectable
+    assert len(said) == 1 and said[0].filename == __file__
+    following = NextExperiment("a ramp", ("creep",), 30.0, 1.0, laboratory("nothing")[0][0])
+    with pytest.warns(DeprecationWarning, match=r"NextExperiment\.protocol is now excitation"):
+        assert following.protocol == "a ramp"

@@ -9,7 +9,7 @@ from pma_gym.data.datasets.dataset import Dataset, NamedTrial, read_dataset
 from pma_gym.data.files.trial_files import TrialWarning
 from pma_gym.data.trial import Trial, TrialError
 from pma_gym.discovery.preparation.data_checks import check_dataset
-from pma_gym.discovery.screening.candidates import suspects
+from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.plant.plant import Plant
 from tests.discovery.preparation.data_checks.logs import GIVEN, checked, log, logs, write
 
@@ -172,14 +172,18 @@ def test_good_data_pass_unchanged(tmp_path):
             assert np.array_equal(values, other.trial.measurements[name])
 
 
-LARGEST = [(each.name, row) for each in suspects(GIVEN, [0, 1, 2]) for row in each.probes[-1:]]
+LARGEST = [
+    (each.name, row) for each in candidate_effects(GIVEN, [0, 1, 2]) for row in each.probes[-1:]
+]
 
 
 @pytest.mark.parametrize(("name", "row"), LARGEST, ids=[name for name, _ in LARGEST])
 def test_missing_physics_is_no_unit(tmp_path, name, row):
     """Every effect of the catalogue at the largest size that is looked for."""
-    suspect = next(each for each in suspects(GIVEN, [0, 1, 2]) if each.name == name)
-    truth = suspect.beside(GIVEN).replace(dict(zip(suspect.paths, map(float, row), strict=True)))
+    candidate = next(each for each in candidate_effects(GIVEN, [0, 1, 2]) if each.name == name)
+    truth = candidate.beside(GIVEN).replace(
+        dict(zip(candidate.paths, map(float, row), strict=True))
+    )
     named = []
     for number, each in enumerate(logs(truth=truth)):
         trial = Trial(

@@ -1,12 +1,13 @@
-"""Every shipped controller can be deep-copied in the middle of a trial and goes on alike."""
+"""What every controller of the registry keeps: its name, its voltages, its copies."""
 
 import copy
+import math
 import pickle
 
 import numpy as np
 import pytest
 
-from controllers import CONTROLLERS
+from controllers import CONTROLLERS, Controller
 from pma_gym.envs import PMAEnv
 
 EXERCISE = "isotonic_exercise"
@@ -27,6 +28,32 @@ def task_for(name):
             continue
         return task
     raise AssertionError(f"{name} does no task")
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_it_has_the_name_of_its_row_and_a_line_that_says_what_it_does(name):
+    controller = CONTROLLERS[name]()
+    assert isinstance(controller, Controller) and controller.name == name
+    assert (type(controller).__doc__ or "").strip()
+
+
+@pytest.mark.parametrize("name", CONTROLLERS)
+def test_its_voltages_are_numbers_and_a_reset_begins_anew(name):
+    controller, env, runs = CONTROLLERS[name](), PMAEnv(task_for(name), pressure_kpa=500), []
+    if getattr(controller, "repetitions", 1) > 1:
+        pytest.skip("learns from trial to trial: its second trial differs on purpose")
+    for _ in range(2):
+        env.reset(seed=5)
+        if hasattr(controller, "receive"):
+            controller.receive(env)
+        controller.reset(env.reference, env.station)
+        volts = []
+        for _ in range(3 if hasattr(controller, "receive") else AFTER):
+            volts.append(float(controller.act(env.measurement, env.time)))
+            env.step(env.action(volts[-1]))
+        runs.append(volts)
+    assert all(math.isfinite(value) and 0.0 <= value <= 10.0 for value in runs[0])
+    assert runs[0] == runs[1]
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)

@@ -45,7 +45,7 @@ OWN_STREAM = 1
 """Third word of the counters of a person's random numbers, 0 for all others."""
 
 
-class Human(NamedTuple):
+class Operator(NamedTuple):
     """A person, in SI.
 
     Attributes:
@@ -73,7 +73,7 @@ class Human(NamedTuple):
     stiffness: float
 
 
-HUMAN_BOUNDS: dict[str, tuple[float, float, str]] = {
+OPERATOR_BOUNDS: dict[str, tuple[float, float, str]] = {
     "strength": (1.0, 600.0, "N m"),
     "effort": (0.0, 5.0, "(of what the exercise takes)"),
     "reaction": (0.0, 2.0, "s"),
@@ -99,17 +99,17 @@ class Population(NamedTuple):
         high: the greatest.
     """
 
-    low: Human
-    high: Human
+    low: Operator
+    high: Operator
 
     @property
-    def typical(self) -> Human:
+    def typical(self) -> Operator:
         """The middle of every range; no phase of the tremor."""
         middle = (0.5 * (low + high) for low, high in zip(self.low, self.high, strict=True))
-        return Human(*middle)._replace(tremor_phase=0.0)
+        return Operator(*middle)._replace(tremor_phase=0.0)
 
     def draw(self, keys: NDArray[np.int64], streams: NDArray[np.int64]) -> NDArray[np.float64]:
-        """People, by counters alone: shape (n, numbers of a `Human`).
+        """People, by counters alone: shape (n, numbers of a `Operator`).
 
         Args:
             keys: two words for each, shape (n, 2).
@@ -119,7 +119,7 @@ class Population(NamedTuple):
         streamed, nothing = streams.astype(np.uint64), np.zeros(len(streams), np.uint64)
         own = nothing + np.uint64(OWN_STREAM)
         shares: list[NDArray[np.float64]] = []
-        for i in range(math.ceil(len(Human._fields) / 4)):
+        for i in range(math.ceil(len(Operator._fields) / 4)):
             counter = nothing + np.uint64(i), streamed, own, nothing
             shares.extend(uniforms(philox(counter, (words[0], words[1]))))
         low, high = np.array(self.low), np.array(self.high)
@@ -127,7 +127,7 @@ class Population(NamedTuple):
 
 
 PACED = Population(
-    low=Human(
+    low=Operator(
         strength=0.6 * TYPICAL_STRENGTH,
         effort=0.75,
         reaction=0.15,
@@ -139,7 +139,7 @@ PACED = Population(
         fatigue=0.3 / 60.0,
         stiffness=0.0,
     ),
-    high=Human(
+    high=Operator(
         strength=1.2 * TYPICAL_STRENGTH,
         effort=1.2,
         reaction=0.3,
@@ -221,7 +221,7 @@ class OperatorState(NamedTuple):
 
 
 def operator_step(
-    human: Human,
+    human: Operator,
     state: OperatorState,
     wish: Any,  # noqa: ANN401
     away: Any,  # noqa: ANN401

@@ -2,8 +2,7 @@
 
 import os
 import signal
-
-from benchmarks.runner.worker import begin_limited, end_limited
+import time
 
 
 class Awkward(Exception):
@@ -36,13 +35,17 @@ def awkward():
     raise Awkward("one", "two")
 
 
-def loops(limit_s):
-    begin_limited("thinking", limit_s)
+def loops():
     while True:
         pass
 
 
-def is_quick():
-    begin_limited("thinking", 30.0)
-    end_limited()
-    return "quick"
+def sleeps(folder, index, seconds):
+    """Leave this process's number, then sleep."""
+    (folder / f"{index}.pid").write_text(str(os.getpid()))
+    time.sleep(seconds)
+    return index
+
+
+def squared(number):
+    return number * number

@@ -1,7 +1,7 @@
 """Order of convergence of the integrator's steps, on a trial without a kink.
 
 Nobody can command the size of a plant's internal steps. Here the very arithmetic of a step, without
-its choice of size, is written as plain Python and marched with sizes that are given.
+its choice of size, is written as plain Python and integrated with sizes that are given.
 """
 
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from pma_gym.codegen.text import python_text
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.integrator.exponential_rosenbrock import Step, step
-from pma_gym.integrator.step_attempt import beginning
+from pma_gym.integrator.step_attempt import step_start
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import parameter_names
@@ -44,12 +44,12 @@ class FixedStep:
 
     def __init__(self, plant: Plant, method: Callable[..., Step] = step) -> None:
         self.plant = plant
-        eq = plant.program.ramped.equations
-        frozen, here = beginning(eq)
+        eq = plant.program.first_order_hold.equations
+        frozen, here = step_start(eq)
         made = method(eq.states, eq.graph.input("step_size", CHANGING), frozen, here)
         moved = {s.value.id: new for s, new in zip(eq.states, made.states, strict=True)}
-        after = substitute([path.after for path in eq.paths], {**frozen, **moved})
-        names = [entry.name for entry in (*eq.states, *eq.paths)]
+        after = substitute([path.after for path in eq.rate_independent_states], {**frozen, **moved})
+        names = [entry.name for entry in (*eq.states, *eq.rate_independent_states)]
         by_name = dict(zip(names, [*made.states, *after], strict=True))
         errors = dict(zip((s.name for s in eq.states), made.errors, strict=True))
         outputs = [by_name[name] for name in plant.states]

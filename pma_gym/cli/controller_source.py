@@ -1,0 +1,96 @@
+"""A controller that a command line names: a class in a file, or in a module."""
+
+import importlib
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Protocol
+
+from pma_gym.envs import Measurement, Reference, StationInfo
+
+
+class ControllerSourceError(ValueError):
+    """A controller that cannot be made; the message says why and how to fix it."""
+
+
+class Runnable(Protocol):
+    """What drives a trial; see `controllers.controller` in a clone."""
+
+    def reset(self, reference: Reference, station: StationInfo) -> None:
+        """Prepare for a trial."""
+        ...
+
+    def act(self, measurement: Measurement, time: float) -> float:
+        """Voltage of the task's actuator (V) for the next control period."""
+        ...
+
+
+def controller_of(source: str) -> Runnable:
+    """The controller of `file.py:Class` or `module:Class`, made without arguments.
+
+    The file or module is run: name none that you do not trust.
+
+    Raises:
+        ControllerSourceError: what is missing, or what its own code raised.
+    """
+    place, _, name = source.rpartition(":")
+    if not place or not name.isidentifier():
+        raise ControllerSourceError(
+            f"a controller is named file.py:Class or module:Class, got {source!r}"
+        )
+    module = _from_file(Path(place)) if place.endswith(".py") else _imported(place)
+    made = getattr(module, name, None)
+    if not isinstance(made, type):
+        raise ControllerSourceError(f"{place} has no class {name!r}; it has {_classes(module)}")
+    try:
+        controller: Any = made()
+    except Exception as error:
+        raise ControllerSourceError(
+            f"cannot make {source}: {name}() raised {type(error).__name__}: {error}; a controller "
+            "needs no arguments"
+        ) from error
+    missing = [method for method in ("reset", "act") if not callable(getattr(made, method, None))]
+    if missing:
+        raise ControllerSourceError(
+            f"{source} is no controller: it has no method {' and no method '.join(missing)}; give "
+            "it reset(reference, station) and act(measurement, time)"
+        )
+    return controller
+
+
+def _from_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise ControllerSourceError(f"there is no file {path}; check the name and the folder")
+    name = f"watched_{path.resolve().as_posix()}"
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    # A dataclass looks up its module by name.
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        del sys.modules[name]
+        raise ControllerSourceError(
+            f"cannot import {path}: {type(error).__name__}: {error}"
+        ) from error
+    return module
+
+
+def _imported(name: str) -> ModuleType:
+    # A console script has not the folder that it is called in on its path.
+    if "" not in sys.path:
+        sys.path.insert(0, "")
+    try:
+        return importlib.import_module(name)
+    except Exception as error:
+        raise ControllerSourceError(
+            f"cannot import {name}: {type(error).__name__}: {error}; a file is named with its "
+            f"ending, {name}.py:Class"
+        ) from error
+
+
+def _classes(module: ModuleType) -> str:
+    names = [n for n, one in vars(module).items() if isinstance(one, type) and n[0] != "_"]
+    return ", ".join(names) or "no class"

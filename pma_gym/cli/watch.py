@@ -1,0 +1,131 @@
+"""`pma-gym watch`: a trial in a window at real time, or as a film."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from pma_gym.cli.controller_source import controller_of
+from pma_gym.cli.film import FILMS, write_film
+from pma_gym.cli.terminal import read
+from pma_gym.data.trial import TrialError
+from pma_gym.engine.options import parse_pressure
+from pma_gym.envs import PMAEnv
+from pma_gym.files import OutputError, check_output
+
+Voltage = Callable[[PMAEnv], float]
+"""Voltage of the task's actuator (V) for the next control step."""
+
+FILM_RATE_HZ = 25.0
+"""Pictures of a film a second."""
+
+SWING_V, SWING_S = 3.0, 5.0
+"""Without a controller the voltage rises by so much (V) and falls again in so long (s)."""
+
+
+def watch(
+    controller: Annotated[
+        str | None,
+        typer.Option(
+            help="file.py:Class, module:Class, or a file of commands (CSV, XLSX...); without one "
+            "the voltage rises and falls slowly."
+        ),
+    ] = None,
+    task: Annotated[str, typer.Option(help="Name of a task.")] = "displacement",
+    pressure: Annotated[float, typer.Option(help="Gauge pressure at the start (kPa).")] = 300.0,
+    model: Annotated[str, typer.Option(help="Shipped name or TOML file.")] = "station",
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the noise and of what is drawn.")] = 0,
+    video: Annotated[
+        Path | None, typer.Option(help="Write a film instead: a file ending in .mp4 or .gif.")
+    ] = None,
+    width: Annotated[int, typer.Option(help="Width of the picture (pixels).")] = 800,
+) -> None:
+    """Watch a trial in a window at real time, or write it as a film.
+
+    Example: pma-gym watch --task rotation --controller controllers:PID --video pid.gif
+    """
+    if video is not None:
+        _check_film(video)
+    env = PMAEnv(
+        task,
+        "human" if video is None else "rgb_array",
+        width,
+        model=model,
+        pressure_kpa=parse_pressure(pressure),
+    )
+    chosen = _voltages(controller, env)
+    env.reset(seed=seed)
+    frames = _run(env, chosen(env), filmed=video is not None)
+    summary = {} if env.window_closed else env.episode_summary()
+    env.close()
+    if video is not None:
+        write_film(video, frames, FILM_RATE_HZ)
+        print(f"{len(frames)} pictures, {len(frames) / FILM_RATE_HZ:g} s: {video}")
+    for name, value in summary.items():
+        if name.startswith("rmse_") and isinstance(value, float):
+            print(f"{name} {value:.4g}")
+
+
+def _check_film(video: Path) -> None:
+    """Refuse a film that could not be written, before the trial is run."""
+    if video.suffix.lower() not in FILMS:
+        raise OutputError(
+            f"cannot write {video}: a film ends in {' or '.join(FILMS)}; name it "
+            f"{video.stem or 'film'}.gif"
+        )
+    check_output(video)
+
+
+def _run(env: PMAEnv, volts: Voltage, filmed: bool) -> list[np.ndarray]:
+    """Run the episode to its end, or until the window is closed; pictures, if it is filmed."""
+    frames: list[np.ndarray] = []
+    over = False
+    while not over and not env.window_closed:
+        if filmed and env.time * FILM_RATE_HZ >= len(frames) - 1e-6:
+            frames.append(env.picture())
+        *_, terminated, truncated, _ = env.step(env.action(volts(env)))
+        over = terminated or truncated
+    if filmed:
+        frames.append(env.picture())
+    return frames
+
+
+def _voltages(source: str | None, env: PMAEnv) -> Callable[[PMAEnv], Voltage]:
+    """What makes the voltages, given the environment once it has begun."""
+    if source is None:
+        return lambda begun: _swing(begun.regulator_voltage)
+    if ":" in source.replace(":\\", ""):
+        controller = controller_of(source)
+
+        def prepared(begun: PMAEnv) -> Voltage:
+            controller.reset(begun.reference, begun.station)
+            return lambda now: float(controller.act(now.measurement, now.time))
+
+        return prepared
+    return lambda begun: _commands(Path(source), begun)
+
+
+def _swing(rest_voltage: float) -> Voltage:
+    """A voltage that rises and falls; the regulator's from where it holds the pressure."""
+
+    def volts(env: PMAEnv) -> float:
+        start = rest_voltage if env.task.actuator == "regulator" else 0.0
+        size = SWING_V if start == 0.0 else 0.2 * SWING_V
+        return start + 0.5 * size * (1.0 - math.cos(2.0 * math.pi * env.time / SWING_S))
+
+    return volts
+
+
+def _commands(path: Path, env: PMAEnv) -> Voltage:
+    """Voltages of the actuator from a command file, linear between its rows."""
+    trial, name = read(path), f"{env.task.actuator}_voltage"
+    if name not in trial.commands:
+        raise TrialError(
+            f"{path} commands {', '.join(trial.commands)}, but task {env.task.name} moves the "
+            f"{env.task.actuator}: give a column {name}_v, or another --task"
+        )
+    column = trial.commands[name]
+    return lambda now: float(np.interp(now.time, trial.time, column))
