@@ -111,9 +111,9 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
         "98 % of the gap closed",
         "Now:        Use the refitted model, model.toml; no new effect is needed.",
         "            Check on the rig why drive.gain_n_per_v differs.",
-        "            These trials would not have shown creep. To rule that out, run next.csv on "
-        "the rig (staircase; 90 s), save its log into the data set under a name of its own, and "
-        "diagnose again.",
+        "            These trials cannot show creep. To rule that out, run next.csv on "
+        "the rig (staircase; 90 s), save its log into the data set under a new name, and diagnose "
+        "again.",
         "Written to lab-diagnosis: diagnosis.json, report.html, next.csv, trials.toml, model.toml",
     ]
 

@@ -14,16 +14,10 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("pma_gym", "controllers", "benchmarks")
 
-STILL_THERE = (
-    ("benchmarks.measured.job", "benchmarks.measured.pages", "benchmarks.measured.tables"),
-    (
-        "controllers",
-        "controllers.policies.adapter",
-        "controllers.policy",
-        "controllers.policy_with_ilc",
-    ),
-)
-"""Circles of two packages that are being moved; each leaves this list with its last import."""
+STILL_THERE = {
+    ("benchmarks.measured.job", "benchmarks.measured.pages", "benchmarks.measured.tables")
+}
+"""Circles of a package that is being moved; the list only shrinks."""
 
 
 def module_files(root: Path) -> dict[str, Path]:
@@ -70,7 +64,7 @@ def circles(root: Path) -> list[tuple[str, ...]]:
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    assert circles(ROOT) == sorted(STILL_THERE)
+    assert set(circles(ROOT)) <= STILL_THERE
 
 
 def test_imports_for_types_and_in_functions_count(tmp_path):

@@ -101,7 +101,7 @@ def switches(plant: Plant, zero: float) -> list[NDArray[np.float64]]:
 
     They are the slide's velocity, and the stretch of the cable beyond its slack.
     """
-    if plant.model.plant != "station":
+    if not plant.model.rig.balances_loads:
         return []
     part, at = plant.model.parameters, plant.states.index
     turning, tightness = np.zeros((2, len(plant.states) + 1))

@@ -64,7 +64,7 @@ def parse_recipe(given: Mapping[str, Any], model: str) -> Recipe:
     Raises:
         RecipeError: a model or an effect that cannot be drawn so.
     """
-    if load_model(model).plant != "station":
+    if not load_model(model).rig.balances_loads:
         raise RecipeError(f"stations are drawn about the model of a station, {model} is none")
     return Recipe(
         model=model,

@@ -140,7 +140,7 @@ def table_rows(model: Model, seed: int, only: str) -> list[Job]:
         for rate, delay in LOOPS
         for task, pressures in PRESSURES_KPA.items()
         # A cascade has no muscle that a load could be held against.
-        if model.plant == "station" or EVERY_TASK[task].actuator == "motor"
+        if model.rig.balances_loads or EVERY_TASK[task].actuator == "motor"
         for controller in CONTROLLERS
         for pressure in pressures
     ]

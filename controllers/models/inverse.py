@@ -62,7 +62,7 @@ def inverse_of(model: Model, actuator: str = "motor") -> Inverse:
     plant = Plant(model)
     if actuator == "regulator":
         return ContractionInverse(plant)
-    return StationInverse(plant) if model.plant == "station" else CascadeInverse(plant)
+    return StationInverse(plant) if model.rig.balances_loads else CascadeInverse(plant)
 
 
 class StationInverse:

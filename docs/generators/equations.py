@@ -2,22 +2,24 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 from generators.text import code, sections, table
 from pma_gym.effects.effect import Effect, signals
-from pma_gym.plant.model import PLANTS, Model, load_model
+from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.notation import Names, Notation
+from pma_gym.plant.rigs import RIGS
 
 
 def equations(plant: str) -> str:
     """What a plant's module says of its balances."""
-    return sections(PLANTS[plant])[""].partition("\n\n")[2]
+    return sections(import_module(RIGS[plant].write_equations.__module__))[""].partition("\n\n")[2]
 
 
 def ports(plant: str) -> str:
     """The plant's ports and what becomes of the effects there."""
-    rows = [[code(name), port.takes, port.result] for name, port in PLANTS[plant].PORTS.items()]
+    rows = [[code(name), port.takes, port.result] for name, port in RIGS[plant].ports.items()]
     return table(["Port", "Takes", "What the effects there give"], rows)
 
 

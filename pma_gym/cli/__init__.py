@@ -125,7 +125,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 def _doubts(model: Model, trial: Trial) -> list[str]:
     """Where a simulated trial leaves what the model was identified on, or what a rig endures."""
     doubts = []
-    if model.plant == "slide":
+    if not model.rig.has_muscle:
         # It has neither a pressure nor limits of its own.
         return doubts
     valid = model.parameters["validity"]

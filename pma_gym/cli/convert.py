@@ -70,7 +70,7 @@ def _checked(folder: Path, model: Model) -> list[str]:
         for warning in caught
         if "unknown columns are ignored" not in str(warning.message)
     ]
-    if model.plant not in ("station", "slide"):
+    if not model.rig.is_diagnosable:
         return said
     from pma_gym.discovery.preparation.data_checks import check_dataset
 

@@ -168,7 +168,7 @@ def _inputs(
 
         load_effects(path)
     given = load_model(model or trials.model or DEFAULT_MODEL)
-    if given.plant in ("station", "slide"):
+    if given.rig.is_diagnosable:
         from pma_gym.discovery.preparation.data_checks import check_dataset
 
         trials = check_dataset(trials, given, stop=checks)

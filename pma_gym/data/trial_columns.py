@@ -76,8 +76,8 @@ class Column:
     def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in file units that `to_si` takes back to the same bits, where such values exist.
 
-        The one with fewest digits is chosen, so that 25.3 mm is written 25.3; where no double at
-        the door stands for exactly this one in SI, the result reads back 1 ulp off.
+        The one with fewest digits is chosen, so that 25.3 mm is written 25.3; where no double
+        in file units stands for exactly this one in SI, the result reads back 1 ulp off.
         """
         nearest = values / SI_FACTORS[self.unit]
         chosen = nearest.copy()

@@ -26,7 +26,7 @@ from pma_gym.discovery.fitting.trial_states import misfits, trial_states
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
 from pma_gym.discovery.report.approximate_text import why_approximate
 from pma_gym.discovery.report.range_text import widened_ranges
-from pma_gym.discovery.report.records import floors_at_the_door, gaps, judgements, trial_records
+from pma_gym.discovery.report.records import floors_in_file_units, gaps, judgements, trial_records
 from pma_gym.discovery.report.verdict_text import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.screening.localisation import localise
 from pma_gym.discovery.screening.residuals import residuals
@@ -122,7 +122,7 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
         ),
         law=residual_law(laws[0]) if unknown is not None and telling(findings, laws) else None,
         tones=tones(findings) if verdict == "unknown" else {},
-        floors=floors_at_the_door(findings),
+        floors=floors_in_file_units(findings),
         adequacy=judgements(findings),
         trials=records,
         states=states,

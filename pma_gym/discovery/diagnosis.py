@@ -44,7 +44,7 @@ class TrialState:
 Verdict = Literal["effect", "parameters", "agrees", "unknown", "undecidable"]
 """`effect`: the catalogue has what is missing. `parameters`: known parameters were off. `agrees`:
 nothing beyond noise. `unknown`: structure is missing that no effect of the catalogue carries.
-`undecidable`: these data cannot tell."""
+`undecidable`: these data do not decide."""
 
 ADDED = "added to the model"
 """Why a candidate is where it is, if it is in the proposed model."""
@@ -52,7 +52,7 @@ ADDED = "added to the model"
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter's value with its 95 % interval, in its unit at the door.
+    """A parameter's value with its 95 % interval, in its file unit.
 
     Attributes:
         value: the value.
@@ -91,7 +91,7 @@ class Place:
     """Where simulation and data disagree, before anything was refitted but parameters.
 
     Attributes:
-        signal: name of the measurement at the door, `contraction_mm`.
+        signal: column name of the measurement, `contraction_mm`.
         region: where, in words.
         share_of_gap: share of the signal's unexplained mean square that lies there.
         p_value: of so much there by chance, adjusted for all regions that were looked at.
@@ -126,8 +126,8 @@ class NamedEffect:
         name: its name in the catalogue.
         confused_with: other candidates that explain these data as well.
         p_value: family-wise over the whole catalogue.
-        parameters: estimates by name at the door.
-        undetermined: parameters without an estimate, by name at the door (`nested_laws`).
+        parameters: estimates by column name.
+        undetermined: parameters without an estimate, by column name (`nested_laws`).
     """
 
     name: str
@@ -166,7 +166,7 @@ class Approximate:
 
 @dataclass(frozen=True)
 class Gap:
-    """How far simulation and measurement of one signal lie apart (root mean square, at the door).
+    """How far simulation and measurement of one signal lie apart (root mean square, file units).
 
     Attributes:
         before: the model as it was given.
@@ -277,7 +277,7 @@ class TrialRecord:
         before: simulated by the model as it was given.
         parameters: by the model with its parameters refitted.
         after: by the amended model; from a fit that had not seen the trial where `held_out`.
-        gaps: by signal at the door.
+        gaps: by column name.
         held_out: see `after`.
         file: the log that it is a piece of, or its own name.
     """
@@ -298,7 +298,7 @@ class Map:
     """A signal's residual over two conditions, for the report.
 
     Attributes:
-        signal: at the door.
+        signal: column name.
         x_name: what runs along x, with unit.
         y_name: along y.
         x_edges: shape (n + 1,).
@@ -320,10 +320,10 @@ class Floor:
     """The noise of one signal and where it is known from.
 
     Attributes:
-        value: standard deviation at the door.
+        value: standard deviation in file units.
         source: `repeats`, `rest segments`, `autoregression` or `the model's sensor`.
         by_source: what each source that there was says.
-        step: smallest step between readings (quantisation), at the door; 0 if none shows.
+        step: smallest step between readings (quantisation), in file units; 0 if none shows.
         memory: coefficients of the autoregression that whitens it.
     """
 
@@ -368,7 +368,7 @@ class Diagnosis:
         effects: what is missing; empty unless the verdict is `effect`.
         parameters: the model's own parameters that moved, by path; where nothing but parameters is
             off, only those that are named.
-        gap: by signal at the door, over all trials.
+        gap: by column name, over all trials.
         candidates: the whole catalogue, the likeliest first.
         next_experiment: what to measure next, where that would tell more.
         model: the amended model.
@@ -380,8 +380,8 @@ class Diagnosis:
         law: the residual law, where the verdict is `unknown` or the law of an effect approximate,
             and one explains enough.
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
-            rings, for those that do.
-        floors: noise by signal at the door.
+            oscillates, for those that do.
+        floors: noise by column name.
         adequacy: what is left of each signal, by its column.
         states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
         written: misfit of the amended model with these, over all trials, by column in its unit:

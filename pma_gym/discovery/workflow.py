@@ -104,7 +104,7 @@ def refit(
 
     Arguments and errors as `diagnose`. The verdict is `parameters` or `agrees` where the residual
     of readings left out is noise, `unknown` where parameters alone do not explain the readings, and
-    `undecidable` where the trials cannot tell.
+    `undecidable` where the trials do not decide.
     """
     with linear_algebra_alone():
         return _Work(trials, model, seed, jobs, journal, progress, checks=checks).run(search=False)
@@ -187,7 +187,7 @@ class _Work:
         if not asked.trials:
             raise TrialError("a diagnosis needs at least one trial; give measured trials")
         model = load_model(self.wanted or asked.model or DEFAULT_MODEL)
-        if model.plant not in ("station", "slide"):
+        if not model.rig.is_diagnosable:
             raise ModelError(
                 f"model {model.name} is a {model.plant}; a diagnosis needs a station or a slide, "
                 "the balance of forces that effects act on; give serres2008, station or one made "

@@ -273,13 +273,13 @@ def rig_model(task: Task, options: Options) -> Model:
         ValueError: a cascade where there must be a station.
     """
     model = load_model(options.model)
-    if model.plant == "slide":
+    if not model.rig.has_muscle:
         raise ValueError(
             f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
             "which has no muscle; take station or serres2008"
         )
     operated = options.disturbing.operator_force != 0.0
-    if model.plant != "station" and (operated or task.load or task.exercise):
+    if not model.rig.balances_loads and (operated or task.load or task.exercise):
         what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
         held = "plays an operator" if task.exercise else "holds a load"
         why = "somebody pulls at its slide" if operated else f"the motor {held}"
@@ -295,7 +295,7 @@ def rig_model(task: Task, options: Options) -> Model:
 
 def nominal_model(task: Task, model: Model) -> Model:
     """The nominal model that controllers receive: with a leg on its lever in an exercise."""
-    if task.exercise is None or "leg" in model.parameters or model.plant != "station":
+    if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
         return model
     leg = CATALOGUE["leg"]
     usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}

@@ -9,7 +9,7 @@ from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import OUTPUTS
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
 
@@ -51,8 +51,7 @@ class Logged:
         nothing = np.full(len(trial.time), np.nan)
         measured = np.stack([trial.measurements.get(name, nothing) for name in OUTPUTS])
         absent = np.isnan(measured) | _at_an_end(measured)
-        silent = getattr(PLANTS[model.plant], "SILENT", ())
-        absent |= np.isin(OUTPUTS, silent)[:, None]
+        absent |= np.isin(OUTPUTS, model.rig.absent_outputs)[:, None]
         if absent.all():
             raise ValueError(f"trial {number} has no measurements to fit a model to")
         return cls(

@@ -128,7 +128,7 @@ class Residuals:
         self.balanced: NDArray[np.bool_] = np.ones(1, bool)
         self._own: list[tuple[int, Array]] = []
         self._begun: list[tuple[int, Array]] = []
-        if self.plant.model.plant == "slide":
+        if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
             paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
             self._begun = self._places({path: list(row) for path, row in paths.items()})

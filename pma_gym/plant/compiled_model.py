@@ -1,9 +1,12 @@
 """A model's compiled equations of motion: rates and outputs of given states."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
+from pma_gym.effects import Effect
+from pma_gym.effects.effect import Parameters
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.program import program, table, vector
@@ -59,6 +62,16 @@ class CompiledModel:
     def __reduce__(self) -> "tuple[type[CompiledModel], tuple[Model, float]]":
         """Copy and pickle by construction: compiled functions belong to their process."""
         return type(self), (self.model, self.tolerance)
+
+    @property
+    def effects(self) -> Mapping[str, Effect]:
+        """The model's effects by name."""
+        return self.model.effects
+
+    @property
+    def parameters(self) -> Mapping[str, Parameters]:
+        """The effects' parameters (SI) by name."""
+        return self.model.parameters
 
     def regulator_voltage(self, pressure: float) -> float:
         """Regulator voltage (V) that settles at a pressure (Pa).

@@ -5,9 +5,7 @@ effects that a model has fill the ports. What comes out is traced arithmetic, fr
 code, Python text and derivatives are made.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from pma_gym.codegen.graph import Value
@@ -18,32 +16,6 @@ from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, R
 
 LAG_SHARE = 5.0
 """Tolerance of a sensor's lag beside that of its output, which it follows where that is slow."""
-
-
-@dataclass(frozen=True)
-class Port:
-    """A place where effects act on a plant.
-
-    Attributes:
-        result: what the effects there contribute, and what becomes of it.
-        least: fewest effects that it takes.
-        most: most effects that it takes.
-        only: names of the effects that it takes; any of this port if empty.
-    """
-
-    result: str
-    least: int = 0
-    most: float = math.inf
-    only: tuple[str, ...] = ()
-
-    @property
-    def takes(self) -> str:
-        """How many effects it takes, or which, in words."""
-        if self.only:
-            return " and ".join(self.only)
-        if self.most == 1:
-            return "exactly one effect" if self.least else "at most one effect"
-        return f"{self.least} or more effects"
 
 
 class PlantEquations(Equations):

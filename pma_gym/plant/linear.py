@@ -131,7 +131,7 @@ def _holding_voltage(plant: CompiledModel, regulator: float, contraction: float)
 
 def _strongest(plant: CompiledModel, regulator: float) -> float:
     """Highest motor voltage whose load the muscle balances within its stroke."""
-    if plant.model.plant == "cascade":
+    if not plant.model.rig.balances_loads:
         return 10.0
     state = equilibrium_at(plant, 0.0, regulator).state
     most = static_force(plant, state)(-plant.model.parameters["limits"].stretch)

@@ -16,13 +16,11 @@ from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
 from pma_gym.limits import LimitError
-from pma_gym.plant.composition import Port
-from pma_gym.plant.rigs import cascade, slide, station
+from pma_gym.plant.rigs import RIGS, Port, Rig
 from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1
 _shown = reprlib.repr
-PLANTS = {"station": station, "cascade": cascade, "slide": slide}
 _HEAD = ("schema", "name", "title", "plant")
 
 
@@ -52,7 +50,7 @@ class Model:
     Attributes:
         name: short name.
         title: one line for people.
-        plant: `station`, `cascade` or `slide`.
+        plant: name of its rig: `station`, `cascade` or `slide`.
         parameters: NamedTuple of parameters (SI) by effect name, in catalogue order.
         notes: source and interval by `effect.parameter_unit`.
     """
@@ -81,6 +79,11 @@ class Model:
     def effects(self) -> dict[str, Effect]:
         """The model's effects by name, in catalogue order."""
         return {name: CATALOGUE[name] for name in self.parameters}
+
+    @property
+    def rig(self) -> Rig:
+        """The rig that the model is of."""
+        return RIGS[self.plant]
 
     def vector(self) -> np.ndarray:
         """All parameters in SI as one flat array, in the order the compiled plant reads them."""
@@ -342,26 +345,25 @@ def _known(effect: str) -> Effect:
 
 
 def _check_ports(model: Model) -> None:
-    if model.plant not in PLANTS:
-        raise ModelError(f"plant must be one of {', '.join(PLANTS)}, got {model.plant!r}")
-    plant = PLANTS[model.plant]
+    if model.plant not in RIGS:
+        raise ModelError(f"plant must be one of {', '.join(RIGS)}, got {model.plant!r}")
+    rig = model.rig
     for name, effect in model.effects.items():
         known = effect.port == "part" or effect.port.startswith("sensor:")
-        if not known and effect.port not in plant.PORTS:
+        if not known and effect.port not in rig.ports:
             raise ModelError(
-                f"[{name}] acts at port {effect.port}, which a {model.plant} does not have; "
-                f"its ports: {', '.join(plant.PORTS)}"
+                f"[{name}] acts at port {effect.port}, which a {rig.name} does not have; "
+                f"its ports: {', '.join(rig.ports)}"
             )
-        refused = getattr(plant, "REFUSED", {})
-        if name in refused:
-            raise ModelError(f"a {model.plant} cannot have [{name}]: {refused[name]}")
-    for part in plant.PARTS:
+        if name in rig.refused_effects:
+            raise ModelError(f"a {rig.name} cannot have [{name}]: {rig.refused_effects[name]}")
+    for part in rig.parts:
         if part not in model.parameters:
             doors = ", ".join(CATALOGUE[part].names_at_the_door())
-            source = {"station": "serres2008", "cascade": "cascade"}.get(model.plant)
-            where = f"copy it from the shipped model {source}" if source else f"it has {doors}"
-            raise ModelError(f"a {model.plant} needs [{part}]; {where}")
-    for name, port in plant.PORTS.items():
+            example = rig.shipped_example
+            where = f"copy it from the shipped model {example}" if example else f"it has {doors}"
+            raise ModelError(f"a {rig.name} needs [{part}]; {where}")
+    for name, port in rig.ports.items():
         _check_port(model, name, port)
 
 

@@ -13,7 +13,7 @@ from pma_gym.codegen.rebinding import rebind
 from pma_gym.effects.effect import Effect, Parameters
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 
 
 class Names:
@@ -58,7 +58,7 @@ class Notation(PlantEquations):
         self.outputs: Any = {}
         self.travelled: Any = None
         self.roads: dict[str, Effect] = {}
-        rebind(PLANTS[model.plant].write_equations, {"trace": self.apply})(self)
+        rebind(model.rig.write_equations, {"trace": self.apply})(self)
 
     @abstractmethod
     def apply(self, law: Callable, *arguments: Any) -> Any:  # noqa: ANN401

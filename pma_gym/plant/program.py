@@ -5,7 +5,7 @@ as a vector when they run. So a drawn station, or a fit's next guess, compiles n
 """
 
 import ctypes
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -34,7 +34,7 @@ from pma_gym.integrator.integration import memory
 from pma_gym.integrator.system import System, rates, step_start_values
 from pma_gym.integrator.trial_kernel import write_simulate
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 from pma_gym.plant.system import static_force, system
 
 FIRST_S = 7e-4
@@ -72,10 +72,13 @@ class Program:
         model: the model it was made for.
         states: names of states and memories, in the order of the state vector.
         outputs: names of the true outputs.
+        places: where a model's vector has which number; the tolerance comes first.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
+        names = ["tolerance", *parameter_names(model)]
+        self.places: Mapping[str, int] = {name: i for i, name in enumerate(names)}
         # Briefly: a candidate of a diagnosis is compiled for a second or two of simulation.
         key = ["plant", *self.key()]
         self.library = compiled(key, self._build, f"plant {model.name}", brief=True)
@@ -88,11 +91,6 @@ class Program:
     def key(self) -> list[str]:
         """What the compiled functions depend on, beside this package's text."""
         return structure(self.model)
-
-    @cached_property
-    def places(self) -> dict[str, int]:
-        """Where a model's vector has which number; the tolerance comes first."""
-        return {name: i for i, name in enumerate(["tolerance", *parameter_names(self.model)])}
 
     @cached_property
     def zero_order_hold(self) -> System:
@@ -108,7 +106,7 @@ class Program:
     def equations(self) -> PlantEquations:
         """The equations with commands held, without the arithmetic of a step."""
         equations = PlantEquations(self.model.effects, self.model.parameters)
-        PLANTS[self.model.plant].write_equations(equations)
+        self.model.rig.write_equations(equations)
         return equations
 
     @cached_property
@@ -122,7 +120,7 @@ class Program:
         self.table = get("table", [pointer, pointer])
         self.derivative = get("derivative", [whole, *[pointer] * 3, whole, pointer])
         self.observe = get("observe", [whole, pointer, real, pointer, pointer])
-        if self.model.plant == "station":
+        if self.model.rig.balances_loads:
             self.balance = get("balance", [whole, pointer, pointer, pointer, whole, pointer])
         self.table_size = int(get("table_size", [], whole)())
 
@@ -131,7 +129,7 @@ class Program:
         self._table(module)
         self._derivative(module)
         self._observe(module)
-        if self.model.plant == "station":
+        if self.model.rig.balances_loads:
             self._balance(module)
         return module
 

@@ -8,7 +8,7 @@ from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
 _ROUNDING = 1e-9
@@ -81,9 +81,9 @@ def measure(
     readings = lagged
     if generator is not None:
         readings = read(lagged, noise_levels(model), generator.standard_normal(lagged.shape))
-    silent = getattr(PLANTS[model.plant], "SILENT", ())
+    absent = model.rig.absent_outputs
     names = [name for name, _ in SENSORS.values()]
-    return {name: readings[:, i] for i, name in enumerate(names) if name not in silent}
+    return {name: readings[:, i] for i, name in enumerate(names) if name not in absent}
 
 
 def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
@@ -98,7 +98,7 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     if two_way is not None:
         drive, least = two_way, -np.inf
     motor = _voltage(trial, "motor_voltage", "load_command", drive, least)
-    if model.plant == "slide":
+    if not model.rig.has_muscle:
         return motor, np.zeros(len(motor))
     return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
 

@@ -7,16 +7,15 @@ from pma_gym.integrator.integration import Layout
 from pma_gym.integrator.step_attempt import step_attempt
 from pma_gym.integrator.system import System, step_start_values
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 
 
 def system(model: Model, interpolation: Interpolation) -> System:
     """A model's equations and step; commands are interpolated by first- or zero-order hold."""
-    plant = PLANTS[model.plant]
     equations = PlantEquations(model.effects, model.parameters, interpolation)
-    plant.write_equations(equations)
+    model.rig.write_equations(equations)
     equations.finish()
-    made = step_attempt(equations, plant.POSITIONS)
+    made = step_attempt(equations, model.rig.position_tolerances)
     return System(equations, made, Layout.of(made))
 
 

@@ -44,7 +44,7 @@ def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str
         'the reference jumps by ... mm at 0.5 s'
     """
     nominal = load_model(model)
-    if nominal.plant != "station":
+    if not nominal.rig.balances_loads:
         raise ValueError(
             f"model must be of a station, whose forces balance, got {nominal.name}, a "
             f"{nominal.plant}"

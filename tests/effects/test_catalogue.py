@@ -18,7 +18,7 @@ from pma_gym.effects.effect import signals
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.model import Model, load_model, shipped_models
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.rigs import cascade, slide, station
+from pma_gym.plant.rigs import RIGS
 
 SIGNALS = {
     "pressure": (0.0, 600e3),
@@ -182,7 +182,7 @@ def test_every_quantity_has_unit_bounds_and_source(effect):
     doors = effect.names_at_the_door()
     assert len(doors) == len(effect.parameters._fields)
     assert effect.parameters.__doc__
-    ports = {"part", *station.PORTS, *cascade.PORTS, *slide.PORTS}
+    ports = {"part", *(port for rig in RIGS.values() for port in rig.ports)}
     assert effect.port in ports or effect.port.startswith("sensor:")
 
 

@@ -112,7 +112,7 @@ def _shown(
 
 
 def _usual(candidate: CandidateEffect) -> Array:
-    """Values of a candidate's parameters at its usual size, at the door."""
+    """Values of a candidate's parameters at its usual size, in file units."""
     found = []
     for path in candidate.paths:
         effect, _, door = path.partition(".")

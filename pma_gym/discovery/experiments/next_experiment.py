@@ -172,7 +172,7 @@ def next_experiment(
         rivals: models that explain them, each fitted, with the candidates in it.
         seed: of what is random in protocols, and of what the rivals may be.
     Returns:
-        What to measure next; None where there are not two rivals, see `blind_spots.for_blind` then,
+        What to measure next; None where there are not two rivals, see `experiment_to_detect` then,
         or where no protocol is safe.
     """
     if len(rivals) < 2:

@@ -23,7 +23,7 @@ class CandidateEffect:
         model: the model with the effect where it does nothing.
         paths: the parameters that make it what it is.
         fitted: which of them are fitted with it, shape (p,); the others only switch it on.
-        absent: their values where it does nothing, at the door, shape (p,).
+        absent: their values where it does nothing, in file units, shape (p,).
         probes: values at which it is looked for, shape (n, p).
         amplitudes: which of them scale with the size of the effect, shape (p,).
         signs: for each probe, whether the opposite makes sense too.
@@ -73,7 +73,7 @@ class CandidateEffect:
 
 
 def bounds(paths: Sequence[str]) -> tuple[Array, Array]:
-    """Bounds of parameters at the door."""
+    """Bounds of parameters in file units."""
     quantities = [_quantity(path) for path in paths]
     return (
         np.array([quantity.lower for quantity in quantities], float),

@@ -25,7 +25,7 @@ LEAST_TRIALS = 4
 
 
 def covariance(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]) -> Array:
-    """Covariance of a fit's parameters, shape (p, p), at the door.
+    """Covariance of a fit's parameters, shape (p, p), in file units.
 
     Correlations are those of the curvature; errors are the largest that it, stretches or trials
     give.

@@ -1,4 +1,4 @@
-"""Fits of a model, alone or with candidates in it, to whitened trials."""
+"""Fit a model, with or without candidate effects, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -42,7 +42,7 @@ class Fitted:
         model: the model with its parameters.
         names: the candidates in it.
         paths: its free parameters.
-        values: their values at the door, shape (p,).
+        values: their values in file units, shape (p,).
         covariance: theirs, from the whitened readings and the prior, shape (p, p).
         chi_square: of the whitened readings, with what the prior adds.
         steps: moves of the parameters that their derivatives were taken with.
@@ -62,7 +62,7 @@ class Fitted:
     reach: Mapping[str, float] = field(default_factory=dict)
 
     def estimate(self, path: str) -> tuple[float, float]:
-        """A parameter's value and its standard error, at the door."""
+        """A parameter's value and its standard error, in file units."""
         at = self.paths.index(path)
         return float(self.values[at]), float(np.sqrt(self.covariance[at, at]))
 
@@ -161,16 +161,16 @@ class FitProblem:
         return float(np.sqrt(fit.chi_square / self.count))
 
     def far(self, fit: Fitted) -> bool:
-        """Whether a fit is so far from the trials that it may have been caught."""
+        """Whether a fit is so far from the trials that it may be in a local minimum."""
         return self.left(fit) > CAUGHT
 
     def careful_fit(self, model: Model, extra: Sequence[CandidateEffect] = ()) -> Fitted | None:
         """Fit a model with candidates in it, whose parameters may be far off.
 
-        A cable that slackens makes chi-square rugged, and a search that begins far away can end in
-        a hollow. With the noise taken for larger, what parameters may be holds them on their way.
-        The rotor rings on the cable, at a frequency that a search finds from nearby only: where
-        much is left, fits begin from other stiffnesses too. The best of all is returned.
+        A cable that slackens makes chi-square rugged, and a search that starts far away can end in
+        a local minimum. With the noise assumed larger, the prior keeps parameters from going
+        astray. The rotor oscillates on the cable, at a frequency that a search finds from nearby
+        only: where much is left, fits start from other stiffnesses too. The best is returned.
         """
         begun = self._eased(model, extra, LARGER)
         fits = [self.fit(begun, extra), self.fit(model, extra)]
@@ -184,11 +184,11 @@ class FitProblem:
                 fits.append(self.fit(self._eased(away, extra, LARGER[-1:]), extra))
         return min(filter(None, fits), key=_chi_square)
 
-    def led_out(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
-        """A fit, or a better one where it was caught far from the trials.
+    def continuation(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> Fitted:
+        """A fit, or a better one where it was in a local minimum far from the trials.
 
-        With the noise taken for as large as what is left, and then for ever less, slopes are those
-        of long moves, which lead out of a hollow.
+        The noise is assumed as large as the residual, then ever smaller: a continuation, whose
+        derivatives are those of long steps, which leave a local minimum.
         """
         if not self.far(fit):
             return fit

@@ -50,7 +50,7 @@ class FreeParameters:
 
     Attributes:
         free: paths of those that may be off.
-        prior: standard deviations about the model's values, at the door, shape (p,).
+        prior: standard deviations about the model's values, in file units, shape (p,).
     """
 
     free: tuple[str, ...]
@@ -64,7 +64,7 @@ def free_parameters(model: Model) -> FreeParameters:
 
 
 def prior(model: Model, path: str) -> float:
-    """Standard deviation of a parameter about the model's value, at the door."""
+    """Standard deviation of a parameter about the model's value, in file units."""
     effect, _, door = path.partition(".")
     law = CATALOGUE[effect]
     value = model.at_the_door(effect)[door]
@@ -78,7 +78,7 @@ def prior(model: Model, path: str) -> float:
 
 
 def values(model: Model, paths: Sequence[str]) -> Array:
-    """Values of parameters at the door."""
+    """Values of parameters in file units."""
     found = []
     for path in paths:
         effect, _, door = path.partition(".")
@@ -87,7 +87,7 @@ def values(model: Model, paths: Sequence[str]) -> Array:
 
 
 def unit(path: str) -> str:
-    """Unit of a parameter at the door."""
+    """File unit of a parameter."""
     effect, _, door = path.partition(".")
     law = CATALOGUE[effect]
     return law.quantities[law.names_at_the_door()[door]].unit

@@ -1,7 +1,7 @@
 """Readings that a fit has not seen: how far it is from them.
 
 Whole trials are left out. Of one long trial, stretches of time are: it is simulated from its
-beginning, so that what the rig remembers goes on through them, but their readings take no part.
+beginning, so that hysteresis and creep go on through them, but their readings take no part.
 """
 
 from collections.abc import Callable, Sequence

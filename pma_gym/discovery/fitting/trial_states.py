@@ -123,7 +123,7 @@ def misfits(
 
 def dump_states(states: Mapping[str, TrialState]) -> str:
     """The states as TOML text; the same states give the same bytes."""
-    lines = ["# What belongs to each trial: zeros of the signals, and parameters of its own."]
+    lines = ["# What belongs to each trial: zeros of the signals, and its own parameters."]
     for name, state in states.items():
         # JSON's strings are TOML's; what no text holds (a stray byte of a file's name) is replaced.
         key = json.dumps(name.encode("utf-8", "replace").decode("utf-8"))

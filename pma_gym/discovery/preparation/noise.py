@@ -1,7 +1,7 @@
 """The noise floor of each signal, and the filters that make that noise white.
 
 Noise is seen where nothing moves: in rest segments, at constant commands long after the last
-change, and between repeats of a trial. What an autoregression of the residual cannot foretell is a
+change, and between repeats of a trial. What an autoregression of the residual cannot predict is a
 third estimate. The largest of what is seen at rest and the rounding of the readings counts: a
 reading that stands still inside one step of the DAQ shows no noise at all. Of a signal that is read
 a few times a trial, only repeats tell the noise, and no autoregression: its readings are seconds

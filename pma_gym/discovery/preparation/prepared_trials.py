@@ -13,7 +13,6 @@ from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.splits import FOLDS, stretches
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
-from pma_gym.plant.rigs import slide
 
 PIECE_S = 1.0
 """Longest trial of a free slide (s): an error of its force leads it away with the square of time,
@@ -38,13 +37,13 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
     ]
     # By the model as it was given: a line that is fitted later says what such volts give.
     kept = [replace(each, trial=_in_volts(each.trial, model)) for each in kept]
-    if model.plant == "slide":
-        words += _unused(trials)
+    if model.rig.is_free:
+        words += _unused(trials, model)
         pieces = [piece for each in kept for piece in _pieces(each)]
         if len(pieces) > len(kept):
             words.append(
                 f"nothing holds this slide, so its {len(kept)} trials are taken as {len(pieces)} "
-                f"pieces of up to {PIECE_S:g} s, each with a start of its own"
+                f"pieces of up to {PIECE_S:g} s, each with its own start"
             )
         kept = pieces
     elif stretches(trials):
@@ -56,11 +55,11 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
     return kept, tuple(words)
 
 
-def _unused(trials: Sequence[Trial]) -> list[str]:
+def _unused(trials: Sequence[Trial], model: Model) -> list[str]:
     """Words on what was measured that a slide does not have."""
     found = [
         BY_QUANTITY[name].name
-        for name in slide.SILENT
+        for name in model.rig.absent_outputs
         if any(name in trial.measurements for trial in trials)
     ]
     said = (

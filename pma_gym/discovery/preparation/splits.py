@@ -14,7 +14,7 @@ LONG_S = 20.0
 """A single trial of this length (s) or more has stretches that can be left out."""
 
 STRETCH_S = 5.0
-"""About how long such a stretch is (s): longer than what the rig remembers of before."""
+"""About how long such a stretch is (s): longer than the memory of the rig."""
 
 
 def folds(count: int, files: Sequence[str] = ()) -> list[list[int]]:

@@ -75,7 +75,7 @@ class WhitenedResiduals(Residuals):
         trials: the trials.
         free: paths of its free parameters.
         noise: whitening of each output.
-        prior: standard deviations of the free parameters about `centre`, at the door; infinite
+        prior: standard deviations of the free parameters about `centre`, in file units; infinite
             for one that may be anything.
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
@@ -140,7 +140,7 @@ class WhitenedResiduals(Residuals):
         return Sums(chi_square, gradient, total[1:, 1:] + np.diag(self.prior**-2.0))
 
     def pieces(self, values: Array, steps: Array, central: bool = False) -> Pieces | None:
-        """Products of the residual and its derivatives by the parameters (per unit at the door).
+        """Products of the residual and its derivatives by the parameters (per file unit).
 
         None where the model cannot be simulated.
         """

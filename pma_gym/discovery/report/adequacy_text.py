@@ -52,7 +52,7 @@ def floors_left(diagnosis: Diagnosis) -> str:
 
 
 def undecided(diagnosis: Diagnosis) -> str:
-    """Why the data cannot tell whether structure is missing, and which log would decide."""
+    """Why it is undecidable whether structure is missing, and which log would decide."""
     signal, judged = _worst(diagnosis)
     name, unit = signal_name(signal), signal_unit(signal)
     if judged.fault == "no floor":

@@ -23,7 +23,7 @@ def why_approximate(reason: Reason) -> str:
     names = effect_names(reason.effects)
     if reason.why == "slow":
         said = f"{share} of what is slow in the residual is left, of a right law {limit} at most"
-    elif reason.why == "remembered":
+    elif reason.why == "autocorrelated":
         said = f"{share} of the residual's autocorrelation is left, of a right law {limit} at most"
     elif reason.why == "scatters":
         said = (

@@ -88,6 +88,6 @@ def _left_style(values: NDArray[np.float64]) -> dict[str, Any]:
 
 
 def _door(values: NDArray[np.float64], signal: str) -> NDArray[np.float64]:
-    """One signal of an array of outputs, in its unit at the door."""
+    """One signal of an array of outputs, in its file unit."""
     column = BY_NAME[signal]
     return values[:, OUTPUTS.index(column.quantity)] / SI_FACTORS[column.unit]

@@ -41,7 +41,7 @@ def _not_detectable_blocks(diagnosis: Diagnosis) -> list[Block]:
     if not diagnosis.not_detectable:
         return []
     return [
-        Heading("What would not have shown", 3),
+        Heading("Not detectable in these data", 3),
         Paragraph(
             "These data would not show the following effects even at their usual size, so the "
             f"diagnosis cannot exclude them: {effect_names(diagnosis.not_detectable)}."

@@ -192,7 +192,7 @@ def _confusion_blocks(diagnosis: Diagnosis) -> list[Block]:
         return []
     text = (
         "In trials like these the following effects, each refitted together with the model's own "
-        "parameters, leave residuals that cannot be told apart: what one does, another does too."
+        "parameters, leave the same residuals: these data do not identify which of them it is."
     )
     blocks: list[Block] = [Heading("What else it could be"), Paragraph(text)]
     blocks.append(confusion_table(diagnosis.effects))

@@ -27,7 +27,7 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
     """Before, parameters refitted and after, one panel a signal, with the noise as a line.
 
     Args:
-        gaps: by signal at the door.
+        gaps: by column name.
         names: what to call the three.
     """
     shares = [gap.before / max(gap.after, gap.floor, 1e-12) for gap in gaps.values()]

@@ -1,4 +1,4 @@
-"""Curves and gaps of every trial, at the door of the report."""
+"""Curves and gaps of every trial, in file units, as the report shows them."""
 
 from collections.abc import Sequence
 
@@ -69,7 +69,7 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
 
 
 def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
-    """Gaps over all trials, by signal at the door."""
+    """Gaps over all trials, by column name."""
     found: dict[str, Gap] = {}
     for column in (BY_QUANTITY[name] for name in OUTPUTS):
         parts = [
@@ -88,7 +88,7 @@ def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
     return found
 
 
-def floors_at_the_door(findings: Findings) -> dict[str, Floor]:
+def floors_in_file_units(findings: Findings) -> dict[str, Floor]:
     """Noise of the signals that were measured."""
     floors = {}
     for channel, name in enumerate(OUTPUTS):

@@ -188,4 +188,4 @@ def confusion_table(effects: tuple[NamedEffect, ...]) -> TextTable:
         for each in effects
         if each.confused_with
     ]
-    return TextTable("Not told apart by these data", ["Named", "Also possible"], rows, words=2)
+    return TextTable("Not identifiable from these data", ["Named", "Also possible"], rows, words=2)

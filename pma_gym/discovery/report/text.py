@@ -15,7 +15,7 @@ VERDICTS = {
     "parameters": "Parameters were off",
     "agrees": "Model and data agree",
     "unknown": "Something unknown is missing",
-    "undecidable": "These data cannot tell",
+    "undecidable": "Undecidable from these data",
 }
 """Each verdict in a few words."""
 
@@ -116,7 +116,7 @@ def unit_cell(unit: str) -> str:
 
 
 def door_name(quantity: str) -> str:
-    """`contraction` is `contraction_mm` at the door."""
+    """Column name of a quantity: `contraction` is `contraction_mm`."""
     return BY_QUANTITY[quantity].name
 
 
@@ -239,7 +239,7 @@ def _use_effect(diagnosis: Diagnosis) -> list[str]:
     # The environments' tasks are a muscle's.
     steps[0] += (
         ': `gym.make("pma_gym/IsokineticDisplacement-v0", model="model.toml")`.'
-        if diagnosis.model.plant == "station"
+        if diagnosis.model.rig.balances_loads
         else ': `Plant(load_model("model.toml")).simulate(trial)`.'
     )
     for effect in diagnosis.effects:
@@ -273,18 +273,15 @@ def _use_as_is(diagnosis: Diagnosis) -> list[str]:
 
 
 def _describe(diagnosis: Diagnosis) -> list[str]:
-    steps = ["Look at the law below: its shape is what any explanation must have."] * bool(
-        diagnosis.law
-    )
+    steps = ["Look at the law below: any explanation must have its shape."] * bool(diagnosis.law)
     steps += [
-        f"Look for what swings at {figure(hertz)} Hz and reaches the {signal_name(signal)}: a "
+        f"Look for what oscillates at {figure(hertz)} Hz and reaches the {signal_name(signal)}: a "
         "loose frame, a hose, a supply, the mains beyond half the sampling rate."
         for signal, hertz in diagnosis.tones.items()
     ]
     return [
         *steps,
-        "Write it as an effect of your own, one Python file, and diagnose again with "
-        "`--effect FILE.py`.",
+        "Write it as a user effect, one Python file, and diagnose again with `--effect FILE.py`.",
     ]
 
 
@@ -293,7 +290,7 @@ def _measure(diagnosis: Diagnosis) -> list[str]:
         return ["Measure trials that move the station further: more speeds, loads and pressures."]
     return [
         _run_next(diagnosis),
-        "Keep the model as it is until then: `model.toml` has parameters refitted at most.",
+        "Keep the given model until then: `model.toml` only has refitted parameters.",
     ]
 
 
@@ -303,9 +300,9 @@ def _run_next(diagnosis: Diagnosis) -> str:
     excitation = following.excitation[:1].lower() + following.excitation[1:]
     run = (
         f"`next.csv` on the rig ({excitation}; {duration(following.minutes)}), save its log into "
-        "the data set under a name of its own, and diagnose again."
+        "the data set under a new name, and diagnose again."
     )
     if diagnosis.verdict in ("parameters", "agrees"):
         shown = effect_names(following.separates, "or")
-        return f"These trials would not have shown {shown}. To rule that out, run {run}"
+        return f"These trials cannot show {shown}. To rule that out, run {run}"
     return f"Run {run}"

@@ -29,7 +29,7 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
         "misfit": _misfit,
         "explained": _explained,
         "slow": _slow,
-        "remembered": _remembered,
+        "autocorrelated": _autocorrelated,
         "scatters": _scatters,
         "outdone": _outdone,
     }[reason.why]
@@ -61,7 +61,7 @@ def _best(reason: Reason, residual: str) -> str:
     if not reason.nearest:
         return "there was none to try"
     likeliest = effect_name(reason.nearest)
-    return f"none was worth adding (the likeliest, {likeliest}, would leave {leaves} of chi-square)"
+    return f"none was added (the likeliest, {likeliest}, would leave {leaves} of chi-square)"
 
 
 def _unexplained(reason: Reason, residual: str) -> str:
@@ -110,7 +110,7 @@ def _slow(reason: Reason, residual: str) -> str:
     return f"so {share} of {_WHAT} {residual} is left, where at most {limit} may be"
 
 
-def _remembered(reason: Reason, residual: str) -> str:
+def _autocorrelated(reason: Reason, residual: str) -> str:
     limit = percent(reason.limit)
     share = _past(percent(min(reason.figure, 1.0)), limit)
     its = "its autocorrelation" if reason.effects else f"the autocorrelation of {residual}"

@@ -68,18 +68,18 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
             instead = f" (or {effect_names(equal, 'or')})" if equal else ""
             return (
                 f"Model {name} misses something, {effect_names(added)}{instead} most likely, but "
-                f"what is left out of {trials} does not bear it out"
+                f"what is left out of {trials} does not confirm it"
             ) + _propose(diagnosis)
         rivals = effect_names([diagnosis.candidates[0].name, *equal], "or")
         return (
-            f"Model {name} misses something, but {trials} cannot tell which of {rivals} it is"
+            f"Model {name} misses something, but {rivals} are not identifiable in {trials}"
         ) + _propose(diagnosis)
     few_hidden = len(diagnosis.not_detectable) <= UNDETECTABLE_SHARE * max(
         len(diagnosis.candidates), 1
     )
     if few_hidden and any(each.fault in OPEN for each in diagnosis.adequacy.values()):
         return (
-            f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
+            f"Whether model {name} misses anything is undecidable from {trials}: "
             f"{undecided(diagnosis)}."
         )
     best = diagnosis.candidates[0] if diagnosis.candidates else None
@@ -89,7 +89,7 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
             f"in too little of {trials} to rule chance out"
         ) + _propose(diagnosis)
     return (
-        f"{trials.capitalize()} cannot tell whether model {name} misses anything: "
+        f"Whether model {name} misses anything is undecidable from {trials}: "
         f"{len(diagnosis.not_detectable)} effects of the catalogue would not show at their usual "
         "size"
     ) + _propose(diagnosis)
@@ -230,7 +230,7 @@ def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> t
         said.append(
             f"Of what was slow in the residual, {percent(left.slow)} is left by "
             f"{effect_names([candidate.name for candidate in selection.chosen])}; of its "
-            f"autocorrelation, {percent(left.remembered)}."
+            f"autocorrelation, {percent(left.autocorrelated)}."
         )
     if findings.elimination is not None:
         said.append(

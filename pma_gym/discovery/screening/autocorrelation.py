@@ -1,8 +1,8 @@
-"""Whether a residual remembers itself for longer than noise does: then something is missing.
+"""Test the residual for autocorrelation beyond the correlation time of the noise.
 
-No candidate is asked. Sensors' noise has forgotten itself after some hundredths of a second; what a
-wrong model leaves goes on, or rings. The largest autocorrelation beyond that is set against
-Bartlett's standard error.
+The test needs no candidate. The noise of sensors is uncorrelated after some hundredths of a second;
+what a wrong model leaves is correlated for longer, or oscillates. The largest autocorrelation
+beyond that lag is compared with Bartlett's standard error.
 """
 
 from collections.abc import Sequence
@@ -22,16 +22,16 @@ SURE = 6.0
 """Standard errors of the largest autocorrelation that chance does not reach, over all lags."""
 
 LEAST = 0.025
-"""Autocorrelation below which what remembers itself is smaller than 0.16 of the noise."""
+"""Autocorrelation below which the autocorrelated part is smaller than 0.16 of the noise."""
 
 SLOWEST_HZ, WIDTH, MOSTLY = 0.4, 0.25, 0.7
 """A tone's least frequency (Hz), for slower than that every trial is one swing; half its width as a
-share of it; the least share of what a residual remembers that is a tone."""
+share of it; the least share of the autocorrelation that makes a tone."""
 
 
 @dataclass(frozen=True)
 class AutocorrelationTest:
-    """What a signal's residual remembers of itself.
+    """The largest autocorrelation of a signal's residual beyond that of noise.
 
     Attributes:
         share: largest autocorrelation, either sign, at lags that noise does not reach.
@@ -50,7 +50,7 @@ class AutocorrelationTest:
 
 
 def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> AutocorrelationTest:
-    """What one signal's residual remembers of itself.
+    """Test the residual of one signal for autocorrelation beyond that of noise.
 
     Args:
         parts: of each trial (SI), NaN where there is none.
@@ -79,7 +79,7 @@ def autocorrelation_test(parts: Sequence[Array], rate_hz: float) -> Autocorrelat
 
 @dataclass(frozen=True)
 class Tone:
-    """A frequency at which a residual rings.
+    """A frequency at which a residual oscillates.
 
     Attributes:
         hertz: the frequency (Hz).
@@ -91,7 +91,7 @@ class Tone:
 
 
 def tone(parts: Sequence[Array], rate_hz: float) -> Tone | None:
-    """The frequency at which a residual rings; None where it is noise or remembers otherwise.
+    """The frequency at which a residual oscillates; None where it is noise or has no peak.
 
     Args:
         parts: of each trial (SI), NaN where there is none.

@@ -16,7 +16,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.plant import sensors
-from pma_gym.plant.model import PLANTS, Model, ModelError
+from pma_gym.plant.model import Model, ModelError
 from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
@@ -100,7 +100,7 @@ def _lacking(
     counted = "repeat" in effect.quantities
     if counted and (orders is None or len(set(orders)) < 2):
         return None
-    if effect.port not in PLANTS[model.plant].PORTS and not effect.port.startswith("sensor:"):
+    if effect.port not in model.rig.ports and not effect.port.startswith("sensor:"):
         return None
     if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
         return None

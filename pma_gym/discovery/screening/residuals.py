@@ -60,7 +60,7 @@ def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Arra
 def is_autocorrelated(
     problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
 ) -> bool:
-    """Whether what a fit leaves remembers itself and is surely no noise, whatever is hidden."""
+    """Whether the residual of a fit is autocorrelated beyond noise in any signal."""
     return any(each.sure for each in autocorrelation_tests(problem, fit, chosen).values())
 
 
@@ -81,7 +81,7 @@ def far_off(problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] 
 def autocorrelation_tests(
     problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect] = ()
 ) -> dict[str, AutocorrelationTest]:
-    """What the rest that a fit leaves of each output remembers of itself.
+    """Autocorrelation test of the residual of each output.
 
     Nothing beside a coarse sensor, whose rounding follows the motion; nor of a slide, whose starts
     are taken from readings, so that what is left remembers their noise.
@@ -115,4 +115,4 @@ def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
 
 def _tells(problem: FitProblem) -> bool:
     """Whether a residual tells of itself what is noise."""
-    return not problem.coarse and problem.given.plant != "slide"
+    return not problem.coarse and not problem.given.rig.is_free

@@ -1,9 +1,9 @@
-"""Whether a residual is too large, somewhere, to be noise.
+"""Scan the residual for pieces that are too large to be noise.
 
 What shows at a few instants only, such as a cable that comes taut, weighs little in a whole record:
-turning the signs of pieces does not rule chance out, for it lies in a handful of them, nor does the
-residual remember itself. Yet in a piece of a quarter of a second it may be far beyond anything that
-the sensor's noise can do. No candidate is asked.
+a sign-flipping test has few pieces to flip, and the residual is hardly autocorrelated. Yet in a
+piece of a quarter of a second it may be far beyond the sensor's noise. The test needs no
+candidate.
 """
 
 from collections.abc import Sequence
@@ -60,7 +60,7 @@ NO_EXCESS = ScanStatistic(1.0, 0.0)
 def scan_statistic(
     parts: Sequence[Array], edges: Sequence[Sequence[int]], level: float, step: float
 ) -> ScanStatistic:
-    """Bursts in one signal's residual.
+    """Scan the residual of one signal for pieces that noise does not make.
 
     Args:
         parts: the residual in each trial (SI), NaN where there is none.

@@ -78,7 +78,7 @@ class Baseline:
 
     Attributes:
         whitened: the trials beside it.
-        values: its parameters at the door.
+        values: its parameters in file units.
         columns: whitened residual and derivatives of each trial, shape (1 + p, 4, rows).
         inverse: of the curvature with the prior, shape (p, p).
     """

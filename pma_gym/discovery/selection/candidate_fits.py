@@ -1,4 +1,4 @@
-"""Fits of candidates beside what was found before: begun well, led out of hollows, and kept."""
+"""Fit candidates beside the effects selected so far, with restarts from better parameters."""
 
 from collections.abc import Callable, Sequence
 
@@ -51,7 +51,7 @@ def fitted(
     for begun in starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]:
         found = problem.fit(before.model, extra, {each.candidate.name: begun})
         if found is not None and caught:
-            found = problem.led_out(found, extra)
+            found = problem.continuation(found, extra)
         if found is not None and (best is None or found.chi_square < best.chi_square):
             best = found
         # As much as the look promised, or near at last: no other beginning is needed.
@@ -60,13 +60,13 @@ def fitted(
         ):
             break
     if best is None or best.chi_square > before.chi_square:
-        # Caught in a hollow: where the effect is absent it explains more.
+        # A local minimum: without the effect the fit explains more.
         return None
     journal.keep(key, kept_form(best))
     return best
 
 
-def restarted_from_better(
+def restarted(
     problem: FitProblem,
     baseline: Baseline,
     before: Fitted,
@@ -102,7 +102,7 @@ def better(
         )
         found = problem.careful_fit(fit.model.replace(given), chosen)
         best = fit if found is None or found.chi_square >= fit.chi_square else found
-        return problem.led_out(best, chosen)
+        return problem.continuation(best, chosen)
 
     return _once("better", problem, fit, chosen, journal, search)
 

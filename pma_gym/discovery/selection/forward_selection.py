@@ -31,7 +31,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     cost,
     fitted,
     refit,
-    restarted_from_better,
+    restarted,
     stripped,
     without_idle,
 )
@@ -148,7 +148,7 @@ def select(
         best = better(problem, stage.fits[added], chosen, journal)
         chosen, best = without_idle(problem, best, chosen, refitted, journal)
         if not chosen and best.chi_square < refitted.chi_square and len(begun) < BEGINNINGS:
-            # The refitted model had been caught in a hollow that any effect led out of.
+            # The fit without effects was in a local minimum; restart from the better parameters.
             refitted, stages = best, []
             begun.append(added)
         elif len(chosen) < len(stages):
@@ -203,9 +203,7 @@ def _stage(
             found = fitted(problem, baseline, before, chosen, each, journal)
             if found is not None:
                 fits[each.candidate.name] = found
-        fits |= restarted_from_better(
-            problem, baseline, before, chosen, worth, fits, journal, progress
-        )
+        fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan)

@@ -11,14 +11,14 @@ from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.forward_selection import Stage
 
 NEAREST = 12.0
-"""Chi-square within which two effects cannot be told apart: odds of 400 to 1."""
+"""Chi-square within which two effects are not identifiable: odds of 400 to 1."""
 
 NEAREST_SHARE = 0.02
 """The same as a share of what the effect gained: laws of a catalogue are likenesses, and the wrong
 one of two that differ by less may be the nearer likeness by chance."""
 
 CLOSE = 0.35
-"""Share of the gain within which a rival is fitted again with the noise that was learnt."""
+"""Share of the gain within which a rival is fitted again with the noise as reestimated."""
 
 MOST = 5
 """Most rivals that are fitted again."""
@@ -32,7 +32,7 @@ class Rival:
         candidate: it.
         fit: of the model with it.
         behind: chi-square by which it explains less, counting parameters; negative where more.
-        equal: whether the data cannot tell them apart.
+        equal: whether the data do not identify which of the two it is.
     """
 
     candidate: CandidateEffect

@@ -4,7 +4,8 @@ A verdict that denies missing structure (`agrees`, `parameters`) needs it of eve
 misfit is at most `MOST_FLOORS` floors, and a flexible regression on state, command and the
 command's history explains less than `MOST_EXPLAINED` floors of it. No rig and no sensor is exempt.
 Where the readings that the model was fitted to are beyond these limits too, structure is missing.
-Where only those left out are, the trials may not hold the parameters: they cannot tell.
+Where only those left out are, the trials may not determine the parameters: the verdict is
+`undecidable`.
 """
 
 from collections.abc import Mapping, Sequence
@@ -39,9 +40,9 @@ Fault = Literal[
     "misfit", "explained", "not predicted", "follows", "wide", "no floor", "not left out"
 ]
 """What is wrong with a signal. Structure is missing: too large a misfit of readings that the model
-was fitted to (`misfit`), or a regression that explains too much of them (`explained`). These data
-cannot tell: the same of readings left out alone (`not predicted`, `follows`), too wide a bound
-(`wide`), no floor, no readings that could be left out."""
+was fitted to (`misfit`), or a regression that explains too much of them (`explained`). The
+verdict is `undecidable`: the same of readings left out alone (`not predicted`, `follows`), too wide
+a bound (`wide`), no floor, no readings that could be left out."""
 
 STRUCTURE: tuple[Fault, ...] = ("misfit", "explained")
 OPEN: tuple[Fault, ...] = ("not predicted", "follows", "wide", "no floor", "not left out")

@@ -1,4 +1,4 @@
-"""What the selected effects leave of all that was slow, or rang, in the residual."""
+"""The fraction of the slow and of the autocorrelated residual that the selected effects leave."""
 
 from dataclasses import dataclass
 
@@ -23,16 +23,16 @@ class ResidualFraction:
 
     Attributes:
         slow: of what was slow in the residual.
-        remembered: of what it remembered of itself, where that is still more than chance.
+        autocorrelated: of its autocorrelated part, where that is still more than chance.
     """
 
     slow: float
-    remembered: float
+    autocorrelated: float
 
     @property
     def most(self) -> float:
         """The larger."""
-        return max(self.slow, self.remembered)
+        return max(self.slow, self.autocorrelated)
 
 
 def residual_fraction(findings: Findings) -> ResidualFraction:
@@ -43,9 +43,9 @@ def residual_fraction(findings: Findings) -> ResidualFraction:
     whitened = selection.problem.whitened_residuals(selection.fit.model, selection.chosen)
     after = _slow(findings, residuals(whitened, selection.fit))
     # What may be chance before has no share afterwards. Of a few readings no memory is known, and
-    # a slide's starts are taken from readings, whose noise it remembers.
+    # a slide's starts are taken from readings and carry their noise.
     seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
-    free = findings.given.plant == "slide"
+    free = findings.given.rig.is_free
     there = (before[1] > 0.0) | np.array(seldom) | free
     shares = [
         float(now[there].sum() / then[there].sum()) if then[there].sum() > LEAST_SLOW else 0.0
@@ -55,7 +55,7 @@ def residual_fraction(findings: Findings) -> ResidualFraction:
 
 
 def tones(findings: Findings) -> dict[str, float]:
-    """Frequency (Hz) of each signal, by column, whose residual after the refit rings."""
+    """Frequency (Hz) of each signal, by column, whose residual after the refit oscillates."""
     whitened = findings.problem.whitened_residuals(findings.refitted.model)
     left, rate, heard = residuals(whitened, findings.refitted), _rate(findings), {}
     for channel, name in enumerate(OUTPUTS):
@@ -71,7 +71,7 @@ def _rate(findings: Findings) -> float:
 
 
 def _slow(findings: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Mean squares of the four signals over those of their noise: slow ones, remembered ones."""
+    """Mean squares of four signals' slow and autocorrelated parts over those of their noise."""
     rate = _rate(findings)
     shares = np.zeros((2, 4))
     for channel, floor in enumerate(findings.floors):

@@ -57,7 +57,7 @@ def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
 
     They are laws of a muscle and of a drive that only pulls.
     """
-    if problem.given.plant == "slide":
+    if not problem.given.rig.has_muscle:
         return []
     before = (
         problem.whitened_residuals(refitted.model).sums(refitted.values, np.empty(0)).chi_square
@@ -122,7 +122,7 @@ def words(at: Array, law: Array, errors: Array, variable: str) -> str:
 
 
 def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, float]]:
-    """Where the data of each law's variable begin and end, at the door."""
+    """Where the data of each law's variable begin and end, in file units."""
     whitened = problem.whitened_residuals(refitted.model)
     readings = whitened.readings(refitted.values)
     assert readings is not None

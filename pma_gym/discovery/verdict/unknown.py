@@ -28,8 +28,8 @@ on their gain in chi-square, and chi-square."""
 WORTH_DRAWING = 0.15
 """Share of the chi-square beyond noise that such a law must explain to be drawn."""
 
-MOST_REMEMBERED = 0.1
-"""Most of what the residual remembered of itself that it may still remember, beyond chance."""
+MOST_AUTOCORRELATED = 0.1
+"""Largest fraction of the autocorrelated residual that may be left, beyond chance."""
 
 MOST_SPREAD = 0.12
 """Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
@@ -39,11 +39,11 @@ EXTRAPOLATED = 1.0
 changes. Sizes that really scattered by more than themselves would leave a residual; where none is
 left, the slopes are wrong, not the law."""
 
-Why = Literal["unexplained", "misfit", "explained", "slow", "remembered", "scatters", "outdone"]
+Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
 the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
-too much of what was slow in it is left. `remembered`: of what it remembered of itself. `scatters`:
-an effect has another size by trial or condition. `outdone`: a law without a shape of its own
+too much of what was slow in it is left. `autocorrelated`: too much of its autocorrelated part is
+left. `scatters`: an effect has another size by trial or condition. `outdone`: a freely drawn law
 explains more."""
 
 
@@ -54,7 +54,7 @@ class Reason:
     Attributes:
         why: see `Why`.
         figure: what was found: standard errors (`unexplained`), floors (`misfit`, `explained`), a
-            share (`slow`, `remembered`, `scatters`), or the fall of chi-square by the law
+            share (`slow`, `autocorrelated`, `scatters`), or the fall of chi-square by the law
             (`outdone`).
         limit: the most that it may be, in the same unit.
         effects: what was added; empty if nothing was.
@@ -112,8 +112,8 @@ def _beyond(
         return None
     if left.slow > MOST_LEFT:
         return Reason("slow", left.slow, MOST_LEFT)
-    if left.remembered > MOST_REMEMBERED:
-        return Reason("remembered", left.remembered, MOST_REMEMBERED)
+    if left.autocorrelated > MOST_AUTOCORRELATED:
+        return Reason("autocorrelated", left.autocorrelated, MOST_AUTOCORRELATED)
     return _scatters(findings, left) or _outdone(findings, laws)
 
 
@@ -186,7 +186,7 @@ def _scatters(findings: Findings, left: ResidualFraction) -> Reason | None:
 
 
 def _outdone(findings: Findings, laws: Sequence[EstimatedLaw]) -> Reason | None:
-    """A law without a shape of its own that explains more than the effects do."""
+    """A freely drawn law that explains more than the effects do."""
     if not laws:
         return None
     selection = findings.selection
@@ -200,7 +200,7 @@ def _outdone(findings: Findings, laws: Sequence[EstimatedLaw]) -> Reason | None:
 
 
 def telling(findings: Findings, laws: Sequence[EstimatedLaw]) -> bool:
-    """Whether the best law without a shape of its own explains enough to be drawn."""
+    """Whether the best freely drawn law explains enough to be shown."""
     if not laws:
         return False
     whitened = findings.selection.problem.whitened_residuals(findings.refitted.model)

@@ -27,7 +27,7 @@ from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.state_layout import StateLayout
 from pma_gym.integrator.integration import FUSED
 from pma_gym.plant.composition import PlantEquations
-from pma_gym.plant.model import PLANTS, Model
+from pma_gym.plant.model import Model
 from pma_gym.plant.program import Program
 
 ARGUMENTS = (
@@ -81,7 +81,7 @@ class BlockMemory:
         self.element: ir.Type = DOUBLE
         self.offsets = kernel.state_layout.offsets
         self.eq = PlantEquations(model.effects, model.parameters)
-        PLANTS[model.plant].write_equations(self.eq)
+        model.rig.write_equations(self.eq)
         self.step_graph = ControlStepGraph(kernel.state_layout, self.eq)
         self.fixed: list[Value] = []
 

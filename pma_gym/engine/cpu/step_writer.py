@@ -31,7 +31,6 @@ from pma_gym.engine.cpu.reset_writer import ResetWriter
 from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
 from pma_gym.integrator.integration import FUSED, Lane, Layout, integrate_lanes, memory
 from pma_gym.integrator.step_attempt import step_attempt
-from pma_gym.plant.model import PLANTS
 
 BAD_ACTION = 4
 """What `check` returns where an action is no finite number: there `step` is not to be called."""
@@ -54,7 +53,7 @@ class Writer(ResetWriter):
 
     def __init__(self, kernel: KernelSpec) -> None:
         super().__init__(kernel)
-        self.attempt = step_attempt(self.eq, PLANTS[kernel.program.model.plant].POSITIONS)
+        self.attempt = step_attempt(self.eq, kernel.program.model.rig.position_tolerances)
         self.course: Course = course(self.eq, self.attempt, kernel.state_layout.task)
         extra = [*self.course.values, self.attempt.accepted, self.attempt.length]
         layout = Layout.of(self.attempt, extra)

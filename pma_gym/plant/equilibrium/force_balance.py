@@ -6,8 +6,7 @@ import numpy as np
 
 from pma_gym.effects.cable.hanging_load import GRAVITY
 from pma_gym.effects.effect import signals
-from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem, SolvablePlant
 
 RIPPLE = "drive_ripple"
 """Port whose effects make the load depend on where the motor stands."""
@@ -25,7 +24,7 @@ def solve_station(problem: EquilibriumProblem) -> None:
     load = _drive_load(problem)
     problem["contraction"] = _balance(problem, np.maximum(load, 0.0))
     problem["angle"] = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
-    ripples = [e for e in problem.plant.model.effects.values() if e.port == RIPPLE and e.law]
+    ripples = [e for e in problem.plant.effects.values() if e.port == RIPPLE and e.law]
     angles = {"angle", "motor_angle"}
     if any(angles & set(signals(effect.law)) for effect in ripples if effect.law):
         _settle_by_angle(problem)
@@ -34,7 +33,7 @@ def solve_station(problem: EquilibriumProblem) -> None:
 def _drive_load(problem: EquilibriumProblem) -> np.ndarray:
     """Load of the drive (N), which the pulley shows while the cable hangs slack."""
     rotor, pull = problem.parameters("rotor"), problem.rate("spin")
-    effects, inertia = problem.plant.model.effects, rotor["inertia"]
+    effects, inertia = problem.plant.effects, rotor["inertia"]
     if "leg" in effects:
         inertia = inertia + problem.parameters("leg")["inertia"]
     if "hanging_load" not in effects:
@@ -99,7 +98,7 @@ def _balance(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
 
 
 def balances(
-    plant: CompiledModel,
+    plant: SolvablePlant,
     pressures: np.ndarray,
     loads: np.ndarray,
     vectors: np.ndarray | None = None,
@@ -123,9 +122,9 @@ def balances(
     return out
 
 
-def static_force(plant: CompiledModel, state: np.ndarray) -> Callable[[float], float]:
+def static_force(plant: SolvablePlant, state: np.ndarray) -> Callable[[float], float]:
     """Force of the muscle (N) over contraction (m), at the state's pressure, without the cable."""
-    mass = plant.model.parameters["slide"].mass
+    mass = plant.parameters["slide"].mass
     probe = state.copy()
     x, velocity = plant.states.index("contraction"), plant.states.index("velocity")
 

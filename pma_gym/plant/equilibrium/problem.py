@@ -1,10 +1,65 @@
 """The equilibrium problem of many plants of one structure: their states so far, and their rates."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from pma_gym.plant.compiled_model import CompiledModel
+from pma_gym.effects.effect import Effect
+
+
+class CompiledEquations(Protocol):
+    """Compiled functions of equations of motion; see `pma_gym.plant.program.Program`."""
+
+    derivative: Callable
+    observe: Callable
+    balance: Callable
+
+    @property
+    def places(self) -> Mapping[str, int]:
+        """Where a vector of parameters has which number."""
+        ...
+
+
+class SolvablePlant(Protocol):
+    """What an equilibrium problem asks of a compiled model."""
+
+    vector: np.ndarray
+
+    @property
+    def states(self) -> Sequence[str]:
+        """Names of the states, in the order of the state vector."""
+        ...
+
+    @property
+    def outputs(self) -> Sequence[str]:
+        """Names of the true outputs."""
+        ...
+
+    @property
+    def effects(self) -> Mapping[str, Effect]:
+        """The model's effects by name."""
+        ...
+
+    @property
+    def parameters(self) -> Mapping[str, Any]:
+        """The effects' parameters (named tuples) by name."""
+        ...
+
+    @property
+    def program(self) -> CompiledEquations:
+        """The compiled functions."""
+        ...
+
+    def derivative(
+        self,
+        state: np.ndarray,
+        motor_voltage: float,
+        regulator_voltage: float,
+        zero_contraction: float,
+    ) -> np.ndarray:
+        """Time derivative of the state vector (SI per s)."""
+        ...
 
 
 class EquilibriumProblem:
@@ -21,7 +76,7 @@ class EquilibriumProblem:
 
     def __init__(
         self,
-        plant: CompiledModel,
+        plant: SolvablePlant,
         motor: np.ndarray,
         regulator: np.ndarray,
         vectors: np.ndarray | None,
@@ -62,6 +117,15 @@ class EquilibriumProblem:
         self.plant.program.derivative(len(out), *given, at)
         return out[:, self.names[name]]
 
+    def output(self, name: str) -> np.ndarray:
+        """A true output where the states stand, x0 at 0, shape (n,)."""
+        plant, truth = self.plant, np.empty((len(self.state), len(self.plant.outputs)))
+        for i, (state, out) in enumerate(zip(self.state, truth, strict=True)):
+            numbers = plant.vector if self.vectors is None else self.vectors[i]
+            addresses = (a.ctypes.data for a in (numbers, out))
+            plant.program.observe(1, state.ctypes.data, 0.0, *addresses)
+        return truth[:, list(plant.outputs).index(name)]
+
     def relax(self, name: str, of: str = "", about: np.ndarray | float = 0.0) -> None:
         """Put a state where a rate vanishes that is linear in it `about` a value.
 
@@ -85,7 +149,7 @@ class EquilibriumProblem:
 
     def relax_memory(self, port: str) -> None:
         """Put the memory of the effect at a port that follows a command where it rests."""
-        for effect in self.plant.model.effects.values():
+        for effect in self.plant.effects.values():
             if effect.port == port and effect.memories > 1:
                 self._relax_together(effect.memory_names)
             elif effect.port == port and effect.rate:
@@ -124,9 +188,9 @@ class EquilibriumProblem:
 
 
 def effect_parameters(
-    plant: CompiledModel, vectors: np.ndarray | None, effect: str
+    plant: SolvablePlant, vectors: np.ndarray | None, effect: str
 ) -> dict[str, np.ndarray]:
     """An effect's parameters, one each or one for all."""
     numbers = plant.vector[None, :] if vectors is None else vectors
-    fields, places = plant.model.parameters[effect]._fields, plant.program.places
+    fields, places = plant.parameters[effect]._fields, plant.program.places
     return {field: numbers[:, places[f"{effect}.{field}"]] for field in fields}

@@ -4,7 +4,7 @@ import numpy as np
 
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition, check_voltages
-from pma_gym.plant.equilibrium.force_balance import balances, solve_station
+from pma_gym.plant.equilibrium.force_balance import balances
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters
 from pma_gym.plant.model import Model
 
@@ -64,7 +64,7 @@ def hangs_by_itself(model: Model) -> bool:
     effects = model.effects.values()
     sensed = any(effect.port.startswith("sensor:") and effect.law for effect in effects)
     delayed = any(effect.port == "regulator_delay" for effect in effects)
-    return model.plant == "station" and not sensed and not delayed
+    return model.rig.balances_loads and not sensed and not delayed
 
 
 class NoLoadEquilibria:
@@ -133,12 +133,13 @@ def _solve(
         _settle_pressure(problem)
     for port in ("drive_delay", "drive_lag"):
         problem.relax_memory(port)
-    {"station": solve_station, "cascade": _cascade, "slide": _slide}[plant.model.plant](problem)
+    plant.model.rig.solve_equilibrium(problem)
     for name in plant.states:
         if name.startswith("lag_"):
             problem.relax(name)
-    if plant.model.plant == "slide" and "lag_lvdt" in plant.states:
-        problem.follow("lag_lvdt", problem["velocity"])
+    for lag, rate in plant.model.rig.moving_lags.items():
+        if lag in plant.states:
+            problem.follow(lag, problem[rate])
     return problem
 
 
@@ -152,7 +153,7 @@ def _settle_pressure(problem: EquilibriumProblem) -> None:
     A limit on their rate has them searched for where they are asked to be, and a deadband, in which
     they rest anywhere, has them begin there.
     """
-    if not {"regulator_rate_limit", "regulator_deadband"} & problem.plant.model.effects.keys():
+    if not {"regulator_rate_limit", "regulator_deadband"} & problem.plant.effects.keys():
         problem.relax("pressure")
         return
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -162,25 +163,6 @@ def _settle_pressure(problem: EquilibriumProblem) -> None:
         asked = np.maximum(line["gain"] * problem.inputs[:, 1] + line["offset"], 0.0)
         problem.relax("pressure", about=asked)
     found = np.where(settled, found, problem["pressure"])
-    if "regulator_deadband" in problem.plant.model.effects:
+    if "regulator_deadband" in problem.plant.effects:
         found = np.where(problem.parameters("regulator_deadband")["width"] > 0.0, asked, found)
     problem["pressure"] = found
-
-
-def _cascade(problem: EquilibriumProblem) -> None:
-    plant = problem.plant
-    problem.relax("servo", of="servo_rate" if "servo_rate" in problem.names else "servo")
-    problem["extension"] = problem["servo"]
-    truth = np.empty((len(problem.state), len(plant.outputs)))
-    for i, (state, out) in enumerate(zip(problem.state, truth, strict=True)):
-        numbers = plant.vector if problem.vectors is None else problem.vectors[i]
-        addresses = (a.ctypes.data for a in (numbers, out))
-        plant.program.observe(1, state.ctypes.data, 0.0, *addresses)
-    problem.zero[:] = truth[:, plant.outputs.index("contraction")] + problem["extension"]
-
-
-def _slide(problem: EquilibriumProblem) -> None:
-    """A slide that nothing holds begins as its model says; its bristles are relaxed."""
-    start = problem.parameters("start")
-    problem.zero[:] = problem["contraction"] = start["contraction"]
-    problem["velocity"] = start["velocity"]

@@ -15,7 +15,9 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.muscle.contractile_force import contractile_force
 from pma_gym.effects.muscle.stiffness import spring_stiffness
-from pma_gym.plant.composition import PlantEquations, Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.rigs.rig import Port, Rig
 
 PORTS: dict[str, Port] = {
     "muscle_force": Port(
@@ -35,7 +37,7 @@ PORTS: dict[str, Port] = {
 }
 """Ports of the cascade: how many effects each takes, and what becomes of their results."""
 
-REFUSED: dict[str, str] = {
+REFUSED_EFFECTS: dict[str, str] = {
     "repperger_damping": (
         "its damping grows with the velocity, of which a cascade knows only the sign; take "
         "[damping] or [symmetric_damping], or plant = 'station'"
@@ -49,7 +51,7 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 
-POSITIONS: dict[str, float] = {"extension": 0.003, "servo": 0.01}
+POSITION_TOLERANCES: dict[str, float] = {"extension": 0.003, "servo": 0.01}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 SCALES: dict[str, float] = {
@@ -107,3 +109,23 @@ def _write_servo(eq: PlantEquations) -> None:
     acceleration = eq.one("servo_inertia", servo=eq.parameters["servo"], **signals)
     eq.add_state("servo", eq["servo_rate"], SCALES["servo"])
     eq.add_state("servo_rate", acceleration, SCALES["servo_rate"])
+
+
+def solve_equilibrium(problem: EquilibriumProblem) -> None:
+    """Put the motor where it stands still, and the muscle behind it."""
+    problem.relax("servo", of="servo_rate" if "servo_rate" in problem.names else "servo")
+    problem["extension"] = problem["servo"]
+    problem.zero[:] = problem.output("contraction") + problem["extension"]
+
+
+CASCADE = Rig(
+    name="cascade",
+    ports=PORTS,
+    parts=PARTS,
+    position_tolerances=POSITION_TOLERANCES,
+    write_equations=write_equations,
+    solve_equilibrium=solve_equilibrium,
+    fastest_oscillation=fastest_oscillation,
+    refused_effects=REFUSED_EFFECTS,
+    shipped_example="cascade",
+)

@@ -3,13 +3,16 @@
     m x'' + B x' = F(x, x', memories) - L       x contraction, L the load that the drive gives
 
 Nothing holds it, so no command has a rest: a trial begins where [start] says, as fast as it says.
-There is no pulley and no pressure; L is a command, so a load cell in the link tells nothing new.
+There is no pulley and no pressure; L is a command, so a load cell in the link would
+measure nothing new.
 """
 
 from collections.abc import Mapping
 
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant.composition import PlantEquations, Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.rigs.rig import Port, Rig
 from pma_gym.plant.rigs.station import SCALES, TURNING_M
 
 PORTS: dict[str, Port] = {
@@ -21,7 +24,7 @@ PORTS: dict[str, Port] = {
 }
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
-REFUSED: dict[str, str] = {
+REFUSED_EFFECTS: dict[str, str] = {
     "operator": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
@@ -30,10 +33,10 @@ REFUSED: dict[str, str] = {
 PARTS: tuple[str, ...] = ("slide", "start")
 """Effects of port `part` that the slide reads itself and cannot do without."""
 
-SILENT: tuple[str, ...] = ("rotation", "load", "pressure")
-"""Outputs that it does not have: the load is what it is told."""
+ABSENT_OUTPUTS: tuple[str, ...] = ("rotation", "load", "pressure")
+"""Outputs that it does not have: its load is its command."""
 
-POSITIONS: dict[str, float] = {"contraction": 0.001}
+POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 
@@ -67,3 +70,27 @@ def write_equations(equations: PlantEquations) -> None:
 def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
     """0: nothing swings."""
     return 0.0
+
+
+def solve_equilibrium(problem: EquilibriumProblem) -> None:
+    """Put the slide where its model says that a trial begins; its bristles are relaxed."""
+    start = problem.parameters("start")
+    problem.zero[:] = problem["contraction"] = start["contraction"]
+    problem["velocity"] = start["velocity"]
+
+
+SLIDE = Rig(
+    name="slide",
+    ports=PORTS,
+    parts=PARTS,
+    position_tolerances=POSITION_TOLERANCES,
+    write_equations=write_equations,
+    solve_equilibrium=solve_equilibrium,
+    fastest_oscillation=fastest_oscillation,
+    refused_effects=REFUSED_EFFECTS,
+    absent_outputs=ABSENT_OUTPUTS,
+    is_free=True,
+    has_muscle=False,
+    is_diagnosable=True,
+    moving_lags={"lag_lvdt": "velocity"},
+)

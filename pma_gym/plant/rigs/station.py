@@ -15,7 +15,9 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects.cable.hanging_load import hanging_inertia
 from pma_gym.effects.cable.leg import leg_torque
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant.composition import PlantEquations, Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.force_balance import solve_station
+from pma_gym.plant.rigs.rig import Port, Rig
 
 PORTS: dict[str, Port] = {
     "muscle_force": Port("force on the slide (N), added; positive shortens the muscle", least=1),
@@ -39,7 +41,7 @@ PORTS: dict[str, Port] = {
 PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
 """Effects of port `part` that the station reads itself and cannot do without."""
 
-POSITIONS: dict[str, float] = {"contraction": 0.001, "angle": 0.001}
+POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001, "angle": 0.001}
 """States that are asked for more exactly than the others, and their tolerance beside theirs: dry
 friction turns an error of 1 nm into one of a ten-thousandth of its force."""
 
@@ -138,3 +140,17 @@ def _write_states(eq: PlantEquations) -> None:
             name = effect.event.__name__
             eq.add_event(name, eq.call(effect, effect.event), TIGHTENING_M)
     eq.add_breakpoints()
+
+
+STATION = Rig(
+    name="station",
+    ports=PORTS,
+    parts=PARTS,
+    position_tolerances=POSITION_TOLERANCES,
+    write_equations=write_equations,
+    solve_equilibrium=solve_station,
+    fastest_oscillation=fastest_oscillation,
+    shipped_example="serres2008",
+    balances_loads=True,
+    is_diagnosable=True,
+)

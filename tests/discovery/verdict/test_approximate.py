@@ -101,7 +101,7 @@ def test_an_unknown_says_its_best_candidate_with_its_size_and_what_is_left():
     assert "best candidate" not in without
 
 
-@pytest.mark.parametrize("why", ["slow", "remembered", "scatters", "outdone"])
+@pytest.mark.parametrize("why", ["slow", "autocorrelated", "scatters", "outdone"])
 def test_every_reason_says_its_figure_and_its_limit(why):
     of = {"scatters": "hysteresis", "outdone": "residual_load"}.get(why, "")
     reason = Reason(why, 0.42, 0.12, ("hysteresis",), of=of, by="load", gain=0.3)

@@ -183,7 +183,7 @@ def test_an_effect_that_is_not_borne_out_is_said_to_be_likeliest():
     found = replace(diagnosed("hysteresis"), verdict="undecidable")
     said = sentence(found)
     assert "misses something, hysteresis" in said and "most likely" in said
-    assert "left out of these 3 trials does not bear it out" in said
+    assert "left out of these 3 trials does not confirm it" in said
 
 
 UNKNOWN = {
@@ -199,11 +199,11 @@ UNKNOWN = {
     ),
     "slow, nothing added": (
         Reason("slow", 1.02, 0.35, nearest="creep", leaves=0.98),
-        "none was worth adding (the likeliest, creep, would leave 98 % of chi-square), so 100 % of "
+        "none was added (the likeliest, creep, would leave 98 % of chi-square), so 100 % of "
         "what is slow in the residual of these 3 trials is left, where at most 35 % may be.",
     ),
-    "remembered": (
-        Reason("remembered", 0.21, 0.1, ("hysteresis",), leaves=0.06),
+    "autocorrelated": (
+        Reason("autocorrelated", 0.21, 0.1, ("hysteresis",), leaves=0.06),
         "the best, hysteresis, leaves 6 % of what is slow in the residual of these 3 trials, but "
         "21 % of its autocorrelation is left, where at most 10 % may be.",
     ),
@@ -232,7 +232,7 @@ UNKNOWN = {
     ),
     "unexplained": (
         Reason("unexplained", 14.2, 6.0, nearest="creep", leaves=0.983, of="rotation_deg"),
-        "none was worth adding (the likeliest, creep, would leave 98 % of chi-square), and the "
+        "none was added (the likeliest, creep, would leave 98 % of chi-square), and the "
         "residual of these 3 trials is autocorrelated in rotation of the pulley for longer than "
         "noise: by 14.2 standard errors, where chance stays below 6.",
     ),
@@ -296,7 +296,7 @@ def same_size(monkeypatch):
 
 def test_what_is_within_its_limits_is_not_unknown(same_size):
     left, law = (
-        ResidualFraction(unknown.MOST_LEFT, unknown.MOST_REMEMBERED),
+        ResidualFraction(unknown.MOST_LEFT, unknown.MOST_AUTOCORRELATED),
         SimpleNamespace(gain=260.0),
     )
     found = made_up()
@@ -308,7 +308,7 @@ def test_what_is_within_its_limits_is_not_unknown(same_size):
     ("left", "why", "figure", "limit"),
     [
         (ResidualFraction(0.4, 0.5), "slow", 0.4, unknown.MOST_LEFT),
-        (ResidualFraction(0.1, 0.5), "remembered", 0.5, unknown.MOST_REMEMBERED),
+        (ResidualFraction(0.1, 0.5), "autocorrelated", 0.5, unknown.MOST_AUTOCORRELATED),
     ],
 )
 def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):

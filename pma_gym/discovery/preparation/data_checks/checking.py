@@ -47,7 +47,7 @@ def check_dataset(dataset: Dataset, model: Model, stop: bool = True) -> Dataset:
     _refuse(clock_proposals(dataset, named, model), stop, words)
     named = _changed(named, _evened, words)
     named, wholes = _cut(named, words)
-    if model.plant == "station":
+    if not model.rig.is_free:
         _refuse(unit_proposals(dataset, named, model), stop, words)
         # Lags after units: a signal turned round has none.
         words += timing.words(timing.lags(pairs(model, [each.trial for each in named])))

@@ -148,7 +148,7 @@ def way_there(model: Model, trial: Trial, whole: Trial) -> Trial | None:
     """A trial with rows before its first that lead from rest to it; None where no command moves.
 
     A command that rises comes from its least value in the whole log, one that falls from there over
-    its largest: so what the rig remembers comes from the right side.
+    its largest: so hysteresis starts on the right branch.
     """
     motor, regulator = sensors.voltages(model, trial)
     spans = [(float(np.min(row)), float(np.max(row))) for row in sensors.voltages(model, whole)]

@@ -1,0 +1,79 @@
+"""What a rig is: its ports, parts, balances and equilibrium, and what can be asked of it."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from pma_gym.effects.effect import Parameters
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+
+
+@dataclass(frozen=True)
+class Port:
+    """A place where effects act on a rig.
+
+    Attributes:
+        result: what the effects there contribute, and what becomes of it.
+        least: fewest effects that it takes.
+        most: most effects that it takes.
+        only: names of the effects that it takes; any of this port if empty.
+    """
+
+    result: str
+    least: int = 0
+    most: float = math.inf
+    only: tuple[str, ...] = ()
+
+    @property
+    def takes(self) -> str:
+        """How many effects it takes, or which, in words."""
+        if self.only:
+            return " and ".join(self.only)
+        if self.most == 1:
+            return "exactly one effect" if self.least else "at most one effect"
+        return f"{self.least} or more effects"
+
+
+@dataclass(frozen=True)
+class Rig:
+    """A kind of rig. A new one is one file beside this one, and one line of the registry.
+
+    Attributes:
+        name: its name, as `plant = "..."` of a model file says it.
+        ports: its ports: how many effects each takes, and what becomes of their results.
+        parts: effects that it reads itself and cannot do without.
+        position_tolerances: states that are held to a smaller error than the others, and their
+            tolerance as a share of the others'.
+        write_equations: writes its balances, with the model's effects at its ports.
+        solve_equilibrium: puts the states of an `EquilibriumProblem` where they stand still.
+        fastest_oscillation: angular frequency (rad/s) of its fastest oscillation by the effects'
+            parameters; 0 if nothing swings.
+        refused_effects: effects that would fit a port and mean nothing there, and why.
+        absent_outputs: outputs that it does not have, so no sensor measures them.
+        shipped_example: shipped model that a missing part can be copied from; "" for none.
+        balances_loads: a muscle balances the load of the drive, so a load has an equilibrium and a
+            person or a weight can act on it.
+        is_free: nothing holds it: no command has an equilibrium, and a trial begins where its
+            [start] says.
+        has_muscle: it has one, with a pressure and limits of its own.
+        is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
+        moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
+            state that is its rate.
+    """
+
+    name: str
+    ports: Mapping[str, Port]
+    parts: tuple[str, ...]
+    position_tolerances: Mapping[str, float]
+    write_equations: Callable[[PlantEquations], None]
+    solve_equilibrium: Callable[[EquilibriumProblem], None]
+    fastest_oscillation: Callable[[Mapping[str, Parameters]], float]
+    refused_effects: Mapping[str, str] = field(default_factory=dict)
+    absent_outputs: tuple[str, ...] = ()
+    shipped_example: str = ""
+    balances_loads: bool = False
+    is_free: bool = False
+    has_muscle: bool = True
+    is_diagnosable: bool = False
+    moving_lags: Mapping[str, str] = field(default_factory=dict)
