@@ -89,21 +89,21 @@ def diagnose(
 
     with results.opened(resume):
         arguments = {"seed": seed, "jobs": jobs, "journal": results.journal}
-        found = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
+        diagnosis = _run(discovery.diagnose, trials, given, results, arguments, TimeLeft(DIAGNOSIS))
         files = {
-            "diagnosis.json": found.text().encode(),
-            "model.toml": dump_model(found.model).encode(),
-            "trials.toml": dump_states(found.states).encode(),
+            "diagnosis.json": diagnosis.text().encode(),
+            "model.toml": dump_model(diagnosis.model).encode(),
+            "trials.toml": dump_states(diagnosis.states).encode(),
             "report.html": report_page(
-                found, trials.title, _origin(dataset, trials, seed)
+                diagnosis, trials.title, _origin(dataset, trials, seed)
             ).encode(),
         }
-        if found.next_experiment:
-            files["next.csv"] = proposed_file(found.next_experiment.trial, trials, given)
+        if diagnosis.next_experiment:
+            files["next.csv"] = proposed_file(diagnosis.next_experiment.trial, trials, given)
         results.write(files)
     from pma_gym.discovery.report.summary import diagnosis_summary
 
-    print(diagnosis_summary(found))
+    print(diagnosis_summary(diagnosis))
     _print_files(results)
 
 
@@ -127,19 +127,19 @@ def fit(
 
     with results.opened():
         arguments = {"seed": seed, "jobs": jobs}
-        found = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
-        document = found.document()
+        refitted = _run(discovery.refit, trials, given, results, arguments, TimeLeft(FIT))
+        document = refitted.document()
         kept = {key: document[key] for key in _FITTED}
         results.write(
             {
                 "fit.json": (json.dumps(kept, indent=1, allow_nan=False) + "\n").encode(),
-                "model.toml": dump_model(found.model).encode(),
-                "trials.toml": dump_states(found.states).encode(),
+                "model.toml": dump_model(refitted.model).encode(),
+                "trials.toml": dump_states(refitted.states).encode(),
             }
         )
     from pma_gym.discovery.report.summary import print_fit
 
-    print_fit(found)
+    print_fit(refitted)
     _print_files(results)
 
 
@@ -211,5 +211,5 @@ def _origin(folder: Path, trials: Dataset, seed: int) -> dict[str, str]:
 
 
 def _print_files(results: Results) -> None:
-    found = [name for name in reversed(results.names) if (results.folder / name).exists()]
-    print(f"Written to {results.folder}: {', '.join(found)}")
+    written = [name for name in reversed(results.names) if (results.folder / name).exists()]
+    print(f"Written to {results.folder}: {', '.join(written)}")

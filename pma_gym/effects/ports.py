@@ -1,4 +1,4 @@
-"""What an effect that is added to a station may depend on, and what leaves the station as it is.
+"""Ports of a station: what effects give there, what they depend on, what leaves it unchanged.
 
 The station (`pma_gym.plant.rigs.station`) computes its signals one after the other, and finds
 its rest without the cable; so a law sees at its port what is known there. Rates of memories come
@@ -6,6 +6,7 @@ last and see everything. `tests/effects/test_user_effects.py` holds this table a
 together.
 """
 
+import math
 from dataclasses import dataclass
 
 STATES = ("contraction", "velocity", "angle", "spin", "pressure")
@@ -36,44 +37,108 @@ _RANGES = {
 
 
 @dataclass(frozen=True)
-class Place:
-    """A port where effects can be added.
+class Port:
+    """A place where effects act on a rig.
 
     Attributes:
-        signals: what a law there may depend on, beside `memory` and `p`.
-        absent: what a law gives there that changes nothing: a number, or the name of a signal.
+        result: what the effects there contribute, and what becomes of it.
+        least: fewest effects that it takes.
+        most: most effects that it takes.
+        only: names of the effects that it takes; any of this port if empty.
+        signals: what a law of an effect that users add there may depend on, beside `memory` and
+            `p`.
+        absent: what a law gives there that changes nothing, a number or the name of a signal;
+            None where users can add nothing.
     """
 
-    signals: tuple[str, ...]
-    absent: float | str
+    result: str
+    least: int = 0
+    most: float = math.inf
+    only: tuple[str, ...] = ()
+    signals: tuple[str, ...] = ()
+    absent: float | str | None = None
+
+    @property
+    def takes(self) -> str:
+        """How many effects it takes, or which, in words."""
+        if self.only:
+            return " and ".join(self.only)
+        if self.most == 1:
+            return "exactly one effect" if self.least else "at most one effect"
+        return f"{self.least} or more effects"
 
 
-_MUSCLE = Place(("pressure", "contraction", "velocity"), 0.0)
-_DAMPING = ("pressure", "contraction", "velocity", "cable_tension")
-_SENSOR = Place(
-    ("signal", "contraction", "velocity", "angle", "spin", "pressure", "cable_tension"), 0.0
-)
+_MUSCLE = ("pressure", "contraction", "velocity")
+_DAMPING = (*_MUSCLE, "cable_tension")
+_RIPPLE = ("load_arriving", "angle", "motor_angle", "spin", "velocity", "motor_voltage")
+_SENSOR = ("signal", "contraction", "velocity", "angle", "spin", "pressure", "cable_tension")
 
-PLACES: dict[str, Place] = {
-    "muscle_force": _MUSCLE,
-    "slide_force": _MUSCLE,
-    "muscle_damping": Place(_DAMPING, 0.0),
-    "damping_factor": Place(_DAMPING, 1.0),
-    "drive_shape": Place(("load", "motor_voltage", "velocity", "spin", "pressure"), "load"),
-    "drive_delay": Place(("load_asked", "motor_voltage"), "load_asked"),
-    "drive_lag": Place(("load_command", "motor_voltage"), "load_command"),
-    "drive_ripple": Place(
-        ("load_arriving", "angle", "motor_angle", "spin", "velocity", "motor_voltage"), 0.0
+STATION_PORTS: dict[str, Port] = {
+    "muscle_force": Port(
+        "force on the slide (N), added; positive shortens the muscle",
+        least=1,
+        signals=_MUSCLE,
+        absent=0.0,
     ),
-    "regulator_delay": Place(("pressure_asked", "regulator_voltage"), "pressure_asked"),
-    "regulator_pace": Place(("pressure", "pressure_command", "regulator_time_constant"), 1.0),
-    "chamber": Place(("pressure", "contraction", "velocity"), 0.0),
-    "sensor:contraction": _SENSOR,
-    "sensor:rotation": _SENSOR,
-    "sensor:load": _SENSOR,
-    "sensor:pressure": _SENSOR,
+    "muscle_damping": Port(
+        "damping coefficient of the slide (N s/m), added", signals=_DAMPING, absent=0.0
+    ),
+    "damping_factor": Port(
+        "factor on the damping coefficient, multiplied", signals=_DAMPING, absent=1.0
+    ),
+    "slide_force": Port(
+        "force on the slide (N), added; positive shortens the muscle", signals=_MUSCLE, absent=0.0
+    ),
+    "cable": Port("tension of the cable (N)", least=1, most=1),
+    "drive": Port("load that the drive asks for (N)", least=1, most=1),
+    "drive_shape": Port(
+        "that load (N), changed by one effect after the other",
+        signals=("load", "motor_voltage", "velocity", "spin", "pressure"),
+        absent="load",
+    ),
+    "drive_delay": Port(
+        "load command that has reached the drive (N)",
+        most=1,
+        signals=("load_asked", "motor_voltage"),
+        absent="load_asked",
+    ),
+    "drive_lag": Port(
+        "load that arrives at the pulley (N)",
+        most=1,
+        signals=("load_command", "motor_voltage"),
+        absent="load_command",
+    ),
+    "drive_ripple": Port("load on top of what arrives (N), added", signals=_RIPPLE, absent=0.0),
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
+    "regulator_delay": Port(
+        "pressure command that has reached the regulator (Pa)",
+        most=1,
+        signals=("pressure_asked", "regulator_voltage"),
+        absent="pressure_asked",
+    ),
+    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
+    "regulator_pace": Port(
+        "factor on the regulator's rate, multiplied",
+        signals=("pressure", "pressure_command", "regulator_time_constant"),
+        absent=1.0,
+    ),
+    "chamber": Port(
+        "rate of the pressure beside the regulator's (Pa/s), added", signals=_MUSCLE, absent=0.0
+    ),
 }
-"""Ports of a station where effects can be added, by name."""
+"""Ports of a station: how many effects each takes, what becomes of their results, what their laws
+may depend on."""
+
+SENSOR_PORTS: dict[str, Port] = {
+    f"sensor:{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
+    for output in ("contraction", "rotation", "load", "pressure")
+}
+"""Ports of the sensors, which every rig has."""
+
+OPEN_PORTS: dict[str, Port] = {
+    name: port for name, port in (STATION_PORTS | SENSOR_PORTS).items() if port.absent is not None
+}
+"""Ports where users can add effects."""
 
 
 def example(signal: str) -> float:

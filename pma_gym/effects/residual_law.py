@@ -114,7 +114,15 @@ _SIGNATURE = "none of its own; drawn by a diagnosis where no other effect fits"
 
 
 def _effect(name: str, port: str, parameters: type, law: Callable) -> Effect:
-    return Effect(name, port, parameters, law, signature=_SIGNATURE, held=("first", "reach"))
+    return Effect(
+        name,
+        port,
+        parameters,
+        law,
+        signature=_SIGNATURE,
+        held=("first", "reach"),
+        replaces="free law",
+    )
 
 
 RESIDUAL_FORCE_OF_CONTRACTION = _effect(

@@ -9,7 +9,7 @@ from types import CodeType, FunctionType, ModuleType
 from pma_gym.codegen.graph import CHANGING, FIXED, Graph
 from pma_gym.codegen.trace import trace
 from pma_gym.effects.effect import Effect, signals
-from pma_gym.effects.ports import EVERYTHING, PLACES, STATES, example
+from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, STATES, example
 from pma_gym.units import with_unit
 
 
@@ -28,9 +28,9 @@ def numbers(law: Callable) -> Iterator[tuple[str, object]]:
 
 
 def _port(effect: Effect, _module: ModuleType) -> str:
-    if effect.port in PLACES:
+    if effect.port in OPEN_PORTS:
         return ""
-    return f"acts at port {effect.port!r}; effects can be added at {', '.join(PLACES)}"
+    return f"acts at port {effect.port!r}; effects can be added at {', '.join(OPEN_PORTS)}"
 
 
 def _parameters(effect: Effect, _module: ModuleType) -> str:
@@ -84,7 +84,7 @@ def _functions(effect: Effect, module: ModuleType) -> str:
 
 def _arguments(effect: Effect, _module: ModuleType) -> str:
     memory = ("memory",) if effect.rate or effect.rate_independent_law else ()
-    place, path = PLACES[effect.port].signals, ("memory", "travel", "direction")
+    place, path = OPEN_PORTS[effect.port].signals, ("memory", "travel", "direction")
     known = [
         (effect.law, (*place, *memory)),
         (effect.rate, (*EVERYTHING, "memory")),
@@ -142,7 +142,7 @@ def _memories(effect: Effect, make: Callable) -> object:
 
 
 def _absence(effect: Effect, _module: ModuleType) -> str:
-    law, absent = effect.law, PLACES[effect.port].absent
+    law, absent = effect.law, OPEN_PORTS[effect.port].absent
     assert law is not None
     for share in (1.0, -0.5):
         known = {name: share * example(name) for name in signals(law)}

@@ -1,4 +1,4 @@
-"""From actions to volts: what the agent asks for, checked, and how late the station hears it."""
+"""From actions to volts: an agent's action, checked, and the action of a voltage."""
 
 import math
 

@@ -192,9 +192,9 @@ def _halves(first: int, last: int) -> list[tuple[int, int]]:
     >>> _halves(0, 16)
     [(0, 8), (8, 12), (12, 14), (14, 16)]
     """
-    found = []
+    halves = []
     while last - first >= 2 * LEAST_BLOCKS:
         middle = (first + last) // 2
-        found.append((first, middle))
+        halves.append((first, middle))
         first = middle
-    return [*found, (first, last)]
+    return [*halves, (first, last)]

@@ -1,4 +1,4 @@
-"""What an environment remembers between two steps: a row of numbers, in named places."""
+"""The state of an environment between two steps: a row of numbers, at named offsets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ NOMINAL_STATION = (
 and keeps the exercise safe. `told_lag_share` is how far the pressure goes in a control step."""
 
 FILTER_STATE = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
-"""Places of what the safety layer remembers: the pressure that the nominal regulator has come to
+"""Offsets of the safety layer's state: the pressure that the nominal regulator has come to
 (Pa), the last measured extension (m), the estimated speed (rad/s), the moment of late
 (N m)."""
 

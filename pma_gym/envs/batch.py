@@ -91,18 +91,18 @@ def wanted_pressures(
 
 
 def spread(
-    found: Mapping[str, Any], mask: NDArray[np.bool_], indices: NDArray[np.int64]
+    columns: Mapping[str, Any], mask: NDArray[np.bool_], indices: NDArray[np.int64]
 ) -> dict[str, Any]:
     """Values of the environments in a mask as arrays of all, each with a mask of its own.
 
     Args:
-        found: arrays by name, one value for each environment in the mask, or dictionaries of such;
-            NaN for a value that there is not.
+        columns: arrays by name, one value for each environment in the mask, or dictionaries of
+            such; NaN for a value that there is not.
         mask: bool, shape (num_envs,).
         indices: where it is true.
     """
     info: dict[str, Any] = {}
-    for name, values in found.items():
+    for name, values in columns.items():
         own, places = mask.copy(), indices
         if isinstance(values, Mapping):
             info[name], info[f"_{name}"] = spread(values, mask, indices), own

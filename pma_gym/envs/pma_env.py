@@ -164,7 +164,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     | `operator` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
     | `regulator_and_operator` | both |
 
-    A jump is volts that the regulator hears beside its command, by the nominal line and as far as
+    A jump adds volts to the regulator's command, by the nominal line and as far as
     0-10 V go; the operator's force adds to the muscle's at the slide. Both come with the control
     step after their time. `env.disturbance` and `env.events` tell, but not controllers.
 

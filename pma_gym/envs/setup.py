@@ -1,4 +1,4 @@
-"""What an environment was made with, as words that can be compared and stored."""
+"""The task, options and model of an environment as text that can be compared and stored."""
 
 import hashlib
 import re

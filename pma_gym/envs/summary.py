@@ -36,21 +36,21 @@ def episode_summary(engine: Engine, index: int) -> dict[str, Any]:
 
 def _step_info(engine: Engine, row: list[float]) -> dict[str, Any]:
     keys, first = engine.state_layout.info, engine.state_layout.offsets["ended"] + 1
-    found = dict(zip(keys, row[first : first + len(keys)], strict=True))
-    return found | {name: found[name] != 0.0 for name in TRUTHS}
+    info = dict(zip(keys, row[first : first + len(keys)], strict=True))
+    return info | {name: info[name] != 0.0 for name in TRUTHS}
 
 
 def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, Any]:
     task, offsets = engine.task, engine.state_layout.offsets
     sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.protocol.phases}
-    found = summary(task, sums, row[offsets["sample"]])
+    score = summary(task, sums, row[offsets["sample"]])
     code = row[offsets["ended"]]
-    found["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
+    score["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
     if task.exercise is None:
-        return found
+        return score
     numbers = {name: np.array([row[offsets[name]]]) for name in exercise_offsets()}
     other = exercise_summaries(numbers, np.array([engine.steps(index)]), engine.options.period)
-    return found | {name: float(values[0]) for name, values in other.items()}
+    return score | {name: float(values[0]) for name, values in other.items()}
 
 
 def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, Any]:

@@ -420,23 +420,23 @@ class PMAVectorEnv(
         columns = engine.rows(indices).T
         numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
         sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
-        found: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
-        found |= {name: found[name] != 0.0 for name in TRUTHS}
-        found |= summaries(task, sums, numbers["sample"])
+        columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
+        columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
+        columns_by_name |= summaries(task, sums, numbers["sample"])
         if task.exercise:
             counts = engine.counts()[indices]
-            found |= exercise_summaries(numbers, counts, self.options.period)
+            columns_by_name |= exercise_summaries(numbers, counts, self.options.period)
         pairs = zip(indices.tolist(), numbers["ended"].tolist(), strict=True)
         limits = [limit_in_words(engine.models[i], code, task.exercise) for i, code in pairs]
-        found["ended_by"] = np.array(limits, object)
-        return spread(found, over, indices)
+        columns_by_name["ended_by"] = np.array(limits, object)
+        return spread(columns_by_name, over, indices)
 
     def station_info(self) -> dict[str, NDArray[Any]]:
         """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
-        found: dict[str, NDArray[Any]] = {
+        info: dict[str, NDArray[Any]] = {
             name: self.engine.numbers(name) for name in self.engine.state_layout.info
         }
-        return found | {name: found[name] != 0.0 for name in TRUTHS}
+        return info | {name: info[name] != 0.0 for name in TRUTHS}
 
     def measurements(self) -> NDArray[np.float64]:
         """What the sensors say, `observation_delay_s` ago (SI), shape (4, num_envs).

@@ -15,8 +15,9 @@ import numpy as np
 from pma_gym.documents import DocumentError, read_toml
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.effects.effect import Parameters, Value
+from pma_gym.effects.ports import Port
 from pma_gym.limits import LimitError
-from pma_gym.plant.rigs import RIGS, Port, Rig
+from pma_gym.plant.rigs import RIGS, Rig
 from pma_gym.plant.toml import LINE_FORM, toml_text
 
 SCHEMA = 1

@@ -71,14 +71,14 @@ def scaled(layers: Layers) -> Sequence[Layer]:
         layers: two or more.
     """
     (weight, bias), *between, (last, last_bias) = layers
-    found = [
+    scaled_layers = [
         (weight.mT, bias, 2.0, 2.0),
         *((weight.mT, bias - weight.sum(-1), 4.0, 2.0) for weight, bias in between),
         (last.mT, last_bias - last.sum(-1), 2.0, 1.0),
     ]
     if weight.dim() == 2:
-        return found
-    return [(weight, bias[:, None], alpha, beta) for weight, bias, alpha, beta in found]
+        return scaled_layers
+    return [(weight, bias[:, None], alpha, beta) for weight, bias, alpha, beta in scaled_layers]
 
 
 def passed(x: Tensor, layers: Sequence[Layer], out: Sequence[Tensor] = ()) -> list[Tensor]:
@@ -90,10 +90,10 @@ def passed(x: Tensor, layers: Sequence[Layer], out: Sequence[Tensor] = ()) -> li
         out: where to write each s; empty for fresh memory.
     """
     *hidden, last = layers
-    found = [_shared(x, last[0])]
+    outputs = [_shared(x, last[0])]
     for layer, place in zip(hidden, out or [None] * len(hidden), strict=True):
-        found.append(_linear(found[-1], layer, place).sigmoid_())
-    return [*found[1:], _linear(found[-1], last)]
+        outputs.append(_linear(outputs[-1], layer, place).sigmoid_())
+    return [*outputs[1:], _linear(outputs[-1], last)]
 
 
 def _shared(x: Tensor, among: Tensor) -> Tensor:

@@ -252,9 +252,9 @@ class _Rollout:
         self._whole = np.concatenate(columns, axis=1, dtype=np.float32)
 
     def part(self, rows: NDArray[np.int64]) -> _Part:
-        found = self._whole.take(rows, 0)
-        observations, actions = found[:, : self._entries], found[:, self._entries : -4]
-        likelihoods, advantages, *others = found[:, -4:].T
+        table = self._whole.take(rows, 0)
+        observations, actions = table[:, : self._entries], table[:, self._entries : -4]
+        likelihoods, advantages, *others = table[:, -4:].T
         if self._normalises and len(rows) > 1:
             advantages = (advantages - advantages.mean()) / (advantages.std(ddof=1) + 1e-8)
         return _Part(torch.from_numpy(observations), actions, likelihoods, advantages, *others)

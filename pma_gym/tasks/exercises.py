@@ -123,5 +123,5 @@ def numbered_exercise(name: str) -> Task | None:
     Raises:
         ValueError: a moment that is not safe.
     """
-    found = re.fullmatch(r"isotonic_exercise_(\d+(?:\.\d+)?)", name)
-    return isotonic_exercise(float(found[1]), name) if found else None
+    match = re.fullmatch(r"isotonic_exercise_(\d+(?:\.\d+)?)", name)
+    return isotonic_exercise(float(match[1]), name) if match else None

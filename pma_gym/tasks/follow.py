@@ -20,7 +20,7 @@ _HALVINGS = 40
 
 
 def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str | None:
-    """What keeps the actuator of a station from following a task, in words; None if nothing.
+    """Why the actuator of a station cannot follow a task, in words; None if it can.
 
     A jump of the reference; a voltage of less than 0 or more than 10 V; or, where the motor moves,
     a cable that would have to push, on the way back. The muscle's force and damping count; inertia,
@@ -49,9 +49,9 @@ def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str
             f"model must be of a station, whose forces balance, got {nominal.name}, a "
             f"{nominal.plant}"
         )
-    found = _jump(task)
-    if found is not None or task.exercise:
-        return found
+    reason = _jump(task)
+    if reason is not None or task.exercise:
+        return reason
     balance = _Balance(task, Plant(nominal), pressure)
     return balance.of_motor() if task.actuator == "motor" else balance.of_regulator()
 

@@ -24,11 +24,11 @@ def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
         limits: the rig's parameters of `[limits]` (SI).
         truth: contraction (m), load (N), pressure (Pa).
     """
-    found = 0.0
+    code = 0.0
     # A state that is no number keeps no limit. The first of several counts.
     for i, (output, limit, sign) in reversed(list(enumerate(LIMITS, 1))):
-        found = where(sign * truth[output] <= getattr(limits, limit), found, float(i))
-    return found
+        code = where(sign * truth[output] <= getattr(limits, limit), code, float(i))
+    return code
 
 
 def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
@@ -41,8 +41,8 @@ def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
     """
     code = float(len(LIMITS))
     # A joint that turns at no speed that is a number is not safe.
-    found = where(abs(speed) <= exercise.safe_speed, 0.0, code + 2.0)
-    return where(moment <= exercise.safe_moment, found, code + 1.0)
+    speed_code = where(abs(speed) <= exercise.safe_speed, 0.0, code + 2.0)
+    return where(moment <= exercise.safe_moment, speed_code, code + 1.0)
 
 
 def broken_limit(model: Model, truth: Mapping[str, float]) -> str:

@@ -1,6 +1,6 @@
 """The safety layer of an exercise: the pressure that it lets through.
 
-It stands between whoever commands the regulator and the regulator, hears the sensors and knows the
+It stands between whoever commands the regulator and the regulator, reads the sensors and knows the
 nominal device, and holds the pressure that is asked for within
 
     P - fall  <=  P_asked  <=  P + rise
@@ -108,8 +108,8 @@ def filtered_pressure(
     )
     rising = where(room < rising, room, rising)
     lowest, highest = pressure - falling, pressure + rising
-    found = where(asked < lowest, lowest, asked)
-    return where(found > highest, highest, found)
+    raised = where(asked < lowest, lowest, asked)
+    return where(raised > highest, highest, raised)
 
 
 def _reserve(left: Any, safety_filter: SafetyFilter) -> Any:  # noqa: ANN401

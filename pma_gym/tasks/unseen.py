@@ -171,8 +171,8 @@ def unseen(name: str) -> Task | None:
     >>> unseen("displacement_speeds_12").name, unseen("displacement_sine_1")
     ('displacement_speeds_12', None)
     """
-    found = re.fullmatch(r"(displacement|rotation)_(multisine|steps|speeds)_(0|[1-9]\d*)", name)
-    if found is None or int(found[3]) >= SEEDS:
+    match = re.fullmatch(r"(displacement|rotation)_(multisine|steps|speeds)_(0|[1-9]\d*)", name)
+    if match is None or int(match[3]) >= SEEDS:
         return None
-    quantity = next(q for q, base in _BASES.items() if base == found[1])
-    return DRAWN[found[2]](quantity, int(found[3]))
+    quantity = next(q for q, base in _BASES.items() if base == match[1])
+    return DRAWN[match[2]](quantity, int(match[3]))

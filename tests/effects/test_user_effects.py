@@ -10,14 +10,14 @@ import pytest
 from pma_gym.codegen.trace import live_inputs
 from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE, Effect, user_effects
-from pma_gym.effects.ports import EVERYTHING, PLACES
+from pma_gym.effects.ports import EVERYTHING, OPEN_PORTS, SENSOR_PORTS, STATION_PORTS
 from pma_gym.effects.user_effects import OwnEffectError, load_effects, source_of
 from pma_gym.integrator.equations import COMMANDS, ZERO
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import structure
-from pma_gym.plant.rigs.station import PORTS, write_equations
+from pma_gym.plant.rigs.station import write_equations
 from pma_gym.plant.statics import muscle_force
 
 HEAD = """
@@ -226,11 +226,11 @@ BRANCH = Effect("branch", "{port}", Branch, law, rate=rate)
 )
 
 
-@pytest.mark.parametrize("port", PLACES)
+@pytest.mark.parametrize("port", OPEN_PORTS)
 def test_laws_may_know_what_the_table_says(port, write, station):
     """Every signal at every port is one that the station has when it gets there."""
-    assert port in PORTS or port.startswith("sensor:")
-    place = PLACES[port]
+    assert port in STATION_PORTS or port in SENSOR_PORTS
+    place = OPEN_PORTS[port]
     known = {
         "signals": "".join(f"{name}, " for name in place.signals),
         "absent": place.absent if isinstance(place.absent, str) else f"{place.absent!r}",

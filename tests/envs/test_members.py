@@ -4,15 +4,15 @@ import sys
 from types import ModuleType, SimpleNamespace
 
 import gymnasium as gym
+import gymnasium.wrappers.vector
 import numpy as np
 import pytest
-from gymnasium.wrappers.vector import RecordVideo
 
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 
 MADE = {"model": "serres2008", "pressure_kpa": 300, "render_mode": "rgb_array"}
 READ = (
-    "time truth position error reading pressure ended_by extrapolated disturbance events human "
+    "time truth position error measurement pressure ended_by extrapolated disturbance events human "
     "motor_voltage regulator_voltage motor_voltages voltages"
 ).split()
 
@@ -131,8 +131,13 @@ def films(monkeypatch):
 
 
 def test_gymnasium_records_a_film_of_a_batch(films, tmp_path):
+    if not hasattr(gym.wrappers.vector, "RecordVideo"):
+        pytest.skip(f"Gymnasium {gym.__version__} has no RecordVideo of batches")
     envs = gym.make_vec("pma_gym/IsokineticDisplacement-v0", 4, control_rate_hz=10.0, **MADE)
-    envs = RecordVideo(envs, str(tmp_path / "films"), episode_trigger=lambda episode: episode == 0)
+    folder = str(tmp_path / "films")
+    envs = gym.wrappers.vector.RecordVideo(
+        envs, folder, episode_trigger=lambda episode: episode == 0
+    )
     envs.reset(seed=1)
     for _ in range(60):
         envs.step(np.full((4, 1), -0.9, np.float32))

@@ -42,6 +42,10 @@ def bounded(builder: Builder, threads: int) -> None:
     """
     # llvmlite's own `add` knows no attributes with a value.
     set.add(builder.function.attributes, f'"nvvm.maxntid"="{threads}"')
+    # LLVM up to version 20 reads the same promise from an annotation.
+    module = builder.module
+    promise = [builder.function, ir.MetaDataString(module, "maxntidx"), INDEX(threads)]
+    module.add_named_metadata("nvvm.annotations", promise)
 
 
 def thread_index(builder: Builder) -> Operand:

@@ -21,32 +21,6 @@ from pma_gym.units import Quantity
 
 Array = NDArray[np.float64]
 
-REPLACING_LAWS = frozenset(
-    {
-        "contractile_force",
-        "stiffness",
-        "sarosi_force",
-        "schulte_force",
-        "schulz_force",
-        "chou_hannaford_force",
-        "caldwell_force",
-        "tondu_lopez_force",
-        "colbrunn_spring",
-        "repperger_spring",
-        "damping",
-        "symmetric_damping",
-        "repperger_damping",
-        "operator",
-        "residual_force_of_contraction",
-        "residual_force_of_velocity",
-        "residual_force_of_pressure",
-        "residual_load",
-    }
-)
-"""Laws that stand in place of another, not beside it: a whole muscle's force or damping (compare
-such models as models), the operator's hand, which no experiment without one has, and the laws
-without a shape of their own (`residual_law`)."""
-
 SCALES = (0.1, 0.3, 1.0, 3.0)
 """How many times its usual value an amplitude is probed at."""
 
@@ -95,7 +69,7 @@ def _lacking(
     model: Model, effect: Effect, orders: Sequence[float] | None
 ) -> "CandidateEffect | None":
     """An effect that the model has not."""
-    if effect.name in model.parameters or effect.name in REPLACING_LAWS or effect.neutral is None:
+    if effect.name in model.parameters or effect.replaces or effect.neutral is None:
         return None
     counted = "repeat" in effect.quantities
     if counted and (orders is None or len(set(orders)) < 2):
@@ -110,7 +84,8 @@ def _lacking(
         for stem, quantity in effect.quantities.items()
         if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
-        and stem != "repeat"
+        # Free in every trial already, as `estimation.residuals` has it.
+        and stem not in ("repeat", effect.memory_start)
     }
     if any(quantity.usual is None for quantity in shown.values()):
         return None

@@ -56,6 +56,7 @@ def colbrunn_spring(pressure, contraction, p):
 
 COLBRUNN_SPRING = Effect(
     name="colbrunn_spring",
+    replaces="force law",
     port="muscle_force",
     parameters=ColbrunnSpring,
     held=("hardening_length", "reach", "half_pressure"),

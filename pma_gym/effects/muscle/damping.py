@@ -49,6 +49,7 @@ def damping(pressure, velocity, p):
 
 DAMPING = Effect(
     name="damping",
+    replaces="damping law",
     port="muscle_damping",
     parameters=Damping,
     held=("breakpoint",),
@@ -91,6 +92,7 @@ def symmetric_damping(pressure, p):
 
 SYMMETRIC_DAMPING = Effect(
     name="symmetric_damping",
+    replaces="damping law",
     port="muscle_damping",
     parameters=SymmetricDamping,
     law=symmetric_damping,

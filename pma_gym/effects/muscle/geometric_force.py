@@ -277,9 +277,16 @@ SCHULTE_FORCE = Effect(
     schulte_force,
     signature=_PROPORTIONAL,
     held=_GEOMETRY,
+    replaces="force law",
 )
 SCHULZ_FORCE = Effect(
-    "schulz_force", "muscle_force", SchulzForce, schulz_force, signature=_SIGNATURE, held=_GEOMETRY
+    "schulz_force",
+    "muscle_force",
+    SchulzForce,
+    schulz_force,
+    signature=_SIGNATURE,
+    held=_GEOMETRY,
+    replaces="force law",
 )
 CHOU_HANNAFORD_FORCE = Effect(
     "chou_hannaford_force",
@@ -288,6 +295,7 @@ CHOU_HANNAFORD_FORCE = Effect(
     chou_hannaford_force,
     signature=_PROPORTIONAL,
     held=_GEOMETRY,
+    replaces="force law",
 )
 CALDWELL_FORCE = Effect(
     "caldwell_force",
@@ -296,6 +304,7 @@ CALDWELL_FORCE = Effect(
     caldwell_force,
     signature=_PROPORTIONAL,
     held=_GEOMETRY,
+    replaces="force law",
 )
 TONDU_LOPEZ_FORCE = Effect(
     "tondu_lopez_force",
@@ -304,4 +313,5 @@ TONDU_LOPEZ_FORCE = Effect(
     tondu_lopez_force,
     signature=_PROPORTIONAL,
     held=_GEOMETRY,
+    replaces="force law",
 )

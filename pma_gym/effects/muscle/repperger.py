@@ -111,6 +111,7 @@ def repperger_damping(pressure, velocity, p):
 
 REPPERGER_SPRING = Effect(
     name="repperger_spring",
+    replaces="force law",
     port="muscle_force",
     parameters=ReppergerSpring,
     law=repperger_spring,
@@ -118,6 +119,7 @@ REPPERGER_SPRING = Effect(
 )
 REPPERGER_DAMPING = Effect(
     name="repperger_damping",
+    replaces="damping law",
     port="muscle_damping",
     parameters=ReppergerDamping,
     law=repperger_damping,

@@ -53,6 +53,7 @@ def sarosi_force(pressure, contraction, p):
 
 SAROSI_FORCE = Effect(
     name="sarosi_force",
+    replaces="force law",
     port="muscle_force",
     parameters=SarosiForce,
     held=("resting_length",),

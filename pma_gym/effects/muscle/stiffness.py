@@ -59,6 +59,7 @@ def spring_force(pressure, contraction, p):
 
 STIFFNESS = Effect(
     name="stiffness",
+    replaces="force law",
     port="muscle_force",
     parameters=Stiffness,
     held=("breakpoint",),

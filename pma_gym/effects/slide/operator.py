@@ -50,6 +50,7 @@ def operator_rate(memory, p):
 
 OPERATOR = Effect(
     name="operator",
+    replaces="person",
     port="slide_force",
     parameters=Operator,
     held=("share",),

@@ -86,12 +86,12 @@ class BlockMemory:
         self.fixed: list[Value] = []
 
     def _arguments(self, b: Builder, arguments: Operand) -> dict[str, Operand]:
-        found = {}
+        by_name = {}
         numbers = ("first", "last", "count", "table_stride", "settles", "horizon")
         for i, name in enumerate(ARGUMENTS):
             value = b.load(offset(b, arguments, i, INTEGER), typ=INTEGER)
-            found[name] = value if name in numbers else b.inttoptr(value, POINTER)
-        return found
+            by_name[name] = value if name in numbers else b.inttoptr(value, POINTER)
+        return by_name
 
     def _place(
         self, b: Builder, records: Operand, block: Operand, name: str, lane: Operand | int
@@ -169,7 +169,7 @@ class BlockMemory:
         self,
         b: Builder,
         lanes: SimdEmitter,
-        found: dict[int, Operand],
+        emitted: dict[int, Operand],
         values: dict[str, Value],
         records: Operand,
         lane: Operand | int,
@@ -181,7 +181,7 @@ class BlockMemory:
             at = self._row(b, name)
             index = b.add(at, integer(lane)) if alone else at
             where = offset(b, records, index, self.element)
-            self._keep(b, lanes, found[value.id], where, self.state_layout.kind(name))
+            self._keep(b, lanes, emitted[value.id], where, self.state_layout.kind(name))
 
     def _block(self, b: Builder, given: dict[str, Operand], block: Operand) -> tuple[Operand, ...]:
         """Addresses of a block's records and tables."""
@@ -209,7 +209,7 @@ class BlockMemory:
         later: int,
     ) -> Operand:
         """References so many steps ahead, for a block or one lane."""
-        found = []
+        references = []
         for k in range(lanes.width):
             index = self._row(b, "count", k)
             if lanes.width == 1:
@@ -217,21 +217,21 @@ class BlockMemory:
             steps = self._count(b, offset(b, records, index, self.element))
             row = b.add(steps, integer(ahead + later))
             where = offset(b, given["references"], row, self.element)
-            found.append(b.load(where, typ=self.element))
-        return self._gathered(b, lanes, found)
+            references.append(b.load(where, typ=self.element))
+        return self._gathered(b, lanes, references)
 
     def _put_observation(
         self,
         b: Builder,
         lanes: SimdEmitter,
         given: dict[str, Operand],
-        found: dict[int, Operand],
+        emitted: dict[int, Operand],
         entries: Sequence[Value],
         first: Operand,
     ) -> None:
         for i, entry in enumerate(entries):
             for k in range(lanes.width):
-                number = lanes.extract(b, found[entry.id], k)
+                number = lanes.extract(b, emitted[entry.id], k)
                 row = b.mul(b.add(first, integer(k)), integer(len(entries)))
                 where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
                 b.store(narrowed(b, number, FLOAT), where)

@@ -21,7 +21,7 @@ from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, w
 from pma_gym.engine.state_layout import DRAW, TARE
 from pma_gym.integrator.integration import FUSED, memory
 from pma_gym.plant.program import FIRST_S, balanced
-from pma_gym.plant.system import static_force
+from pma_gym.plant.system import memories_at_start, static_force
 
 TARE_READINGS = 192
 """Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""
@@ -72,7 +72,8 @@ class ResetWriter(BlockMemory):
         keys = self.step_graph.slot("key_0"), self.step_graph.slot("key_1")
         stream = self.step_graph.slot("episode") * 4 + DRAW
         self.share = uniform(philox((nothing, stream, nothing, nothing), keys)[0])
-        return [self.force, *self.reach, *self.line]
+        self.memories = memories_at_start(eq)
+        return [self.force, *self.reach, *self.line, *self.memories.values()]
 
     def _begin(self) -> None:
         """Begin trials of environments, at rest wherever their states are not set already.
@@ -121,8 +122,9 @@ class ResetWriter(BlockMemory):
         reach = [known[value.id] for value in self.reach]
         none = ir.Constant(DOUBLE, 0.0)
         zero = balanced(b, self.eq, self.force, known, none, reach)
-        found = {"zero": zero, "pressure": pressure}
-        real = {name: found[what] for name, what in _AT_REST.items()}
+        at_rest = {"zero": zero, "pressure": pressure}
+        real = {name: at_rest[what] for name, what in _AT_REST.items()}
+        real |= {name: known[value.id] for name, value in self.memories.items()}
         real |= {"zero_contraction": zero, "size": ir.Constant(DOUBLE, FIRST_S)}
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
         real |= self._asked_before(b, regulator)
@@ -153,14 +155,14 @@ class ResetWriter(BlockMemory):
         for sign, bound in (("<", -1.0), (">", 1.0)):
             end = ir.Constant(DOUBLE, bound)
             action = b.select(b.fcmp_ordered(sign, action, end), end, action)
-        found = {}
+        commands = {}
         actions = ir.Constant(DOUBLE, -1.0), action
         volts = ir.Constant(DOUBLE, 0.0), regulator
         for i in range(self.state_layout.actions):
-            found[f"action_{i}"] = actions[i]
+            commands[f"action_{i}"] = actions[i]
             for k in range(self.state_layout.options.action_delay):
-                found[f"wire_{k}_{i}"] = volts[i]
-        return found
+                commands[f"wire_{k}_{i}"] = volts[i]
+        return commands
 
     def _zero_sensors(self, b: Builder, records: Operand, tables: Operand, lane: Operand) -> None:
         """Read the sensors at rest, some readings at once.
@@ -178,11 +180,11 @@ class ResetWriter(BlockMemory):
         with loop(b, readings, step=abreast.width) as first:
             number = b.add(abreast.spread(b, first), abreast.numbers)
             known[self.eq.graph.input("reading", 2, "integer").id] = number
-            found = abreast.emit(b, self.tare, known)
+            emitted = abreast.emit(b, self.tare, known)
             for total, value in zip(totals, self.tare[:2], strict=True):
                 sum_ = b.load(total, typ=DOUBLE)
                 for k in range(abreast.width):
-                    sum_ = b.fadd(sum_, widened(b, abreast.extract(b, found[value.id], k)))
+                    sum_ = b.fadd(sum_, widened(b, abreast.extract(b, emitted[value.id], k)))
                 b.store(sum_, total)
         for total, name in zip(totals, ("tare_contraction", "tare_rotation"), strict=True):
             mean = b.fmul(b.load(total, typ=DOUBLE), ir.Constant(DOUBLE, 1.0 / readings))
@@ -206,8 +208,8 @@ class ResetWriter(BlockMemory):
             known[self.step_graph.reference(ahead).id] = self._references(
                 b, lanes, given, records, lane, ahead, 0
             )
-        found = lanes.emit(b, values, known)
-        self._store(b, lanes, found, self.begun, records, lane)
+        emitted = lanes.emit(b, values, known)
+        self._store(b, lanes, emitted, self.begun, records, lane)
         if self.traces:
-            b.store(widened(b, found[self.first_position.id]), given["trace"])
-        self._put_observation(b, lanes, given, found, entries, index)
+            b.store(widened(b, emitted[self.first_position.id]), given["trace"])
+        self._put_observation(b, lanes, given, emitted, entries, index)

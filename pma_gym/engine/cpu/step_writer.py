@@ -82,9 +82,9 @@ class Writer(ResetWriter):
     def _table(self) -> None:
         b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
         known = self.kernel.program.parameters(b, vector, self.fixed)
-        found = SimdEmitter(1).emit(b, self.fixed, known)
+        emitted = SimdEmitter(1).emit(b, self.fixed, known)
         for i, value in enumerate(self.fixed):
-            b.store(found[value.id], offset(b, out, i))
+            b.store(emitted[value.id], offset(b, out, i))
         b.ret_void()
         b, _ = function(self.module, "table_size", [], INTEGER)
         b.ret(integer(len(self.fixed)))
@@ -174,8 +174,8 @@ class Writer(ResetWriter):
         known = self._known(b, lanes, values, records, tables, 0)
         for i in range(self.state_layout.actions):
             known[self.step_graph.action(i).id] = self._actions(b, lanes, given, block, i)
-        found = lanes.emit(b, values, known)
-        self._store(b, lanes, found, self.commanded, records, 0)
+        emitted = lanes.emit(b, values, known)
+        self._store(b, lanes, emitted, self.commanded, records, 0)
 
     def _march(
         self,
@@ -209,8 +209,8 @@ class Writer(ResetWriter):
                 with b.if_then(b.not_(is_left())):
                     for place, job in zip((following, behind), take_part(), strict=True):
                         b.store(job, place)
-            found, job = is_left(), b.load(following, typ=INTEGER)
-            with b.if_then(found):
+            is_next, job = is_left(), b.load(following, typ=INTEGER)
+            with b.if_then(is_next):
                 b.store(b.add(job, integer(1)), following)
                 b.store(job, lane.job(k))
                 if self.width == 1:
@@ -236,7 +236,7 @@ class Writer(ResetWriter):
                 with b.if_then(stale) if again else nullcontext():
                     lane.tabulate(k, offset(b, tables, rest), self.width)
                 lane.hold(k, inputs)
-            return found
+            return is_next
 
         def proceed(k: Operand) -> Operand:
             job = b.load(lane.job(k), typ=INTEGER)
@@ -246,8 +246,8 @@ class Writer(ResetWriter):
                 b.store(lane.widen(lane.get(name, k)), address(job, name))
             return take(k, again=True)
 
-        def watch(found: dict[int, Operand]) -> None:
-            self._sample(b, lanes, lane, found, given)
+        def watch(emitted: dict[int, Operand]) -> None:
+            self._sample(b, lanes, lane, emitted, given)
 
         made = integrate_lanes(lane, self.attempt, take, proceed, watch, self.extra)
         b.store(b.load(made, typ=INTEGER), given["attempts"])
@@ -257,18 +257,18 @@ class Writer(ResetWriter):
         b: Builder,
         lanes: SimdEmitter,
         lane: Numbers,
-        found: dict[int, Operand],
+        emitted: dict[int, Operand],
         given: dict[str, Operand],
     ) -> None:
         """Take every sample that lies in the attempt."""
         options, task = self.state_layout.options, self.state_layout.task
         one = sampling(self.eq, self.attempt, task, options.period)
         graph = self.eq.graph
-        known = {self.attempt.left.id: found[self.attempt.left.id]}
+        known = {self.attempt.left.id: emitted[self.attempt.left.id]}
         for name, value in zip(COURSE, self.course.values, strict=True):
-            known[graph.input(f"course.{name}", 2).id] = found[value.id]
-        known[graph.input("length", 2).id] = found[self.attempt.length.id]
-        known[graph.input("accepted", 2, "truth").id] = found[self.attempt.accepted.id]
+            known[graph.input(f"course.{name}", 2).id] = emitted[value.id]
+        known[graph.input("length", 2).id] = emitted[self.attempt.length.id]
+        known[graph.input("accepted", 2, "truth").id] = emitted[self.attempt.accepted.id]
         known[graph.input("clock", HELD).id] = lane.vector("clock")
         phases = task.protocol.phases
         with repeat(b) as leave_if:
@@ -297,12 +297,12 @@ class Writer(ResetWriter):
         self, b: Builder, lanes: SimdEmitter, given: dict[str, Operand], samples: Operand
     ) -> Operand:
         """Ideal position at the next sample of every lane, from the table."""
-        found = []
+        ideals = []
         for k in range(lanes.width):
             index = b.fptoui(lanes.extract(b, samples, k), INTEGER)
             where = offset(b, given["ideals"], index, self.element)
-            found.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
-        return self._gathered(b, lanes, found)
+            ideals.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
+        return self._gathered(b, lanes, ideals)
 
     # -- what comes of it --------------------------------------------------------------------------
 
@@ -322,19 +322,19 @@ class Writer(ResetWriter):
             known[self.step_graph.reference(ahead).id] = self._references(
                 b, lanes, given, records, 0, ahead, 1
             )
-        found = lanes.emit(b, values, known)
-        self._store(b, lanes, found, self.sensed, records, 0)
+        emitted = lanes.emit(b, values, known)
+        self._store(b, lanes, emitted, self.sensed, records, 0)
         first = b.mul(block, integer(self.width))
-        self._put_observation(b, lanes, given, found, entries, first)
+        self._put_observation(b, lanes, given, emitted, entries, first)
         for k in range(self.width):
             index = b.add(first, integer(k))
-            reward = lanes.extract(b, found[self.sensed["reward"].id], k)
+            reward = lanes.extract(b, emitted[self.sensed["reward"].id], k)
             b.store(reward, offset(b, given["rewards"], index, self.element))
             for name, truth in (("terminated", is_over), ("truncated", truncated)):
-                flag = b.zext(lanes.extract(b, found[truth.id], k), ir.IntType(8))
+                flag = b.zext(lanes.extract(b, emitted[truth.id], k), ir.IntType(8))
                 b.store(flag, offset(b, given[name], index, ir.IntType(8)))
         # SimdEmitter beyond the last environment never end: their records are copies of a rest.
-        any_over = b.zext(lanes.any(b, found[is_over.id]), INTEGER)
-        any_end = b.zext(lanes.any(b, found[truncated.id]), INTEGER)
+        any_over = b.zext(lanes.any(b, emitted[is_over.id]), INTEGER)
+        any_end = b.zext(lanes.any(b, emitted[truncated.id]), INTEGER)
         both = b.or_(any_over, b.shl(any_end, integer(1)))
         b.store(b.or_(b.load(ended, typ=INTEGER), both), ended)

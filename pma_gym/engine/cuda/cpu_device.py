@@ -40,10 +40,10 @@ class CpuDevice:
         self, given: object, shape: tuple[int, int], kind: type[np.generic]
     ) -> NDArray[Any]:
         """Actions as an array, checked for shape."""
-        found = np.ascontiguousarray(np.asarray(given), kind)
-        if found.shape != shape:
-            raise ValueError(f"actions must have shape {shape}, got {found.shape}")
-        return found
+        array = np.ascontiguousarray(np.asarray(given), kind)
+        if array.shape != shape:
+            raise ValueError(f"actions must have shape {shape}, got {array.shape}")
+        return array
 
     def address(self, array: NDArray[Any]) -> int:
         """Where an array begins."""

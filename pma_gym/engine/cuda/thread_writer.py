@@ -111,9 +111,9 @@ class ThreadWriter(CudaResetWriter):
                 for name in self.state_layout.held:
                     if name in self.offsets:
                         known[self.step_graph.slot(name).id] = self._number(b, records, name)
-                found = lanes.emit(b, self.layout.held, known)
+                emitted = lanes.emit(b, self.layout.held, known)
                 for value in self.layout.held:
-                    cells.put(value, found[value.id])
+                    cells.put(value, emitted[value.id])
 
         def end() -> None:
             records, _ = self._block(b, given, b.load(job, typ=INTEGER))
@@ -137,12 +137,12 @@ class ThreadWriter(CudaResetWriter):
             known = self._fixed(b, lanes, tables, 0)
             for value in (*self.layout.changing, *self.layout.held):
                 known[value.id] = cells.get(value)
-            found = lanes.emit(b, [*self.layout.outputs, *self.extra], known)
+            emitted = lanes.emit(b, [*self.layout.outputs, *self.extra], known)
             with b.if_then(works):
-                self._sample(b, lanes, cells, found, given)
+                self._sample(b, lanes, cells, emitted, given)
             for value, new in zip(self.layout.changing, self.layout.outputs, strict=True):
-                cells.put(value, found[new.id])
-            left = found[made.next_left.id]
+                cells.put(value, emitted[new.id])
+            left = emitted[made.next_left.id]
             finished = b.fcmp_ordered("<=", left, ir.Constant(self.element, 0.0))
             with b.if_then(b.and_(works, finished)):
                 end()
@@ -157,8 +157,8 @@ class ThreadWriter(CudaResetWriter):
         wide = {i: widened(b, number) for i, number in wide.items()}
         wide[self.eq.graph.input("clock", HELD).id] = b.load(self._clock, typ=DOUBLE)
         # What an attempt's samples share is asked for, or it would be a part of each one's sum.
-        found = SimdEmitter(1, fused=FUSED).emit(b, [one.done, one.when], wide)
-        return {one.when.id: narrowed(b, found[one.when.id], self.element)}
+        emitted = SimdEmitter(1, fused=FUSED).emit(b, [one.done, one.when], wide)
+        return {one.when.id: narrowed(b, emitted[one.when.id], self.element)}
 
 
 class _Cells:

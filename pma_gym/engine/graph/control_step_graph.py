@@ -51,7 +51,7 @@ class ControlStepGraph(StepInputs):
         for i in range(state_layout.actions):
             asked = self.action(i)
             held.append(where(asked < -1.0, -1.0, where(asked > 1.0, 1.0, asked)))
-        found: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
+        new: dict[str, Value] = {f"action_{i}": value for i, value in enumerate(held)}
         volts = [0.5 * HIGHEST_VOLTAGE * (value + 1.0) for value in held]
         if options.action_delay:
             received = [self.slot(f"wire_0_{i}") for i in range(state_layout.actions)]
@@ -60,35 +60,35 @@ class ControlStepGraph(StepInputs):
                 for k in range(1, options.action_delay)
             ]
             for k, values in enumerate([*line, volts]):
-                found |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
+                new |= {f"wire_{k}_{i}": value for i, value in enumerate(values)}
         else:
             received = volts
         if self.exercise_step:
             regulator, filtered = self.exercise_step.keep_safe(received[0])
-            found |= self.exercise_step.operate() | filtered
+            new |= self.exercise_step.operate() | filtered
         elif state_layout.task.actuator == "regulator":
-            found["motor_voltage"], regulator = self.slot("rest_motor"), received[0]
+            new["motor_voltage"], regulator = self.slot("rest_motor"), received[0]
         else:
-            found["motor_voltage"] = received[0]
+            new["motor_voltage"] = received[0]
             regulator = received[1] if options.regulator_action else self.slot("rest_regulator")
-        found["regulator_voltage"] = self._disturbed(regulator)
+        new["regulator_voltage"] = self._disturbed(regulator)
         change = self.graph.constant(0.0)
         for i, value in enumerate(held):
             moved = abs(value - self.slot(f"action_{i}"))
             change = where(moved > change, moved, change)
-        found["reward"] = change
-        jump = abs(found["motor_voltage"] - self.slot("motor_voltage"))
-        other = abs(found["regulator_voltage"] - self.slot("regulator_voltage"))
+        new["reward"] = change
+        jump = abs(new["motor_voltage"] - self.slot("motor_voltage"))
+        other = abs(new["regulator_voltage"] - self.slot("regulator_voltage"))
         jump = where(other > jump, other, jump)
         if any(name.startswith("pulse_") for name in self.state_layout.events):
-            found[OPERATOR] = self._pulse()
-            pulled = abs(found[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
+            new[OPERATOR] = self._pulse()
+            pulled = abs(new[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
             jump = where(pulled > jump, pulled, jump)
-        found["size"] = first_size(self.slot("size"), jump)
-        return found
+        new["size"] = first_size(self.slot("size"), jump)
+        return new
 
     def _disturbed(self, regulator: Value) -> Value:
-        """Regulator voltage that the station hears of one that is commanded (V)."""
+        """Regulator voltage at the station for a commanded one, disturbances included (V)."""
         jumps = [name for name in self.state_layout.events if name.startswith("jump_step_")]
         if not jumps:
             return regulator
@@ -151,31 +151,31 @@ class ControlStepGraph(StepInputs):
             "load": load,
             "pressure": pressure,
         }
-        found: dict[str, Value] = {f"true_{name}": value for name, value in truth.items()}
+        new: dict[str, Value] = {f"true_{name}": value for name, value in truth.items()}
         for k in range(state_layout.readings):
             for part in PARTS:
                 before = reading[part] if k == 0 or first else self.slot(f"{part}_{k - 1}")
-                found[f"{part}_{k}"] = before
+                new[f"{part}_{k}"] = before
         ended = broken(self.equations.parameters["limits"], truth)
-        found["ended"] = self.graph.value(ended)
-        found["count"] = count
+        new["ended"] = self.graph.value(ended)
+        new["count"] = count
         if self.exercise_step:
-            found |= self.exercise_step.score(found, first)
-        found |= self._info(found, to_real(count))
-        return found
+            new |= self.exercise_step.score(new, first)
+        new |= self._info(new, to_real(count))
+        return new
 
-    def _info(self, found: Mapping[str, Value], count: Value) -> dict[str, Value]:
+    def _info(self, sensed: Mapping[str, Value], count: Value) -> dict[str, Value]:
         state_layout, task = self.state_layout, self.state_layout.task
         unit, quantity = task.protocol.unit, task.protocol.quantity
-        factor, position = 1.0 / SI_FACTORS[unit], self.position(found)
+        factor, position = 1.0 / SI_FACTORS[unit], self.position(sensed)
         valid = self.equations.parameters["validity"]
         low = where(valid.lowest < task.lowest_pressure, task.lowest_pressure, valid.lowest)
         high = where(valid.highest < task.highest_pressure, valid.highest, task.highest_pressure)
-        pressure = found["true_pressure"]
+        pressure = sensed["true_pressure"]
         inside = (pressure >= low - PRESSURE_TOLERANCE) & (pressure <= high + PRESSURE_TOLERANCE)
         measured = measured_position(
             quantity,
-            lambda part: found[f"{part}_{state_layout.options.observation_delay}"],
+            lambda part: sensed[f"{part}_{state_layout.options.observation_delay}"],
             self.prescribed,
         )
         values = [
@@ -187,25 +187,25 @@ class ControlStepGraph(StepInputs):
             self.slot("motor_voltage"),
             self.slot("regulator_voltage"),
             pressure * 1e-3,
-            found["true_load"],
+            sensed["true_load"],
             where(inside, 0.0, 1.0),
         ]
         if self.exercise_step:
-            values += self.exercise_step.info(found)
+            values += self.exercise_step.info(sensed)
         return dict(zip(state_layout.info, values, strict=True))
 
-    def position(self, found: Mapping[str, Value]) -> Value:
+    def position(self, sensed: Mapping[str, Value]) -> Value:
         """True position that the task asks for (m or rad)."""
-        outputs = {name: found[f"true_{name}"] for name in TRUTH}
+        outputs = {name: sensed[f"true_{name}"] for name in TRUTH}
         return position_of(self.equations, self.state_layout.task, outputs)
 
-    def first_score(self, found: Mapping[str, Value]) -> dict[str, Value]:
+    def first_score(self, sensed: Mapping[str, Value]) -> dict[str, Value]:
         """The score's numbers once the first sample, that of the beginning, is taken."""
         phase = self.state_layout.task.protocol.phases[0]
-        error = self.position(found) - float(phase.reference(0.0))
+        error = self.position(sensed) - float(phase.reference(0.0))
         return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
 
-    def reward(self, found: Mapping[str, Value]) -> Value:
+    def reward(self, sensed: Mapping[str, Value]) -> Value:
         """Reward of a step; the action's change stands where the reward will.
 
         It stays there for a user's function, which Python calls (`FunctionRewards`).
@@ -214,17 +214,17 @@ class ControlStepGraph(StepInputs):
         if callable(options.reward):
             return self.slot("reward")
         rule = REWARDS[options.reward]
-        error = self.position(found) - self.reference(0)
+        error = self.position(sensed) - self.reference(0)
         value = self.graph.value(rule(task.error_percent(error), self.slot("reward")))
-        missed = self.horizon - to_real(found["count"])
-        whole = where(found["ended"] > 0.0, value + missed * missed_reward(rule), value)
+        missed = self.horizon - to_real(sensed["count"])
+        whole = where(sensed["ended"] > 0.0, value + missed * missed_reward(rule), value)
         # By 1 it is the same, and takes its time.
         return whole if options.reward_scale == 1.0 else options.reward_scale * whole
 
-    def observation(self, table: ObservationTable, found: Mapping[str, Value]) -> list[Value]:
+    def observation(self, table: ObservationTable, sensed: Mapping[str, Value]) -> list[Value]:
         """The observation's entries."""
         entries = table.entries(
-            lambda part, k: found[f"{part}_{k}"],
+            lambda part, k: sensed[f"{part}_{k}"],
             self.reference,
             [self.slot(f"action_{i}") for i in range(self.state_layout.actions)],
             self.prescribed,

@@ -78,11 +78,11 @@ class ExerciseStep:
         )
         load = moment / slot("told_radius")
         volts = (load - slot("told_drive_offset")) / slot("told_drive_gain")
-        found = {f"mind_{name}": value for name, value in mind._asdict().items()}
-        return found | {"motor_voltage": held_volts(volts), "operator_moment": moment}
+        new = {f"mind_{name}": value for name, value in mind._asdict().items()}
+        return new | {"motor_voltage": held_volts(volts), "operator_moment": moment}
 
     def _intended(self, time: Value) -> Value:
-        """Angle that somebody means to have who hears the cues at a time of his own (rad)."""
+        """Angle that an operator intends, by a time that includes his reaction (rad)."""
         angle = self.inputs.graph.constant(0.0)
         for phase in PACE.phases:
             since = time - phase.start
@@ -94,7 +94,7 @@ class ExerciseStep:
     # -- safety ------------------------------------------------------------------------------------
 
     def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
-        """Regulator voltage of one that is asked for, and what the safety layer remembers."""
+        """Regulator voltage that the safety layer passes on, and the layer's new state."""
         if not self.state_layout.options.safety:
             return volts, {}
         # It stands at the rig: delays lie between the agent and it.
@@ -120,8 +120,8 @@ class ExerciseStep:
         )
         there = before + slot("told_lag_share") * (pressure - before)
         new = (there, extension, speed, slow)
-        found: dict[str, Value] = dict(zip(FILTER_STATE, new, strict=True))
-        return held_volts((pressure - offset) / gain), found
+        filter_state: dict[str, Value] = dict(zip(FILTER_STATE, new, strict=True))
+        return held_volts((pressure - offset) / gain), filter_state
 
     def _filtered(self, name: str, value: Value, time_constant: float) -> Value:
         kept = math.exp(-self.period / time_constant)
@@ -129,17 +129,17 @@ class ExerciseStep:
 
     # -- score -------------------------------------------------------------------------------------
 
-    def score(self, found: Mapping[str, Value], first: bool) -> dict[str, Value]:
+    def score(self, sensed: Mapping[str, Value], first: bool) -> dict[str, Value]:
         """What a step came to: new numbers by name.
 
         Args:
-            found: the step's truth, and whether it broke a limit of the rig.
+            sensed: the step's truth, and whether it broke a limit of the rig.
             first: at the trial's beginning, where nothing has been done yet.
         """
         eq, slot = self.inputs.equations, self.inputs.slot
-        moment, speed = eq.parameters["rotor"].radius * found["true_load"], slot("spin")
+        moment, speed = eq.parameters["rotor"].radius * sensed["true_load"], slot("spin")
         if first:
-            return {"ended": self.inputs.graph.value(found["ended"])}
+            return {"ended": self.inputs.graph.value(sensed["ended"])}
         power = moment * speed
         new: dict[str, Value] = {}
         for name, value in (
@@ -152,17 +152,17 @@ class ExerciseStep:
         done = power * self.period
         new["work"] = slot("work") + where(done > 0.0, done, 0.0)
         new["returned"] = slot("returned") + where(done < 0.0, -done, 0.0)
-        new |= self._pace(found)
-        rig = found["ended"]
+        new |= self._pace(sensed)
+        rig = sensed["ended"]
         broken = unsafe(self.exercise, moment, speed)
         return new | {"ended": where(rig > 0.0, rig, broken)}
 
-    def _pace(self, found: Mapping[str, Value]) -> dict[str, Value]:
+    def _pace(self, sensed: Mapping[str, Value]) -> dict[str, Value]:
         """Sums of squared errors of the angle by phase, at the control steps' ends (rad^2)."""
-        time = to_real(found["count"]) * self.period
+        time = to_real(sensed["count"]) * self.period
         new = {}
         for phase in PACE.phases:
-            error = found["true_rotation"] - (phase.initial + phase.slope * (time - phase.start))
+            error = sensed["true_rotation"] - (phase.initial + phase.slope * (time - phase.start))
             end = phase.start + phase.duration
             # Half a step beside the edges: times are whole steps, but for rounding.
             edge = 0.5 * self.period
@@ -171,11 +171,11 @@ class ExerciseStep:
             new[f"pace_{phase.name}"] = where(inside, before + error * error, before)
         return new
 
-    def info(self, found: Mapping[str, Value]) -> list[Value]:
+    def info(self, sensed: Mapping[str, Value]) -> list[Value]:
         """An exercise's own numbers of the info, in order."""
         eq, degree = self.inputs.equations, SI_FACTORS["deg"]
-        moment = eq.parameters["rotor"].radius * found["true_load"]
-        speed, rotation = self.inputs.slot("spin"), found["true_rotation"]
+        moment = eq.parameters["rotor"].radius * sensed["true_load"]
+        speed, rotation = self.inputs.slot("spin"), sensed["true_rotation"]
         other = []
         if self.exercise.prescription:
             other = [rotation * (1.0 / degree), self.plan.at(rotation)]

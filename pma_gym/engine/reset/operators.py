@@ -94,11 +94,11 @@ def _refusal(task: Task, model: Model, miss: Miss, pressure: float) -> str:
 
 def _starts(task: Task, wanted: Iterable[Pressure]) -> set[float]:
     """Pressures to look at (Pa): each that is named, and the ends of the task's range."""
-    found: set[float] = set()
+    pressures: set[float] = set()
     for one in wanted:
         several = one if isinstance(one, Sequence) and not isinstance(one, str) else [one]
-        found |= set(task.starts) if isinstance(one, str) else {1e3 * float(p) for p in several}
-    return found
+        pressures |= set(task.starts) if isinstance(one, str) else {1e3 * float(p) for p in several}
+    return pressures
 
 
 def plans(exercise: Exercise, model: Model, pressures: NDArray[np.float64]) -> list[MomentProfile]:
@@ -142,14 +142,14 @@ def operators(
     exercise = task.exercise
     assert exercise is not None
     people = _people(exercise, options, keys, episodes)
-    found = {f"human_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
-    rise = found["human_rise"]
-    found["human_share"] = -np.expm1(-options.period / rise)
+    numbers = {f"human_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
+    rise = numbers["human_rise"]
+    numbers["human_share"] = -np.expm1(-options.period / rise)
     known = plans(exercise, model, pressures)
-    found["plan_first"] = np.array([plan.first for plan in known])
+    numbers["plan_first"] = np.array([plan.first for plan in known])
     for what in ("angles", "slopes"):
         rows = np.array([getattr(plan, what) for plan in known]).reshape(len(known), -1)
-        found |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
+        numbers |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
     drive, line, lag = (model.parameters[n] for n in ("drive", "regulator_line", "regulator_lag"))
     common = {
         "told_radius": model.parameters["rotor"].radius,
@@ -162,11 +162,11 @@ def operators(
         "mind_freshness": 1.0,
         "operator_moment": exercise.start_moment,
     }
-    found |= {name: np.full(len(known), value) for name, value in common.items()}
+    numbers |= {name: np.full(len(known), value) for name, value in common.items()}
     if options.safety:
-        found["guard_moment"] = np.full(len(known), exercise.start_moment)
-        found["guard_pressure"] = line.gain * regulator + line.offset
-    return found
+        numbers["guard_moment"] = np.full(len(known), exercise.start_moment)
+        numbers["guard_pressure"] = line.gain * regulator + line.offset
+    return numbers
 
 
 def _people(

@@ -32,15 +32,15 @@ def drawn_pressures(
         wanted: as the option `pressure_kpa`, one each.
     """
     low, high = task.starts
-    found = []
+    pressures = []
     for share, one in zip(_shares(keys, episodes * 4 + DRAW), wanted, strict=True):
         if isinstance(one, str):
-            found.append(low + share * (high - low))
+            pressures.append(low + share * (high - low))
         elif isinstance(one, Sequence):
-            found.append(1e3 * float(one[int(share * len(one))]))
+            pressures.append(1e3 * float(one[int(share * len(one))]))
         else:
-            found.append(1e3 * float(one))
-    return np.array(found)
+            pressures.append(1e3 * float(one))
+    return np.array(pressures)
 
 
 def _shares(keys: NDArray[np.int64], streams: NDArray[np.int64]) -> list[float]:
@@ -102,9 +102,9 @@ def settled_at_no_load(
     Raises:
         ValueError: no contraction balances the drive's load.
     """
-    found = rest(pressures, vectors)
-    if found is not None:
-        return found
+    slack = rest(pressures, vectors)
+    if slack is not None:
+        return slack
     nominal = rest.plant
     numbers = np.tile(nominal.vector, (len(models), 1)) if vectors is None else vectors
     keys = [

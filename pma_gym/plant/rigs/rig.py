@@ -1,38 +1,12 @@
 """What a rig is: its ports, parts, balances and equilibrium, and what can be asked of it."""
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from pma_gym.effects.effect import Parameters
+from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-
-
-@dataclass(frozen=True)
-class Port:
-    """A place where effects act on a rig.
-
-    Attributes:
-        result: what the effects there contribute, and what becomes of it.
-        least: fewest effects that it takes.
-        most: most effects that it takes.
-        only: names of the effects that it takes; any of this port if empty.
-    """
-
-    result: str
-    least: int = 0
-    most: float = math.inf
-    only: tuple[str, ...] = ()
-
-    @property
-    def takes(self) -> str:
-        """How many effects it takes, or which, in words."""
-        if self.only:
-            return " and ".join(self.only)
-        if self.most == 1:
-            return "exactly one effect" if self.least else "at most one effect"
-        return f"{self.least} or more effects"
 
 
 @dataclass(frozen=True)

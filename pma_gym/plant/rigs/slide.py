@@ -10,16 +10,17 @@ measure nothing new.
 from collections.abc import Mapping
 
 from pma_gym.effects.effect import Parameters
+from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
-from pma_gym.plant.rigs.rig import Port, Rig
+from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.station import SCALES, TURNING_M
 
 PORTS: dict[str, Port] = {
     "slide_force": Port("force on the slide (N), added; positive in the direction of contraction"),
     "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
     "two_way_drive": Port("load that the drive asks for (N)", least=1, most=1),
-    "drive_delay": Port("load that the drive has heard of (N)", most=1),
+    "drive_delay": Port("load command that has reached the drive (N)", most=1),
     "drive_lag": Port("load that arrives at the slide (N)", most=1),
 }
 """Ports of the slide: how many effects each takes, and what becomes of their results."""

@@ -15,28 +15,10 @@ from pma_gym.codegen.trace import trace
 from pma_gym.effects.cable.hanging_load import hanging_inertia
 from pma_gym.effects.cable.leg import leg_torque
 from pma_gym.effects.effect import Parameters
+from pma_gym.effects.ports import STATION_PORTS
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.force_balance import solve_station
-from pma_gym.plant.rigs.rig import Port, Rig
-
-PORTS: dict[str, Port] = {
-    "muscle_force": Port("force on the slide (N), added; positive shortens the muscle", least=1),
-    "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
-    "damping_factor": Port("factor on the damping coefficient, multiplied"),
-    "slide_force": Port("force on the slide (N), added; positive shortens the muscle"),
-    "cable": Port("tension of the cable (N)", least=1, most=1),
-    "drive": Port("load that the drive asks for (N)", least=1, most=1),
-    "drive_shape": Port("that load (N), changed by one effect after the other"),
-    "drive_delay": Port("load that the drive has heard of (N)", most=1),
-    "drive_lag": Port("load that arrives at the pulley (N)", most=1),
-    "drive_ripple": Port("load on top of what arrives (N), added"),
-    "regulator_line": Port("pressure that the regulator settles at (Pa)", least=1, most=1),
-    "regulator_delay": Port("pressure that the regulator has heard of (Pa)", most=1),
-    "regulator_lag": Port("rate of the pressure (Pa/s)", least=1, most=1),
-    "regulator_pace": Port("factor on the regulator's rate, multiplied"),
-    "chamber": Port("rate of the pressure beside the regulator's (Pa/s), added"),
-}
-"""Ports of the station: how many effects each takes, and what becomes of their results."""
+from pma_gym.plant.rigs.rig import Rig
 
 PARTS: tuple[str, ...] = ("rotor", "slide", "limits", "validity")
 """Effects of port `part` that the station reads itself and cannot do without."""
@@ -132,7 +114,7 @@ def _write_states(eq: PlantEquations) -> None:
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", (torque - _drag(eq)) / _inertia(eq), SCALES["spin"])
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"], "chamber")
-    eq.add_memories(tuple(PORTS))
+    eq.add_memories(tuple(STATION_PORTS))
     eq.add_sensors(SCALES)
     eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
     for effect in (*eq.at("cable"), *eq.at("muscle_force")):
@@ -144,7 +126,7 @@ def _write_states(eq: PlantEquations) -> None:
 
 STATION = Rig(
     name="station",
-    ports=PORTS,
+    ports=STATION_PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,
     write_equations=write_equations,

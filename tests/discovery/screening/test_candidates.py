@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from pma_gym.discovery.fitting.candidate_effect import bounds
-from pma_gym.discovery.screening.candidates import FAR, REPLACING_LAWS, candidate_effects
+from pma_gym.discovery.screening.candidates import FAR, candidate_effects
 from pma_gym.discovery.workflow import diagnose
 from pma_gym.effects import CATALOGUE, user_effects
 from pma_gym.effects.user_effects import load_effects
@@ -50,14 +50,16 @@ def catalogue():
 def test_every_effect_that_can_be_absent_is_a_candidate_or_replaces_another_law():
     effects = {candidate.effect for candidate in CANDIDATES}
     for name, effect in CATALOGUE.items():
-        if name in REPLACING_LAWS:
+        if effect.replaces:
             assert name not in effects
         elif effect.law and effect.neutral is not None and name not in STATION.parameters:
             assert name in effects, name
 
 
-def test_stand_ins_are_in_the_catalogue():
-    assert set(CATALOGUE) >= REPLACING_LAWS
+def test_a_muscles_own_laws_replace_others():
+    kinds = {"force law", "damping law", "person", "free law"}
+    assert {effect.replaces for effect in CATALOGUE.values()} - {""} == kinds
+    assert {CATALOGUE[name].replaces for name in ("stiffness", "sarosi_force")} == {"force law"}
 
 
 def test_names_are_unique_and_none_is_already_in_the_model():
