@@ -183,8 +183,8 @@ class FitProblem:
             return fit
         left = self.left(fit)
         ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        found = self.fit(self._eased(fit.model, extra, ever_less), extra)
-        return min(filter(None, (fit, found)), key=_chi_square)
+        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, refit)), key=_chi_square)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
@@ -195,8 +195,8 @@ class FitProblem:
                 Whitening(n.coefficients, factor * n.innovation, factor * n.level)
                 for n in self.noise
             )
-            found = replace(self, noise=noise).fit(model, extra)
-            model = model if found is None else found.model
+            fitted = replace(self, noise=noise).fit(model, extra)
+            model = model if fitted is None else fitted.model
         return model
 
     def fit(
@@ -227,11 +227,11 @@ class FitProblem:
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
-        found = dict(zip(search.named(search.values), search.values, strict=True))
+        by_name = dict(zip(search.named(search.values), search.values, strict=True))
         return Fitted(
-            model.replace({path: float(value) for path, value in found.items()}),
+            model.replace({path: float(value) for path, value in by_name.items()}),
             tuple(candidate.name for candidate in extra),
-            tuple(found),
+            tuple(by_name),
             search.values,
             inverse(search.best.curvature),
             search.best.chi_square,
