@@ -30,6 +30,7 @@ from pma_gym.discovery.selection.backward_elimination import (
     backward_elimination,
 )
 from pma_gym.discovery.selection.forward_selection import Selection, select
+from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.rivals import rivals
 from pma_gym.discovery.verdict.adequacy import Residual, adequacy
 from pma_gym.discovery.verdict.decision import suspicious
@@ -128,7 +129,7 @@ class _Work:
         named, words = prepared(named, given)
         words = (*said, *words)
         trials = [each.trial for each in named]
-        journal = Journal(self.folder, trials, given, f"diagnosis 2 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named))
         own = free_parameters(given)
@@ -156,6 +157,7 @@ class _Work:
                 else _nothing(problem, refitted)
             ),
         )
+        selection = self._timed("nested laws", lambda: self._nested(selection))
         findings = Findings(
             named=tuple(named),
             given=given,
@@ -205,6 +207,14 @@ class _Work:
                 "commands and the model's drive and force"
             )
         return refit
+
+    def _nested(self, selection: Selection) -> Selection:
+        """Without the parameters of effects that the trials do not determine."""
+        if not selection.chosen:
+            return selection
+        # Where all is determined it takes milliseconds, else a few fits: no step of its own.
+        less = nested(selection.problem, selection.fit, selection.chosen)
+        return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
 
     def _confirmed(self, findings: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""

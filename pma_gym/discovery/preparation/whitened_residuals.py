@@ -15,6 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.assumed_range import (
+    assumed_range,
+    at_assumed_edge,
+    needed_reach,
+)
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
@@ -29,9 +34,6 @@ FREE_ZEROS = ("contraction", "rotation")
 
 ROWS = 256
 """Rows in one product of matrices: few enough that no BLAS shares it between threads."""
-
-FARTHEST = 6.0
-"""Standard deviations of what is assumed beforehand that a parameter may go away from it."""
 
 PIECE_S = 0.25
 """How long a piece is (s): longer than what whitening leaves of the noise's memory, and so short
@@ -78,6 +80,7 @@ class WhitenedResiduals(Residuals):
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
         tolerance, interpolation, threads: as `Residuals`.
+        reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
 
     Attributes:
         noise, prior, centre: as given.
@@ -95,19 +98,32 @@ class WhitenedResiduals(Residuals):
         tolerance: float = DEFAULT_TOLERANCE,
         interpolation: Interpolation = "foh",
         threads: int = 1,
+        reach: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
+        self._possible = self.lower, self.upper
+        wider = np.array([(reach or {}).get(path, 1.0) for path in free])
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
-        self.lower = np.maximum(self.lower, self.centre - FARTHEST * self.prior)
-        self.upper = np.minimum(self.upper, self.centre + FARTHEST * self.prior)
+        self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
         self._own = self._places(own or {})
 
     @property
     def logged(self) -> list[Logged]:
         """The trials as they are read."""
         return self._trials
+
+    def at_assumed_edge(self, values: Array) -> list[str]:
+        """Paths of parameters that are at an edge of what was assumed of them beforehand."""
+        at = at_assumed_edge(values, self.lower, self.upper, *self._possible)
+        return [free.path for free, edge in zip(self.free, at, strict=True) if edge]
+
+    def needed_reach(self, values: Array) -> dict[str, float]:
+        """How many times as wide as assumed the ranges that do not hold values must be, by path."""
+        wider = needed_reach(values, self.centre, self.prior, *self._possible)
+        pairs = zip(self.free, wider.tolist(), strict=True)
+        return {free.path: reach for free, reach in pairs if reach > 1.0}
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums over whitened residuals, with what the prior adds."""

@@ -22,6 +22,7 @@ from pma_gym.discovery.report.text import (
     readable,
     signal_name,
     signal_unit,
+    undetermined_words,
     unit_cell,
     what_to_do,
 )
@@ -62,7 +63,10 @@ def _places(diagnosis: Diagnosis) -> Iterator[str]:
 def _effects(diagnosis: Diagnosis) -> Iterator[str]:
     for effect in diagnosis.effects:
         sizes = ", ".join(
-            f"{name} {estimate_words(known)}" for name, known in effect.parameters.items()
+            [
+                *(f"{name} {estimate_words(known)}" for name, known in effect.parameters.items()),
+                *(f"{name} {undetermined_words(e)}" for name, e in effect.undetermined.items()),
+            ]
         )
         yield f"{effect_name(effect.name)}: {sizes}"
         if effect.confused_with:

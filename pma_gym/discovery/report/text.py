@@ -6,7 +6,7 @@ import re
 import sys
 
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
-from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap
+from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Undetermined
 from pma_gym.effects import CATALOGUE
 from pma_gym.units import with_unit
 
@@ -158,6 +158,15 @@ def estimate_words(known: Estimate) -> str:
     """`14.2 N (95 %: 13.1 to 15.4)`."""
     value = with_unit(estimate(known.value, known.low, known.high), known.unit)
     return f"{value}{at_its_limit(known)} (95 %: {interval(known)})"
+
+
+def undetermined_words(known: Undetermined) -> str:
+    """`not determined, above 20 mm/s`."""
+    if known.above is None and known.below is None:
+        return "not determined"
+    side = "below" if known.above is None else "above"
+    bound = known.below if known.above is None else known.above
+    return f"not determined, {side} {with_unit(figure(bound, 2), known.unit)}"
 
 
 def at_its_limit(known: Estimate) -> str:

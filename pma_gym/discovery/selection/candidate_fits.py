@@ -9,7 +9,7 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, starting_points
-from pma_gym.document_shape import ListOf, Real, check_shape
+from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
@@ -169,6 +169,7 @@ _KEPT = {
     "chi_square": Real(),
     "steps": ListOf(Real(finite=False)),
     "converged": bool,
+    "reach": {ANY: Real(1.0)},
 }
 """Shape of a fit in a journal."""
 
@@ -182,6 +183,7 @@ def kept_form(fit: Fitted) -> dict:
         "chi_square": fit.chi_square,
         "steps": fit.steps.tolist(),
         "converged": bool(fit.converged),
+        "reach": dict(fit.reach),
     }
 
 
@@ -220,4 +222,5 @@ def restored(
         kept["chi_square"],
         np.array(kept["steps"]),
         kept["converged"],
+        kept["reach"],
     )

@@ -10,9 +10,10 @@ again only when all effects are selected: before, an autoregression would take t
 noise.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
+from pma_gym.discovery.diagnosis import Undetermined
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -103,6 +104,7 @@ class Selection:
         problem: with the noise that it leaves.
         refitted: the model with its own parameters refitted alone; better than what the selection
             began with, where it had been caught.
+        undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
     """
 
     stages: tuple[Stage, ...]
@@ -110,6 +112,7 @@ class Selection:
     fit: Fitted
     problem: FitProblem
     refitted: Fitted
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
 
 def select(

@@ -43,7 +43,7 @@ def homogeneity_test(
         as simulated, by name; 0 where fewer than three groups show the effect, or where chance
         would scatter as much. Empty where the model cannot be simulated.
     """
-    whitened = problem.whitened_residuals(fit.model, chosen)
+    whitened = problem.whitened_at(fit, chosen)
     pieces = whitened.pieces(fit.values, fit.steps)
     if pieces is None:
         return {}
@@ -94,10 +94,9 @@ def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> A
 def _direction(fit: Fitted, candidate: CandidateEffect) -> Array:
     """How a fit's parameters move where the effect as a whole grows."""
     direction = np.zeros(len(fit.paths))
-    for path, absent, scales, fitted in zip(
-        candidate.paths, candidate.absent, candidate.amplitudes, candidate.fitted, strict=True
-    ):
-        if fitted and (scales or len(candidate.paths) == 1):
+    rows = zip(candidate.paths, candidate.absent, candidate.amplitudes, strict=True)
+    for path, absent, scales in rows:
+        if path in candidate.fitted_paths and (scales or len(candidate.paths) == 1):
             at = fit.paths.index(path)
             size = fit.values[at] - (absent if candidate.fitted.all() and scales else 0.0)
             direction[at] = size
