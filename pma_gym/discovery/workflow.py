@@ -82,8 +82,8 @@ def diagnose(
         >>> time = np.arange(0.0, 4.0, 1 / 64)
         >>> volts = 1.0 + np.clip(time - 0.5, 0.0, 2.0)
         >>> asked = Trial(time, {"motor_voltage": volts, "regulator_voltage": 0 * time + 6.0})
-        >>> found = diagnose([Plant("serres2008").simulate(asked)], "serres2008", propose=False)
-        >>> found.verdict, "regulator_delay" in found.not_detectable
+        >>> diagnosis = diagnose([Plant("serres2008").simulate(asked)], "serres2008", propose=False)
+        >>> diagnosis.verdict, "regulator_delay" in diagnosis.not_detectable
         ('undecidable', True)
     """
     with linear_algebra_alone():
@@ -158,7 +158,7 @@ class _Work:
             ),
         )
         selection = self._timed("nested laws", lambda: self._nested(selection))
-        found = Findings(
+        findings = Findings(
             named=tuple(named),
             given=given,
             floors=floors,
@@ -169,13 +169,13 @@ class _Work:
             searched=search,
             seed=self.seed,
         )
-        found = replace(
-            found, elimination=self._timed("fewest", lambda: _backward_elimination(found))
+        findings = replace(
+            findings, elimination=self._timed("fewest", lambda: _backward_elimination(findings))
         )
-        found = _without_worse(found)
-        found = self._timed("confirmation", lambda: self._confirmed(found))
-        found = self._timed("adequacy", lambda: self._judged(found, logged))
-        diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
+        findings = _without_worse(findings)
+        findings = self._timed("confirmation", lambda: self._confirmed(findings))
+        findings = self._timed("adequacy", lambda: self._judged(findings, logged))
+        diagnosis = self._timed("report", lambda: answer(findings, self._tell, self.propose))
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
@@ -199,14 +199,14 @@ class _Work:
         return list(asked.trials), model, asked.checked or ()
 
     def _refitted(self, problem: FitProblem, journal: Journal) -> Fitted:
-        found = problem.careful_fit(problem.given)
-        if found is None:
+        refit = problem.careful_fit(problem.given)
+        if refit is None:
             raise ModelError(
                 f"model {problem.given.name} cannot be simulated on these trials: its muscle does "
                 "not balance the load where one begins, or it runs away; check the units of the "
                 "commands and the model's drive and force"
             )
-        return found
+        return refit
 
     def _nested(self, selection: Selection) -> Selection:
         """Without the parameters of effects that the trials do not determine."""

@@ -194,8 +194,8 @@ class FitProblem:
             return fit
         left = self.left(fit)
         ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        found = self.fit(self._eased(fit.model, extra, ever_less), extra)
-        return min(filter(None, (fit, found)), key=_chi_square)
+        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, refit)), key=_chi_square)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
@@ -206,8 +206,8 @@ class FitProblem:
                 Whitening(n.coefficients, factor * n.innovation, factor * n.level)
                 for n in self.noise
             )
-            found = replace(self, noise=noise).fit(model, extra)
-            model = model if found is None else found.model
+            fitted = replace(self, noise=noise).fit(model, extra)
+            model = model if fitted is None else fitted.model
         return model
 
     def whitened_at(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> WhitenedResiduals:

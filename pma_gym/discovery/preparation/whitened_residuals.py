@@ -127,8 +127,8 @@ class WhitenedResiduals(Residuals):
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums over whitened residuals, with what the prior adds."""
-        found = self._moved_products(values, steps, central, self._product)
-        total = np.sum(found, axis=0) if found else np.full((1, 1), np.nan)
+        moved_products = self._moved_products(values, steps, central, self._product)
+        total = np.sum(moved_products, axis=0) if moved_products else np.full((1, 1), np.nan)
         if not np.isfinite(total).all():
             size = len(steps)
             return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
@@ -159,10 +159,10 @@ class WhitenedResiduals(Residuals):
         widths = np.concatenate([[1.0], steps])
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
-            found = self._differences(logged, states, zeros, vectors, central)
+            differences = self._differences(logged, states, zeros, vectors, central)
             # A rig that cannot be simulated has no finite products; who asks for them looks.
             with np.errstate(invalid="ignore", over="ignore"):
-                white = self.whitened(logged, found[:, :, : len(logged.time)])
+                white = self.whitened(logged, differences[:, :, : len(logged.time)])
                 return products(logged, white / widths[:, None, None])
 
         return self._each(tried, work)
@@ -174,13 +174,13 @@ class WhitenedResiduals(Residuals):
         """
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
-            found = self._differences(logged, states, zeros, vectors, central=False)
-            return self.whitened(logged, found[:, :, : len(logged.time)]).astype(np.float32)
+            differences = self._differences(logged, states, zeros, vectors, central=False)
+            return self.whitened(logged, differences[:, :, : len(logged.time)]).astype(np.float32)
 
-        found = self._each(tried, work)
-        if not self._settled or not all(np.isfinite(part).all() for part in found):
+        columns = self._each(tried, work)
+        if not self._settled or not all(np.isfinite(part).all() for part in columns):
             return None
-        return found
+        return columns
 
     def readings(self, values: Array) -> list[Array] | None:
         """What the sensors hold at parameters (SI), shape (4, rows) for each trial."""
@@ -188,8 +188,8 @@ class WhitenedResiduals(Residuals):
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             return np.stack([signal[0] for signal in self._held(states, zeros, vectors)])
 
-        found = self._each(values[None], work)
-        return found if self._settled else None
+        readings = self._each(values[None], work)
+        return readings if self._settled else None
 
     def first_states(self, values: Array) -> list[Array]:
         """States (SI) in which each trial begins at parameters, shape (states,) for each trial."""
@@ -212,32 +212,32 @@ class WhitenedResiduals(Residuals):
             if not logged.measures[channel]:
                 continue
             missing = logged.missing[channel]
-            found = noise.white(differences[:, channel], missing)
+            filtered = noise.white(differences[:, channel], missing)
             if name in FREE_ZEROS:
                 one = np.ones(len(logged.time))
                 one[missing] = 0.0
                 along = noise.white(one[None], missing)[0]
-                found -= np.outer(found @ along / (along @ along), along)
-            white[:, channel] = found
+                filtered -= np.outer(filtered @ along / (along @ along), along)
+            white[:, channel] = filtered
         return white
 
     def products(self, columns: Sequence[Array]) -> Pieces:
         """Products of whitened columns, as `columns` gives them."""
-        found = [
+        by_trial = [
             self._products(logged, part.astype(np.float64))
             for logged, part in zip(self._trials, columns, strict=True)
         ]
-        gathered = self.gathered(found)
+        gathered = self.gathered(by_trial)
         assert gathered is not None
         return gathered
 
-    def gathered(self, found: Sequence[Array]) -> Pieces | None:
+    def gathered(self, by_trial: Sequence[Array]) -> Pieces | None:
         """Products of all trials, put together; None where there are none, or no numbers."""
-        if not found or not all(np.isfinite(part).all() for part in found):
+        if not by_trial or not all(np.isfinite(part).all() for part in by_trial):
             return None
-        trial = np.repeat(np.arange(len(found)), [len(part) for part in found])
+        trial = np.repeat(np.arange(len(by_trial)), [len(part) for part in by_trial])
         counts = np.concatenate([self._counts(logged) for logged in self._trials])
-        return Pieces(np.concatenate(found), trial, counts)
+        return Pieces(np.concatenate(by_trial), trial, counts)
 
     def edges(self, logged: Logged) -> list[int]:
         """Where the pieces of a trial begin, and its end."""
@@ -248,11 +248,11 @@ class WhitenedResiduals(Residuals):
     def _products(self, logged: Logged, white: Array) -> Array:
         """Products over the pieces of one trial, shape (pieces, columns, columns)."""
         edges = self.edges(logged)
-        found = np.empty((len(edges) - 1, len(white), len(white)))
+        products = np.empty((len(edges) - 1, len(white), len(white)))
         for k, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
             part = white[:, :, start:stop].reshape(len(white), -1)
-            found[k] = part @ part.T
-        return found
+            products[k] = part @ part.T
+        return products
 
     def _product(self, logged: Logged, white: Array) -> Array:
         """The sum of `_products`, shape (columns, columns), in fewer and larger steps."""

@@ -35,7 +35,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
     """What was found: verdict, where, which effect, how large, how much it closes, what next."""
     lines = [f"{VERDICTS[diagnosis.verdict]}.", readable(diagnosis.sentence, diagnosis), ""]
     lines += [f"Note: {warning}" for warning in diagnosis.warnings]
-    for name, found in (
+    for name, entry in (
         ("Where", _places(diagnosis)),
         ("Effect", _effects(diagnosis)),
         ("Parameters", _parameters(diagnosis)),
@@ -45,7 +45,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
         labels = itertools.chain([f"{name}:"], itertools.repeat(""))
-        lines += [f"{label:<12}{text}" for label, text in zip(labels, found, strict=False)]
+        lines += [f"{label:<12}{text}" for label, text in zip(labels, entry, strict=False)]
     return "\n".join(lines)
 
 

@@ -138,14 +138,15 @@ def _closed(diagnosis: Diagnosis) -> str:
     }
     if not gaps:
         return ""
-    effect, found = diagnosis.verdict == "effect", diagnosis.gap
+    effect, by_signal = diagnosis.verdict == "effect", diagnosis.gap
     widest = max(
         gaps,
         key=lambda signal: (
-            (found[signal].parameters if effect else found[signal].before) / found[signal].floor
+            (by_signal[signal].parameters if effect else by_signal[signal].before)
+            / by_signal[signal].floor
         ),
     )
-    gap = found[widest]
+    gap = by_signal[widest]
     refitted = f" ({figure(gap.parameters)} with its parameters refitted)" if effect else ""
     unseen = " of trials that it was not fitted to" if gap.held_out else ""
     return (

@@ -200,9 +200,9 @@ def _stage(
         worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
             progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-            found = fitted(problem, baseline, before, chosen, each, journal)
-            if found is not None:
-                fits[each.candidate.name] = found
+            refit = fitted(problem, baseline, before, chosen, each, journal)
+            if refit is not None:
+                fits[each.candidate.name] = refit
         fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
@@ -227,14 +227,14 @@ def _refined_scores(
         chance: that noise bursts so.
         least: chi-square that explains bursts.
     """
-    found = [
+    refined = [
         refined_score(baseline, problem.probed(plain, each.candidate), each) for each in scores
     ]
-    found = [
+    refined = [
         replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
-        for each in found
+        for each in refined
     ]
-    return sorted(found, key=lambda each: -each.gain)
+    return sorted(refined, key=lambda each: -each.gain)
 
 
 def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:

@@ -124,8 +124,8 @@ def _held(
     candidate = state.chosen[place]
     less = replace(candidate, left=(*candidate.left, *at))
     chosen = (*state.chosen[:place], less, *state.chosen[place + 1 :])
-    found = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
-    return None if found is None else replace(state, chosen=chosen, fit=found)
+    refit = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
+    return None if refit is None else replace(state, chosen=chosen, fit=refit)
 
 
 def _bound(
@@ -161,11 +161,11 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         if path is None or twin is None:
             continue
         rest = [stems[stem] for stem in idle if stem in stems]
-        found = _equal(problem, state, place, (path, twin), rest)
+        equal = _equal(problem, state, place, (path, twin), rest)
         # What the whole law explains more must be worth its parameters, as anywhere.
-        if found is not None and cost(found.fit) < cost(state.fit):
+        if equal is not None and cost(equal.fit) < cost(state.fit):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
-            return replace(found, undetermined={**state.undetermined, **known})
+            return replace(equal, undetermined={**state.undetermined, **known})
     return None
 
 
@@ -178,13 +178,13 @@ def _equal(
     best: Nested | None = None
     for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
         for _ in range(ROUNDS):
-            found = _held(problem, state, place, {path: size} | idle, {twin: size})
-            if found is None:
+            held = _held(problem, state, place, {path: size} | idle, {twin: size})
+            if held is None:
                 break
-            before, size = size, found.fit.estimate(twin)[0]
+            before, size = size, held.fit.estimate(twin)[0]
             if abs(size - before) < EQUAL * abs(size):
-                if best is None or found.fit.chi_square < best.fit.chi_square:
-                    best = found
+                if best is None or held.fit.chi_square < best.fit.chi_square:
+                    best = held
                 break
     return best
 

@@ -107,10 +107,10 @@ def _groups(
     whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces
 ) -> dict[str, NDArray[np.int64]]:
     """Group of every piece, by trial and by conditions."""
-    found: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
+    groups: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
     readings = whitened.readings(fit.values)
     if readings is None:
-        return found
+        return groups
     for channel, name in enumerate(OUTPUTS):
         if name == "rotation":
             continue
@@ -119,8 +119,8 @@ def _groups(
             edges = whitened.edges(logged)
             means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
         ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
-        found[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
-    return found
+        groups[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
+    return groups
 
 
 def _scatter(
