@@ -48,7 +48,10 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
-CLEAN = ("controllers",)
+CLEAN = (
+    "benchmarks",
+    "controllers",
+)
 """Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
 
 PHRASES = (
