@@ -48,7 +48,11 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
-CLEAN = ("controllers",)
+CLEAN = (
+    "controllers",
+    *(f"pma_gym/{room}" for room in ("codegen", "integrator", "plant", "estimation")),
+    *(f"pma_gym/{room}" for room in ("effects", "data", "studies", "pages")),
+)
 """Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
 
 PHRASES = (
