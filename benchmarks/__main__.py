@@ -7,6 +7,7 @@ from benchmarks.commands import (
     dissertation,
     exercise,
     hidden_effects,
+    remake,
     reproduction,
     settings,
     simulator,
@@ -31,6 +32,7 @@ reproduction.register(app)
 suites.register(app)
 dissertation.register(app)
 settings.register(app)
+remake.register(app)
 simulator.register(app)
 hidden_effects.register(app)
 training.register(app)

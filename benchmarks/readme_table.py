@@ -29,7 +29,9 @@ Run = Mapping[str, Any]
 _BLOCK = re.compile(
     r"(?P<start><!-- figures: (?P<name>\w+) -->\n).*?(?P<end><!-- end of figures -->)", re.DOTALL
 )
-_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse")
+_REPLAY = "serres_replay"
+_PARTS, _PART_NAMES = ("rmse", "line_error", "scatter"), ("RMSE", "line part", "scatter")
+_REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
 
 
 class RunError(ValueError):
@@ -92,6 +94,44 @@ def replay(run: Run) -> str:
             cells = [f"{fmean(v):+.2f} ({fmean(map(abs, v)):.2f})" for v in values]
             rows.append([f"{name} ({UNITS[task]})", *cells])
     header = ["Simulated less measured", "slope (per s)", "intercept", "mean position", "RMSE"]
+    header += ["line part", "scatter"]
+    return _table(header, rows, words=1)
+
+
+def parts(run: Run) -> str:
+    """The two parts of the RMSE, measured and of the replay, by task and phase: means."""
+    first = run["suite"]["models"][0]
+    replayed = [s for s in run["scores"] if s["controller"] == _REPLAY and s["model"] == first]
+    rows = []
+    for task, phases in PHASES.items():
+        for phase in phases:
+            cells = []
+            for scores in (run["measured"], replayed):
+                every = [s["phases"][phase] for s in scores if s["task"] == task]
+                cells += [f"{fmean(one[part] for one in every):.2f}" for part in _PARTS]
+            name = task if task == phase else f"{task}, phase {phase}"
+            rows.append([f"{name} ({UNITS[task]})", *cells])
+    header = ["Mean over the trials"]
+    header += [f"{who}: {part}" for who in ("measured", "simulated") for part in _PART_NAMES]
+    return _table(header, rows, words=1)
+
+
+def reading(run: Run) -> str:
+    """Table 30 as measured, as replayed, and as the replay may have been read: means by phase."""
+    rows = []
+    for phase in PHASES["rotation"]:
+        found = [entry for entry in run["rotation_reading"] if entry["phase"] == phase]
+        means = [fmean(entry[who] for entry in found) for who in ("measured", "plain", "read")]
+        errors = [
+            fmean(abs(entry[who] - entry["measured"]) for entry in found)
+            for who in ("plain", "read")
+        ]
+        rows.append([f"phase {phase}", *(f"{value:.2f}" for value in (*means, *errors))])
+    every = run["rotation_reading"]
+    whole = [fmean(abs(e[who] - e["measured"]) for e in every) for who in ("plain", "read")]
+    rows.append(["all", "", "", "", *(f"{value:.2f}" for value in whole)])
+    header = ["Table 30, RMSE (deg)", "measured", "replay", "replay as it may have been read"]
+    header += ["mean absolute error: replay", "as read"]
     return _table(header, rows, words=1)
 
 
@@ -105,7 +145,7 @@ def bound(run: Run) -> str:
 
 FIGURES: dict[str, Callable[[Run], str]] = {
     function.__name__: function
-    for function in (displacement, rotation, setting, speed, targets, replay, bound)
+    for function in (displacement, rotation, setting, speed, targets, replay, parts, reading, bound)
 }
 """Blocks by name."""
 

@@ -110,6 +110,11 @@ class Regression:
         return _ratio(self.ss_error, self.error_dof)
 
     @property
+    def scatter(self) -> float:
+        """Root mean square of the values about the line (unit); no degree of freedom is counted."""
+        return math.sqrt(self.ss_error / self.n)
+
+    @property
     def ss_model(self) -> float:
         """Sum of squares of the model: slope^2 * time_ss (unit^2)."""
         return self.slope**2 * self.time_ss
@@ -198,10 +203,31 @@ def rmse_from_regression(
     Returns:
         The RMSE (unit).
     """
+    return math.sqrt(line.ss_error / line.n + _line_mean_square(line, ideal_slope, ideal_intercept))
+
+
+def line_error(line: Regression, ideal_slope: float, ideal_intercept: float = 0.0) -> float:
+    """The part of a trial's RMSE that lies in its regression line: line less ideal, rms.
+
+        RMSE^2 = line_error^2 + scatter^2
+
+    A bias of the line can no longer make up for a scatter that is missing, as it can in the RMSE.
+
+    Args:
+        line: the trial's regression; `Regression.scatter` is the other part.
+        ideal_slope: slope of the ideal (unit/s).
+        ideal_intercept: value of the ideal at the phase's own time 0 (unit).
+    Returns:
+        Root mean square over the trial (unit).
+    """
+    return math.sqrt(_line_mean_square(line, ideal_slope, ideal_intercept))
+
+
+def _line_mean_square(line: Regression, ideal_slope: float, ideal_intercept: float) -> float:
+    """Mean square over the trial of its regression line less an ideal one (unit^2)."""
     slope_error = line.slope - ideal_slope
     middle = line.intercept - ideal_intercept + slope_error * line.time_mean
-    systematic = middle**2 + slope_error**2 * line.time_ss / line.n
-    return math.sqrt(line.ss_error / line.n + systematic)
+    return middle**2 + slope_error**2 * line.time_ss / line.n
 
 
 def _finite(name: str, values: ArrayLike) -> NDArray[np.float64]:

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
@@ -13,15 +14,13 @@ from rich.table import Table
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
 from benchmarks.files import write_text
-from benchmarks.identification import judge
+from benchmarks.identification import judge, statics
+from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, protocol_with_creep
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
 from pma_gym.plant.model import Model, Note, dump_model
 from pma_gym.terminal import SafeConsole
-
-STUDENT_10 = 2.228
-"""97.5 % point of Student's t with 10 degrees of freedom: 11 pressures left out in turn."""
 
 DIGITS = 5
 """Significant digits of the values written: below every interval, above what machines differ by."""
@@ -45,16 +44,31 @@ def run_identify(out: Path, jobs: int = 2, console: Console | None = None) -> Mo
     start = fitted_parameters(whole)
     works = [partial(_fold, data, steps, float(pressure), start) for pressure in data.pressures]
     folds = _all_folds(works, jobs, console)
-    model = _noted(whole, [fitted_parameters(fold) for fold, _ in folds])
-    judged = [errors for _, errors in folds]
-    words = judge.unexplained(whole, data, steps)
+    decision = decided([fold.creep for fold in folds])
+    if decision.asked:
+        whole = identify(data, steps, start, creeps=True)
+    chosen = [fold.creeping if decision.asked else fold.plain for fold in folds]
+    model = _noted(whole, [fitted_parameters(fold) for fold, _ in chosen])
+    judged = [errors for _, errors in chosen]
+    words = [decision.words, *judge.unexplained(whole, data, steps)]
     write_text(out, _header(judge.figures(judged), words) + dump_model(model))
     _print(console, model, judged, words)
     console.print(f"written: {out}")
     return model
 
 
-Fold = tuple[Model, judge.LeftOut]
+class Fold(NamedTuple):
+    """A pressure left out: models fitted without it, with what they miss there.
+
+    Attributes:
+        plain: without creep.
+        creeping: with creep.
+        creep: what says whether creep is asked for.
+    """
+
+    plain: tuple[Model, judge.LeftOut]
+    creeping: tuple[Model, judge.LeftOut]
+    creep: CreepFold
 
 
 def _all_folds(works: Sequence[partial[Fold]], jobs: int, console: Console) -> list[Fold]:
@@ -75,8 +89,18 @@ def _fold(
     data: StationLimits, steps: PressureSteps, pressure: float, start: dict[str, float]
 ) -> Fold:
     """The station fitted without a pressure (Pa), and how it predicts that one."""
-    model = identify(*leave_out(data, steps, pressure), start)
-    return model, judge.left_out(model, data.rows(data.pressure == pressure))
+    others, here = leave_out(data, steps, pressure), data.rows(data.pressure == pressure)
+    none = steps.rows(np.zeros(len(steps.load), bool))
+    plain, creeping = (identify(*others, start, creeps) for creeps in (False, True))
+    missed = [
+        float(np.mean(statics.weighted(plain, here, none) ** 2)),
+        float(np.mean(statics.weighted(creeping, here, none, protocol_with_creep) ** 2)),
+    ]
+    return Fold(
+        (plain, judge.left_out(plain, here)),
+        (creeping, judge.left_out(creeping, here, protocol_with_creep)),
+        CreepFold(fitted_parameters(creeping)["creep.stiffness_n_per_mm"], *missed),
+    )
 
 
 def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
@@ -86,7 +110,7 @@ def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
     for path, value in fitted_parameters(model).items():
         replicas = np.array([fold[path] for fold in folds])
         error = math.sqrt((count - 1) / count * np.sum((replicas - replicas.mean()) ** 2))
-        low, high = value - STUDENT_10 * error, value + STUDENT_10 * error
+        low, high = _possible(model, path, value - STUDENT_10 * error, value + STUDENT_10 * error)
         values[path] = _rounded(value)
         notes[path] = Note(_source(path, low, high), _rounded(low, 3), _rounded(high, 3))
     notes["cable.damping_n_s_per_mm"] = Note("assumption: 2 % of critical")
@@ -95,6 +119,20 @@ def _noted(model: Model, folds: list[dict[str, float]]) -> Model:
     )
     rounded = model.replace(values)
     return Model(model.name, model.title, model.plant, rounded.parameters, notes)
+
+
+def _possible(model: Model, path: str, low: float, high: float) -> tuple[float, float]:
+    """The part of an interval in which a memory can lie; any other interval as it is.
+
+    A value outside the bounds of another parameter has a meaning, such as a damping below 0 that
+    tables do not tell from 0; a muscle cannot stand beyond the branch on which it was filled.
+    """
+    effect, _, door = path.partition(".")
+    law = model.effects[effect]
+    if law.names_at_the_door()[door] != law.memory_start:
+        return low, high
+    quantity = law.quantities[law.memory_start]
+    return max(low, quantity.lower), min(high, quantity.upper)
 
 
 def _source(path: str, low: float, high: float) -> str:

@@ -2,18 +2,20 @@
 
 Protocol of I3: settled at P with no load; load ramped to L in 5 s, held 5 s, ramped back in 5 s.
 At 10 s everything viscous has died out; at 15 s the muscle still contracts at the ramp's speed.
-With F(P, x) the static force, H and d force and distance of the hysteresis, B the damping:
+With F(P, x) the static force, H and d force and distance of the hysteresis, z0 its memory where
+the trial begins (1: filled and contracted), B the damping:
 
-    no load        F(P, x0) = 0
-    at 10 s        F(P, x1) + H (1 - exp(-(x0 - x1) / d)) = L
+    no load        F(P, x0) - H z0 = 0
+    at 10 s        F(P, x1) - H z1 = L,     z1 = (1 + z0) exp(-(x0 - x1) / d) - 1
     at 15 s        F(P, x2) - H z2 = B v,   v = (L / 5 s) / (-dF/dx at x2)
-                   z2 = 1 - (1 - z1) exp(-(x2 - x1) / d),  z1 = exp(-(x0 - x1) / d) - 1
+                   z2 = 1 - (1 - z1) exp(-(x2 - x1) / d)
 
 extension is x0 - x1, return is x2 - x1. All follow from the Bouc-Wen law along monotonic paths;
 a test holds them against the simulated protocol. Damping and the
 regulator's paces also make I2's transients (`transients`); neither table fixes them alone.
 """
 
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -35,8 +37,9 @@ PARAMETERS: dict[str, tuple[float, float]] = {
     "pressure_curvature.passive_n_per_percent": (10.0, 2.0),
     "pressure_curvature.softening_n_per_bar2_per_percent": (-0.2, 0.1),
     "pressure_curvature.offset_n_per_bar2": (-12.0, 3.0),
-    "hysteresis.force_n": (5.0, 3.0),
-    "hysteresis.distance_mm": (3.0, 1.0),
+    "hysteresis.force_n": (15.0, 3.0),
+    "hysteresis.distance_mm": (2.0, 1.0),
+    "hysteresis.memory_at_start": (0.5, 0.1),
     "symmetric_damping.intercept_n_s_per_mm": (0.8, 0.3),
     "symmetric_damping.slope_n_s_per_mm_per_kpa": (0.001, 0.001),
     "regulator_lag.time_constant_s": (0.06, 0.01),
@@ -70,13 +73,18 @@ def protocol(model: Model, pressure: np.ndarray, load: np.ndarray) -> Protocol:
     force = muscle_force(model)
     hysteresis = model.parameters["hysteresis"]
     damping = damping_of(model, pressure)
-    x0 = contraction_at(force, pressure, np.zeros_like(load))
+    begun = hysteresis.memory_at_start
+    x0 = contraction_at(force, pressure, np.full_like(load, hysteresis.force * begun))
+
+    def stretched(x: np.ndarray) -> np.ndarray:
+        # Nothing turns back before x0: the search asks beyond it, where the state would run away.
+        return (1.0 + begun) * np.exp(-np.maximum(x0 - x, 0.0) / hysteresis.distance) - 1.0
 
     def loaded(p: np.ndarray, x: np.ndarray) -> np.ndarray:
-        return force(p, x) + hysteresis.force * (1.0 - np.exp(-(x0 - x) / hysteresis.distance))
+        return force(p, x) - hysteresis.force * stretched(x)
 
     x1 = contraction_at(loaded, pressure, load)
-    turned = np.exp(-(x0 - x1) / hysteresis.distance) - 1.0
+    turned = stretched(x1)
 
     def unloaded(p: np.ndarray, x: np.ndarray) -> np.ndarray:
         step = 1e-5
@@ -89,9 +97,15 @@ def protocol(model: Model, pressure: np.ndarray, load: np.ndarray) -> Protocol:
     return Protocol(x0, x0 - x1, x2 - x1)
 
 
-def residuals(model: Model, data: StationLimits) -> dict[str, np.ndarray]:
+Predict = Callable[[Model, np.ndarray, np.ndarray], Protocol]
+"""What predicts I3's protocol from model, pressures (Pa) and loads (N)."""
+
+
+def residuals(
+    model: Model, data: StationLimits, predict: Predict = protocol
+) -> dict[str, np.ndarray]:
     """Predicted less measured: no_load, extension, returned (mm), each of shape (rows,)."""
-    predicted = protocol(model, data.pressure, data.load)
+    predicted = predict(model, data.pressure, data.load)
     return {
         "no_load": (predicted.no_load - data.no_load) * 1e3,
         "extension": (predicted.extension - data.extension) * 1e3,
@@ -99,8 +113,29 @@ def residuals(model: Model, data: StationLimits) -> dict[str, np.ndarray]:
     }
 
 
+def weighted(
+    model: Model, data: StationLimits, steps: PressureSteps, predict: Predict = protocol
+) -> np.ndarray:
+    """What a fit lowers: residuals of I3 (mm) and of I2, by their weights; those that are known."""
+    parts = residuals(model, data, predict)
+    loop = parts["extension"] - parts["returned"]
+    all_parts = (
+        parts["no_load"],
+        parts["extension"],
+        LOOP_WEIGHT * loop,
+        STEP_WEIGHT * step_residuals(model, steps, filling=True),
+        STEP_WEIGHT * step_residuals(model, steps, filling=False),
+    )
+    return np.concatenate([part[np.isfinite(part)] for part in all_parts])
+
+
 def fit(
-    model: Model, data: StationLimits, steps: PressureSteps, start: dict[str, float] | None = None
+    model: Model,
+    data: StationLimits,
+    steps: PressureSteps,
+    start: dict[str, float] | None = None,
+    more: Mapping[str, tuple[float, float]] | None = None,
+    predict: Predict = protocol,
 ) -> Model:
     """The model with static force, hysteresis, damping and the regulator's paces fitted.
 
@@ -109,24 +144,18 @@ def fit(
         data: rows of I3.
         steps: rows of I2.
         start: values to start from, by parameter; `PARAMETERS` has the default.
+        more: parameters that are fitted beside `PARAMETERS`, as these.
+        predict: predicts I3's protocol.
     """
-    names = list(PARAMETERS)
-    begin = np.array([(start or {}).get(n, PARAMETERS[n][0]) for n in names])
-    scale = np.array([PARAMETERS[n][1] for n in names])
+    fitted = {**PARAMETERS, **(more or {})}
+    names = list(fitted)
+    begin = np.array([(start or {}).get(n, fitted[n][0]) for n in names])
+    scale = np.array([fitted[n][1] for n in names])
     lower, upper = _bounds(model, names)
 
     def cost(values: np.ndarray) -> np.ndarray:
         tried = model.replace(dict(zip(names, values.tolist(), strict=True)))
-        parts = residuals(tried, data)
-        loop = parts["extension"] - parts["returned"]
-        all_parts = (
-            parts["no_load"],
-            parts["extension"],
-            LOOP_WEIGHT * loop,
-            STEP_WEIGHT * step_residuals(tried, steps, filling=True),
-            STEP_WEIGHT * step_residuals(tried, steps, filling=False),
-        )
-        return np.concatenate([part[np.isfinite(part)] for part in all_parts])
+        return weighted(tried, data, steps, predict)
 
     found = least_squares(
         cost,

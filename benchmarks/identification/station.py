@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from benchmarks.identification import lines, statics
+from benchmarks.identification.creep import CREEP, HELD, protocol_with_creep
 from benchmarks.identification.measurements import StationLimits
 from benchmarks.identification.transients import PressureSteps
 from pma_gym.effects import CATALOGUE
@@ -40,7 +41,10 @@ def template() -> Model:
 
 
 def identify(
-    data: StationLimits, steps: PressureSteps, start: dict[str, float] | None = None
+    data: StationLimits,
+    steps: PressureSteps,
+    start: dict[str, float] | None = None,
+    creeps: bool = False,
 ) -> Model:
     """Fit everything that the tables tell of the station.
 
@@ -48,6 +52,7 @@ def identify(
         data: rows of I3.
         steps: rows of I2.
         start: values to start the static fit from.
+        creeps: whether the model has a branch of creep (`creep`).
     Returns:
         The station's model.
     """
@@ -55,7 +60,10 @@ def identify(
     values |= lines.pulley_parameters(lines.fit_pulley(data))
     model = template().replace(values)
     model = model.replace({"cable.damping_n_s_per_mm": cable_damping(model)})
-    return statics.fit(model, data, steps, start)
+    if not creeps:
+        return statics.fit(model, data, steps, start)
+    model = model.with_effects({"creep": {path.partition(".")[2]: v for path, v in HELD.items()}})
+    return statics.fit(model, data, steps, start, CREEP, protocol_with_creep)
 
 
 def cable_damping(model: Model) -> float:
@@ -69,7 +77,8 @@ def cable_damping(model: Model) -> float:
 
 def fitted_parameters(model: Model) -> dict[str, float]:
     """The values that the tables determine, by parameter, in file units."""
-    names = [*statics.PARAMETERS, *_LINES]
+    creeps = CREEP if "creep" in model.parameters else {}
+    names = [*statics.PARAMETERS, *creeps, *_LINES]
     return {name: _value(model, name) for name in names}
 
 

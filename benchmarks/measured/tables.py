@@ -116,6 +116,8 @@ def reverse_words(result: Measured) -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
     for found in result.reverse:
         plain = next(each for each in found if each.name == NOTHING)
+        yield from _hypothesis_words(found, plain)
+        found = [each for each in found if not each.hypothesis]
         best, others = found[0], [each for each in alike(found) if each is not found[0]]
         if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
             yield (
@@ -129,6 +131,19 @@ def reverse_words(result: Measured) -> Iterator[str]:
             "mm at pressures left out, the least."
             + (f" As good within 15 %: {told}." if told else "")
         )
+
+
+def _hypothesis_words(found: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
+    """What was thought of when the tables had been seen: told, and never counted."""
+    for each in found:
+        if each.hypothesis:
+            size = ", ".join(f"{name} {value:.3g}" for name, value in each.values.items())
+            yield (
+                f"Hypothesis, thought of when these tables had been seen: {each.name} ({size}) "
+                f"leaves {each.left_out_mm:.2f} of {plain.left_out_mm:.2f} mm at pressures left "
+                "out. These tables cannot decide it: undecidable until the potentiometer is turned "
+                "once by hand beside a scale."
+            )
 
 
 def _costs(each: Explanation, plain: Explanation) -> str:

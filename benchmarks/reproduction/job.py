@@ -24,6 +24,7 @@ from benchmarks.reproduction.execution import Execution, compile_models, execute
 from benchmarks.reproduction.page import report_blocks, report_pictures
 from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.results import Results, csv_text, json_text
+from benchmarks.reproduction.rotation_reading import entries
 from benchmarks.reproduction.summary import print_failures, print_summary
 from benchmarks.reproduction.targets import check_targets
 from benchmarks.runner.environment_info import environment_info
@@ -151,7 +152,12 @@ def _write_results(results: Results, out: Path, began: float) -> Results:
         for error in errors
     ]
     targets = [asdict(check) | {"verdict": check.verdict} for check in checks]
-    texts["scores.json"] = json_text(results, targets=targets, replay_errors=replay)
+    texts["scores.json"] = json_text(
+        results,
+        targets=targets,
+        replay_errors=replay,
+        rotation_reading=entries(results.suite.models[0]) if replay else [],
+    )
     # All is computed before anything is replaced, so that no folder mixes two runs.
     shutil.rmtree(out / PLOTS, ignore_errors=True)
     for name, image in pictures.items():

@@ -10,7 +10,7 @@ from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.score import PHASES, PhaseScore, measured_score
 from pma_gym.data.serres2008 import load_table
 
-QUANTITIES = ("slope", "intercept", "mean", "rmse")
+QUANTITIES = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
 """What is compared, attributes of a `PhaseScore`; mean is the line's position mid-phase."""
 
 
@@ -26,6 +26,8 @@ class ReplayError:
         intercept: error of the intercept (unit).
         mean: error of the mean position (unit).
         rmse: difference of the RMSE against the ideal (unit).
+        line_error: difference of its part in the regression line (unit).
+        scatter: difference of its part about the line (unit).
     """
 
     task: str
@@ -35,6 +37,8 @@ class ReplayError:
     intercept: float
     mean: float
     rmse: float
+    line_error: float
+    scatter: float
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from statistics import fmean
 
+from benchmarks.reproduction.reading_page import reading_blocks
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.score import measured_score
+from benchmarks.reproduction.score_parts import parts_explained, parts_table
 from benchmarks.reproduction.tables import replay_table
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import shipped_models
@@ -32,10 +34,13 @@ def replay_blocks(results: Results) -> list[Block]:
     if displacement:
         blocks += [_against_simple_prediction(results, displacement)]
         blocks += [Paragraph(displacement_verdict(results, displacement))]
-    blocks += [replay_table(trials) for trials in errors.values()]
+    for (task, phase), trials in errors.items():
+        blocks += [replay_table(trials), parts_table(results, task, phase)]
+    blocks.append(parts_explained())
     held = errors.get(("rotation", "II"))
     if held:
         blocks += _hold_blocks(results, held)
+        blocks += reading_blocks(model)
     return blocks
 
 

@@ -9,7 +9,7 @@ from benchmarks.suites.reproduction import Case
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
-from pma_gym.metrics import PHASE_DURATION, Regression, percent_of_range
+from pma_gym.metrics import PHASE_DURATION, Regression, line_error, percent_of_range
 from pma_gym.studies.evaluation import evaluate
 from pma_gym.studies.trials import TRIALS, measured_regression
 from pma_gym.tasks import phase_errors
@@ -36,7 +36,9 @@ class PhaseScore:
         ss_model: sum of squares of the line (unit^2).
         ss_error: sum of squares about the line (unit^2).
         residual_mean_square: ss_error / (n - 2) (unit^2).
-        rmse: against the ideal (unit).
+        rmse: against the ideal (unit); its square is that of the next two together.
+        line_error: rms over the phase of the line less the ideal (unit).
+        scatter: rms about the line (unit).
         percent_of_range: the RMSE in percent of 25 mm or 90 deg.
         largest_error: largest distance from the ideal (unit); None for a printed trial.
     """
@@ -49,6 +51,8 @@ class PhaseScore:
     ss_error: float
     residual_mean_square: float
     rmse: float
+    line_error: float
+    scatter: float
     percent_of_range: float
     largest_error: float | None = None
 
@@ -98,6 +102,7 @@ def score_trial(trial: Trial, task: str) -> dict[str, PhaseScore]:
     return {
         row.phase.name: _figures(
             row.regression,
+            (row.phase.slope, row.phase.initial),
             row.rmse,
             row.percent_of_range,
             unit,
@@ -118,13 +123,21 @@ def measured_score(task: str, phase: str, pressure_kpa: float) -> PhaseScore:
     rmse = float(load_table(name).where(pressure_kpa=pressure_kpa)[rmse_column][0])
     span = PROTOCOLS[task].span / SI_FACTORS[UNITS[task]]
     line = measured_regression(phase, pressure_kpa)
-    return _figures(line, rmse, percent_of_range(rmse, span), 1.0)
+    return _figures(line, tables.ideal, rmse, percent_of_range(rmse, span), 1.0)
 
 
 def _figures(
-    line: Regression, rmse: float, percent: float, unit: float, largest: float | None = None
+    line: Regression,
+    ideal: tuple[float, float],
+    rmse: float,
+    percent: float,
+    unit: float,
+    largest: float | None = None,
 ) -> PhaseScore:
-    """Figures of a line in a unit (its value in the line's own); the largest error is in it."""
+    """Figures of a line in a unit (its value in the line's own); the largest error is in it.
+
+    The ideal is a slope and an intercept in the line's own unit.
+    """
     return PhaseScore(
         slope=line.slope / unit,
         slope_std_error=line.slope_std_error / unit,
@@ -134,6 +147,8 @@ def _figures(
         ss_error=line.ss_error / unit**2,
         residual_mean_square=line.residual_mean_square / unit**2,
         rmse=rmse / unit,
+        line_error=line_error(line, *ideal) / unit,
+        scatter=line.scatter / unit,
         percent_of_range=percent,
         largest_error=largest,
     )

@@ -18,6 +18,8 @@ _QUANTITY_LABELS = {
     "intercept": "intercept ({unit})",
     "mean": "mean position ({unit})",
     "rmse": "RMSE ({unit})",
+    "line_error": "line part ({unit})",
+    "scatter": "scatter ({unit})",
 }
 
 
@@ -61,7 +63,7 @@ def replay_plot(results: Results) -> bytes:
     """Signed errors of the replay: a row a quantity, a column a phase, a bar a trial."""
     errors = all_replay_errors(results, results.suite.models[0])
     color = controller_styles(results.suite)[results.suite.targets.replay].color
-    with picture(11.0, 8.6) as figure:
+    with picture(11.0, 12.4) as figure:
         axes: Any = figure.subplots(len(QUANTITIES), len(errors), sharex="col", squeeze=False)
         for column, ((task, phase), trials) in enumerate(errors.items()):
             places = np.arange(len(trials))

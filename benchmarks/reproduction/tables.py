@@ -16,6 +16,9 @@ MISSING = "failed"
 REGRESSION_TABLES = {"displacement": "21", "I": "27", "II": "28", "III": "29"}
 """Printed tables of slope and intercept, by phase."""
 
+REPLAY_NAMES = ("intercept", "mean position", "RMSE", "line part", "scatter")
+"""Quantities of a replay's errors after the slope, for people."""
+
 Figures = Callable[[float], PhaseScore | None]
 
 
@@ -76,7 +79,7 @@ def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     unit = UNITS[errors[0].task]
     means = summarise(errors)
     header = ["Pressure (kPa)", f"slope ({unit}/s)"]
-    header += [f"{name} ({unit})" for name in ("intercept", "mean position", "RMSE")]
+    header += [f"{name} ({unit})" for name in REPLAY_NAMES]
     rows = [
         [f"{error.pressure_kpa:g}", *(f"{getattr(error, name):+.3f}" for name in QUANTITIES)]
         for error in errors

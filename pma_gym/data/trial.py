@@ -7,7 +7,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pma_gym.data.trial_checks import COMMANDS, check_commanded, check_time, check_values
+from pma_gym.data.trial_checks import (
+    COMMANDS,
+    check_commanded,
+    check_memory_at_start,
+    check_time,
+    check_values,
+)
 from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, TrialError, suggestion
 
 __all__ = ["COMMANDS", "MEASUREMENTS", "TRUTH", "Trial", "TrialError"]
@@ -37,6 +43,9 @@ class Trial:
             tension, N), pressure (gauge, Pa).
         truth: any of `TRUTH`, without noise and sensor lag; empty for a laboratory's trial.
         provenance: where it comes from, as text: model, seed, note...
+        memory_at_start: where the muscle's hysteresis stands at the first sample, -1 to 1 (1: it
+            was filled and has contracted); None: nobody says, so a simulation begins as its model
+            does and a fit leaves it free.
     Raises:
         TrialError: a name, shape or value that breaks these rules.
     """
@@ -46,6 +55,7 @@ class Trial:
     measurements: Arrays = field(default_factory=dict)
     truth: Arrays = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
+    memory_at_start: float | None = None
 
     def __post_init__(self) -> None:
         """Copy, freeze and check."""
@@ -61,7 +71,7 @@ class Trial:
     def __reduce__(self) -> tuple[type["Trial"], tuple[object, ...]]:
         """Pickle and copy by construction: a read-only mapping has no pickle of its own."""
         groups = (self.commands, self.measurements, self.truth, self.provenance)
-        return Trial, (self.time, *(dict(group) for group in groups))
+        return Trial, (self.time, *(dict(group) for group in groups), self.memory_at_start)
 
     def __len__(self) -> int:
         """Number of samples."""
@@ -110,6 +120,7 @@ class Trial:
             return f"sample {index}"
 
         check_time(self.time, place)
+        check_memory_at_start(self.memory_at_start, "a trial")
         check_commanded(self.commands, "a trial")
         for group in (self.commands, self.measurements, self.truth):
             for quantity, values in group.items():

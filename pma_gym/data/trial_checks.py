@@ -28,6 +28,25 @@ def check_commanded(quantities: Iterable[str], owner: str) -> None:
         raise TrialError(f"{owner} needs at least one command, {names}; it has none")
 
 
+def check_memory_at_start(value: object, owner: str) -> None:
+    """Refuse where no memory stands as a trial begins.
+
+    Args:
+        value: -1 to 1, or None where nobody says.
+        owner: what has it.
+    Raises:
+        TrialError: names its range and what came.
+    """
+    number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
+    # `not <=`: NaN is out of every range.
+    if value is not None and not (number and -1.0 <= float(value) <= 1.0):  # type: ignore[arg-type]
+        raise TrialError(
+            f"memory_at_start of {owner} must be a number in -1 to 1, got {value!r}; write 1 where "
+            "the muscle was filled and has contracted, -1 where it was stretched before, 0 where "
+            "it stood in between, or leave it out"
+        )
+
+
 _ROUNDING = 1e-6
 """Share by which a step in floating point may fall short."""
 

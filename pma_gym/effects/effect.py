@@ -53,6 +53,8 @@ class Effect:
         memories: how many numbers the memory has. Of more than one, laws get `memory` as a tuple,
             and the rate law returns a (source, decay) for each.
         memory_scale: what an error of the memory is counted against, roughly its range.
+        memory_start: the parameter (field name) that the memory equals where a trial begins; empty
+            where it begins at 0.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
         replaces: what it is one of several forms of, so that it stands in place of another effect
@@ -72,6 +74,7 @@ class Effect:
     signature: str = ""
     memory_scale: float = 1.0
     memories: int = 1
+    memory_start: str = ""
     held: tuple[str, ...] = ()
     replaces: str = ""
 

@@ -10,11 +10,13 @@ from typing import Any, Self, TypedDict, TypeGuard
 
 import numpy as np
 
+from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
+from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import (
     DISTURBANCES,
@@ -59,6 +61,9 @@ class Options:
         pressure_kpa: gauge pressure of the episodes (kPa): a number, several to draw from (a list,
             a range, an array), or "random" for any that the task's trials begin at.
         model: name of a shipped model, path of a TOML file, or a Model.
+        memory_at_start: where the muscle's hysteresis stands as an episode begins, -1 to 1 (1: it
+            was filled and has contracted); None: as the model says, or where a randomisation draws
+            it, as drawn. A model without hysteresis has nothing to begin with.
         control_rate_hz: control steps a second (Hz).
         preview: how many future references the observation holds, one a control step.
         noise: sensor noise and quantisation; the sensors' lag stays either way.
@@ -88,6 +93,7 @@ class Options:
 
     pressure_kpa: Pressure = "random"
     model: str | Path | Model = "station"
+    memory_at_start: float | None = None
     control_rate_hz: float = 100.0
     preview: int = 0
     noise: bool = True
@@ -148,6 +154,15 @@ class Options:
         """Name of the reward; "function" for a user's, whatever it is."""
         return self.reward if isinstance(self.reward, str) else "function"
 
+    @property
+    def nominal(self) -> Model:
+        """The model as it is read, with memories where episodes shall begin.
+
+        Raises:
+            ModelError: no such model, or one that cannot be used.
+        """
+        return begun_at(load_model(self.model), self.memory_at_start)
+
     def horizon(self, task: Task) -> int:
         """Control steps after which an episode of a task is truncated."""
         whole = task.steps(self.control_rate_hz)
@@ -196,6 +211,7 @@ def parse_options(
         given = {**given, "max_episode_steps": None}
     options = Options(**plain_options(given))
     _check_model(options.model)
+    check_memory_at_start(options.memory_at_start, "episodes")
     _check_rate_and_delays(options)
     for name in ("preview", "history"):
         _check_whole(name, getattr(options, name))
@@ -277,7 +293,7 @@ def rig_model(task: Task, options: Options) -> Model:
         ModelError: no such model, or one that cannot be used.
         ValueError: a cascade where there must be a station.
     """
-    model = load_model(options.model)
+    model = options.nominal
     if not model.rig.has_muscle:
         raise ValueError(
             f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "

@@ -19,7 +19,7 @@ from pma_gym.estimation import initial_states
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
 from pma_gym.integrator.equations import Interpolation, check_interpolation
-from pma_gym.plant import sensors
+from pma_gym.plant import memory_start, sensors
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model, ModelError
@@ -70,7 +70,8 @@ class Residuals:
     A residual is simulated minus measured, in standard deviations: the sensor's noise and the
     rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
     does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
-    begins settled at its first commands; a slide that nothing holds, as fast as fits it best.
+    begins settled at its first commands, memories where they fit it best between 0 and 1 unless the
+    trial says where (`memory_start`); a slide that nothing holds, as fast as fits it best.
 
     Args:
         model: the model; its noise levels weigh the sensors, its drive and its regulator's line
@@ -132,6 +133,10 @@ class Residuals:
             where, speed = initial_states.starts(self._trials)
             paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
             self._begun = self._places({path: list(row) for path, row in paths.items()})
+        guesses = memory_start.first_guesses(trials)
+        nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
+        self._memories = self._places({path: list(guesses) for path in nuisances})
+        self._reaches = [memory_start.reach(trial) for trial in trials]
 
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums at parameters, with the Jacobian by finite differences.
@@ -206,10 +211,11 @@ class Residuals:
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self._factors[column]
-        count, number = len(tried) + bool(self._begun), len(self.plant.states)
+        moved = self._moved_starts()
+        count, number = len(tried) + bool(moved), len(self.plant.states)
         every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
-        if self._begun:
-            every[len(tried) :: count, self._begun[-1][0]] += initial_states.MOVE
+        for place, move in moved:
+            every[len(tried) :: count, place] += move
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
@@ -232,12 +238,44 @@ class Residuals:
                     for k in range(count)
                 ]
             simulate_all(self.plant.program, runs, self.threads)
-            if self._begun:
-                spaces = list(map(self._met, spaces, (self._trials[i] for i in block)))
+            if moved:
+                each = zip(block, spaces, strict=True)
+                spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
             results += work(block, spaces, zeros[block, : len(tried)], vectors)
         return results
 
-    def _met(self, space: Array, logged: Logged) -> Array:
+    def _moved_starts(self) -> list[tuple[int, float]]:
+        """Parameters that say how trials begin, and by how much each is moved once more."""
+        if self._begun:
+            return [(self._begun[-1][0], initial_states.MOVE)]
+        return [(place, memory_start.MOVE) for place, _ in self._memories]
+
+    def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """States of a trial that begins as fits best, shape (tried, rows, states).
+
+        The last of those given is the first with another start; x0 moves with them.
+        """
+        if self._begun:
+            return self._met_slide(space, self._trials[number])
+        shares = self._start_shares(number, space, zeros, vectors)
+        space[:-1] += shares[:, None, None] * (space[-1] - space[0])
+        zeros[:-1] += shares * (zeros[-1] - zeros[0])
+        return space[:-1]
+
+    def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """How many moves bring each simulation nearest to a trial's readings, shape (tried,)."""
+        logged = self._trials[number]
+        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]))
+        left = np.stack(held, axis=1) - logged.measured
+        changes = self._in_noise(logged, left * logged.counts)
+        along = changes[-1] - changes[0]
+        return memory_start.best_shares(changes[:-1], along, self._reaches[number])
+
+    def _in_noise(self, logged: Logged, left: Array) -> Array:
+        """Differences (SI), shape (tried, 4, rows), in units of noise, shape (tried, numbers)."""
+        return (left / self.deviations[:, None]).reshape(len(left), -1)
+
+    def _met_slide(self, space: Array, logged: Logged) -> Array:
         """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
         column = self.plant.sensor_columns[0]
         at = column if column >= 0 else self.plant.states.index("contraction")
@@ -247,7 +285,7 @@ class Residuals:
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
         every = np.tile(vectors, (len(self._trials), 1))
-        for place, values in (*self._begun, *self._own):
+        for place, values in (*self._begun, *self._memories, *self._own):
             every[:, place] = np.repeat(values, len(vectors))
         return every
 

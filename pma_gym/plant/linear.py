@@ -79,8 +79,9 @@ def linearize_at(
     if "velocity" in plant.states:
         base.state[plant.states.index("velocity")] += _AWAY * DIRECTIONS[direction]
     else:
-        # The cascade's muscle shortens where its motor stands behind it.
-        base.state[plant.states.index("servo")] -= _AWAY * DIRECTIONS[direction]
+        # The cascade's muscle shortens where its motor, or its own contraction, stands behind it.
+        for name in ("servo", "free_contraction"):
+            base.state[plant.states.index(name)] -= _AWAY * DIRECTIONS[direction]
     kept = [
         i
         for i, name in enumerate(plant.states)

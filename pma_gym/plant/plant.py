@@ -11,6 +11,7 @@ from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import OUTPUTS, CompiledModel
 from pma_gym.plant.condition import Condition, check_voltages
 from pma_gym.plant.equilibrium.solver import equilibrium_at
+from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.simulation import Run, simulate_all
 from pma_gym.renamed_keywords import old_keywords
 
@@ -37,7 +38,7 @@ class Plant(CompiledModel):
         pressure: float | None = None,
         regulator_voltage: float | None = None,
     ) -> Condition:
-        """The plant at rest at constant commands, memories at zero.
+        """The plant at rest at constant commands, memories as the model says that trials begin.
 
         Args:
             motor_voltage: motor command (V).
@@ -138,6 +139,9 @@ class Plant(CompiledModel):
     ) -> Trial:
         """Run a trial's commands and log what the station's sensors would.
 
+        It begins settled at its first commands, memories as the trial says or, where it says
+        nothing, as the model does.
+
         Args:
             trial: time and commands: motor_voltage or load_command, regulator_voltage or
                 pressure_command.
@@ -151,6 +155,9 @@ class Plant(CompiledModel):
             ValueError: a command that is missing, or not given in the first row; a later empty cell
                 holds the value before it.
         """
+        begun = begun_at(self.model, trial.memory_at_start)
+        if begun != self.model:
+            return Plant(begun, self.tolerance).simulate(trial, noise, seed, interpolation)
         motor, regulator = sensors.voltages(self.model, trial)
         states, zero = self.run(trial.time, motor, regulator, interpolation)
         truth = self.observe(states, zero)
@@ -163,6 +170,7 @@ class Plant(CompiledModel):
             measurements=measured,
             truth=truth,
             provenance=provenance,
+            memory_at_start=trial.memory_at_start,
         )
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:

@@ -228,7 +228,7 @@ class Program:
         b.ret_void()
 
     def _balance(self, module: Module) -> None:
-        """Contraction at which the muscle balances a load, by halving, memories at zero."""
+        """Contraction at which the muscle balances a load, by halving, as trials begin."""
         eq = self.equations
         (force,) = substitute([static_force(eq)], {})
         b, (count, pressures, loads, vectors, stride, out) = function(

@@ -19,11 +19,26 @@ def system(model: Model, interpolation: Interpolation) -> System:
     return System(equations, made, Layout.of(made))
 
 
+def memories_at_start(eq: PlantEquations) -> dict[str, Value]:
+    """The memories that do not begin at 0, as values of the model's parameters, by state."""
+    return {
+        name: getattr(eq.parameters[effect.name], effect.memory_start)
+        for effect in eq.effects.values()
+        if effect.memory_start
+        for name in effect.memory_names
+    }
+
+
 def static_force(eq: PlantEquations) -> Value:
-    """Force of the muscle on the slide at rest, without the cable, memories at zero."""
+    """Force of the muscle on the slide at rest, without the cable, memories as trials begin."""
     force = eq["muscle_force"] + eq["slide_force"]
     nothing = eq.graph.constant(0.0)
-    memories = {entry.value.id: nothing for entry in eq.remembered if "memory_" in entry.name}
+    begun = memories_at_start(eq)
+    memories = {
+        entry.value.id: begun.get(entry.name, nothing)
+        for entry in eq.remembered
+        if "memory_" in entry.name
+    }
     here = step_start_values(eq) | {eq["velocity"].id: nothing}
     (first,) = substitute([force], here)
     return substitute([first], memories | {eq["velocity"].id: nothing})[0]

@@ -58,7 +58,8 @@ def three_element_errors() -> ThreeElementErrors:
     """How far table 2's model is from the station's own measurements, at nominal pressures.
 
     Extension is load over K; contraction is (F_ce - load) / K; force is F_ce - K x contraction.
-    The three repeats of a measurement differ by 0.65 mm.
+    The three repeats of a measurement scatter by 0.74 mm in extension about their mean (n - 1 in
+    the divisor).
 
     Source:
         Serres 2008, table 2 and section 5.1.1 against table I3.

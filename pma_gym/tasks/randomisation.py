@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from pma_gym.effects import Effect
-from pma_gym.effects.effect import Value
+from pma_gym.effects.effect import Value, signals
 from pma_gym.plant.model import Model
 from pma_gym.plant.statics import muscle_force
 from pma_gym.tasks.task import TASKS
@@ -49,7 +49,9 @@ def station_within_intervals(model: Model, generator: np.random.Generator) -> Mo
 def _brought_back(
     model: Model, drawn: dict[str, Value], port: str, holds: Callable[[Model], bool]
 ) -> dict[str, Value]:
-    names = [name for name, effect in model.effects.items() if effect.port == port]
+    # What has a memory, as hysteresis has, is no part of the static force, and stays as drawn.
+    static = {n: e for n, e in model.effects.items() if e.law and "memory" not in signals(e.law)}
+    names = [name for name, effect in static.items() if effect.port == port]
     paths = [path for path in drawn if path.partition(".")[0] in names]
     nominal = {f"{n}.{door}": value for n in names for door, value in model.at_the_door(n).items()}
     for _ in range(10 if paths else 0):

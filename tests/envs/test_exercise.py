@@ -63,13 +63,17 @@ def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure
     env = PMAEnv("isokinetic_exercise", noise=False, human=EXACT, pressure_kpa=pressure_kpa)
     env.reset(seed=0)
     infos = held(env)
-    # At rest at 90 deg, but for hysteresis and friction (8 N and 2 N of 600).
+    # At rest at 90 deg, but for friction and hysteresis: the static moment knows neither its force
+    # nor how much less the muscle contracts where it begins on the branch of filling.
     end_of_hold = infos[999]
-    assert end_of_hold["rotation_deg"] == pytest.approx(90.0, abs=3.0)
+    # 32 N of hysteresis and friction hold the muscle short by some 4 deg at the low pressure.
+    assert end_of_hold["rotation_deg"] == pytest.approx(90.0, abs=4.5)
     device = own_device(env.station.model)
     angle = math.radians(end_of_hold["rotation_deg"])
     static = resistive_moment(env.station.model, device, 1e3 * pressure_kpa, angle).moment
-    friction = 10.0 * device.radius
+    part = env.station.model.parameters
+    hysteresis = part["hysteresis"].force * (1.0 + part["hysteresis"].memory_at_start)
+    friction = (hysteresis + part["coulomb_friction"].static) * device.radius
     assert end_of_hold["moment_nm"] == pytest.approx(float(static), abs=friction)
 
 

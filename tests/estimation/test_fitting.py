@@ -24,8 +24,15 @@ FREE = (
     "hysteresis.force_n",
     "regulator_lag.time_constant_s",
 )
-TRUE = dict(zip(FREE, (348.77, 0.0015264, 7.6281, 0.055422), strict=True))
-OFF = load_model("station").replace(
+STATION = load_model("station")
+TRUE = {
+    f"{effect}.{door}": value
+    for effect in STATION.parameters
+    for door, value in STATION.at_the_door(effect).items()
+    if f"{effect}.{door}" in FREE
+}
+TRUE = {path: TRUE[path] for path in FREE}
+OFF = STATION.replace(
     {path: share * TRUE[path] for path, share in zip(FREE, (1.2, 0.75, 1.3, 0.8), strict=True)}
 )
 
@@ -172,7 +179,7 @@ def test_sensors_without_a_lag_are_fitted_too():
 
 def test_a_bound_holds(measured):
     # Much more friction than there was leaves nothing to hysteresis.
-    friction = {"coulomb_friction.static_n": 30.0, "coulomb_friction.dynamic_n": 25.0}
+    friction = {"coulomb_friction.static_n": 60.0, "coulomb_friction.dynamic_n": 50.0}
     start = load_model("station").replace(friction | {"hysteresis.force_n": 5.0})
     found = fit(start, measured[:2], ("hysteresis.force_n", "regulator_lag.time_constant_s"))
     assert found.at_bounds == ("hysteresis.force_n",) and found.converged

@@ -80,3 +80,33 @@ def test_a_straight_or_rising_map_has_no_peak():
         bent = p._replace(square=tuple(square for _ in p.square))
         expected = square * 81.0 + 9.0 * p.linear[0] + p.constant[0]
         assert mapped_displacement(9.0, 100e3, bent) == pytest.approx(expected)
+
+
+def contraction_after_a_pressure_step(model):
+    """Times (s), and the share of its way that the muscle has gone from 200 to 400 kPa."""
+    plant = Plant(model)
+    when = np.linspace(0.0, 2.0, 2001)
+    regulator = np.full(when.size, plant.regulator_voltage(400e3))
+    start = plant.settle(0.0, 200e3)
+    states, zero = plant.run(when, np.zeros(when.size), regulator, condition=start)
+    contraction = plant.observe(states, zero)["contraction"]
+    rest = plant.settle(0.0, 400e3).zero_contraction
+    return when, (contraction - start.zero_contraction) / (rest - start.zero_contraction)
+
+
+def test_a_pressure_step_takes_the_muscles_time_constant():
+    """Eq. 16: tau = B / K, 0.12 s at 400 kPa; on top comes the regulator's own lag."""
+    tau = 2.90 / (17.0 + 0.0179 * 400.0)
+    at_once = load_model("cascade").replace({"regulator_lag.time_constant_s": 1e-4})
+    when, share = contraction_after_a_pressure_step(at_once)
+    assert np.interp(1.0 - np.exp(-1.0), share, when) == pytest.approx(tau, abs=0.5e-3)
+    when, share = contraction_after_a_pressure_step("cascade")
+    assert np.interp(1.0 - np.exp(-1.0), share, when) == pytest.approx(0.215, abs=0.01)
+
+
+def test_at_constant_pressure_the_free_contraction_stands_still():
+    plant, _, extension = stepped("cascade", 400e3, 1.0, 4.0)
+    rest = plant.settle(4.0, 400e3)
+    state = rest.state[plant.states.index("free_contraction")]
+    assert state == pytest.approx((2.91 * 400.0 + 44.6) / (17.0 + 0.0179 * 400.0) * 1e-3)
+    assert np.ptp(extension) > 0.01

@@ -3,7 +3,7 @@
 import os
 import warnings
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pma_gym.data.datasets.dataset_checks import check_signals, empty_runs
@@ -81,8 +81,9 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
 
     A file with several sheets, segments, groups or structures holds as many trials, with names like
     `march.xlsx#run2`. `dataset.toml` may give `title`, `model`, `[columns]` (the lab's names to
-    ours, with factor and offset), `[format]`, `[trials."ramp.csv"]` with `order`, `repeat_of` and
-    `note`, `[tolerance]` and `[standard_error]` (by measurement, in its unit). Hidden files and
+    ours, with factor and offset), `[format]`, `[trials."ramp.csv"]` with `order`, `repeat_of`,
+    `note` and `memory_at_start` (of the muscle's hysteresis, -1 to 1), `[tolerance]` and
+    `[standard_error]` (by measurement, in its unit). Hidden files and
     TOML files are passed over silently, all others with a warning.
 
     Args:
@@ -139,8 +140,9 @@ def _named(
         (path.name, each)
         for each in (*words, *empty_runs(path, trial, table), *_wild(trial, table))
     ]
-    about = description.trials.get(path.name, {})
-    return NamedTrial(path.name, trial, **about)
+    about = {**description.trials.get(path.name, {})}
+    begun = about.pop("memory_at_start", None)
+    return NamedTrial(path.name, replace(trial, memory_at_start=begun), **about)
 
 
 def _wild(trial: Trial, table: Table) -> Iterator[str]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from pma_gym.data.datasets.format_toml import file_format
 from pma_gym.data.readers.table import PART, FileFormat
+from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.data.trial_columns import COLUMNS, ColumnMap, TrialError, sources, suggestion
 from pma_gym.documents import is_file, read_toml
 from pma_gym.units import SI_FACTORS
@@ -18,7 +19,7 @@ _KEYS = ("title", "model", "columns", "format", "trials", "tolerance", "standard
 MOST_SIZE = 1e9
 """Sizes of signals are smaller, in any unit of the columns."""
 
-_TRIAL_KEYS = ("order", "repeat_of", "note")
+_TRIAL_KEYS = ("order", "repeat_of", "note", "memory_at_start")
 _LINE_FORM = (
     'a line is a table, [columns], or name = value, a text in quotes: "Weg" = "contraction_mm"'
 )
@@ -34,7 +35,7 @@ class Description:
         model: name or path of a model, or None.
         columns: the lab's column names to ours.
         form: what the files leave open: separator, decimal mark, encoding...
-        trials: `order`, `repeat_of` and `note` by file name.
+        trials: `order`, `repeat_of`, `note` and `memory_at_start` by file name.
         tolerance: misfit that is good enough, by measurement (SI): `contraction`.
         standard_error: of readings that are rows of a table, by measurement (SI).
     """
@@ -158,6 +159,7 @@ def _trials(tables: Mapping[str, Any], files: Sequence[str]) -> dict[str, dict[s
         _check_keys(place, table, _TRIAL_KEYS)
         _text(table, "note", place)
         _check_order(place, table.get("order", 0.0))
+        check_memory_at_start(table.get("memory_at_start"), place)
         _check_repeat(place, name, _text(table, "repeat_of", place), tables, files)
     return {name: {**table} for name, table in tables.items()}
 

@@ -116,4 +116,6 @@ def rows_of(trial: Trial, rows: slice | NDArray[np.int64]) -> Trial:
         {name: values[rows] for name, values in trial.commands.items()},
         {name: values[rows] for name, values in trial.measurements.items()},
         provenance=trial.provenance,
+        # Known at the trial's first sample only.
+        memory_at_start=trial.memory_at_start if trial.time[rows][0] == trial.time[0] else None,
     )

@@ -22,6 +22,7 @@ from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.documents import read_toml
 from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.memory_start import memory_states
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
@@ -45,16 +46,17 @@ def trial_states(
     for candidate in chosen:
         own |= candidate.own
     whitened = problem.whitened_residuals(fit.model, chosen)
-    begun = whitened.first_states(fit.values) if _begins_freely(fit.model) else None
+    starts = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
+    begun = whitened.first_states(fit.values) if starts else None
     found = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
             states = dict(zip(whitened.plant.states, begun[i].tolist(), strict=True))
             parameters |= {
-                path: states[state] / SI_FACTORS[unit(path)] for state, path in STARTS.items()
+                path: states[state] / SI_FACTORS[unit(path)] for state, path in starts.items()
             }
-        if begun is not None:
+        if _begins_freely(fit.model):
             parameters = _started(fit.model, problem.trials[i], parameters)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
         found[name] = TrialState(_zeros(problem.trials[i], held), parameters)

@@ -85,6 +85,7 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
             {name: values[rows] for name, values in trial.commands.items()},
             {name: values[rows] for name, values in trial.measurements.items()},
             provenance=trial.provenance,
+            memory_at_start=None if start else trial.memory_at_start,
         )
         since = f"from {trial.time[start]:.4g} s"
         repeats = named.repeat_of and f"{named.repeat_of} {since}"

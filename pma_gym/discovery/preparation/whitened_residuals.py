@@ -183,6 +183,12 @@ class WhitenedResiduals(Residuals):
 
         return self._each(values[None], work)
 
+    def _in_noise(self, logged: Logged, left: Array) -> Array:
+        """Differences (SI), shape (tried, 4, rows), whitened, free of free zeros and flat."""
+        # A rig that cannot be simulated has no finite ones; who asks for them looks.
+        with np.errstate(invalid="ignore", over="ignore"):
+            return self.whitened(logged, left).reshape(len(left), -1)
+
     def whitened(self, logged: Logged, differences: Array) -> Array:
         """Differences (SI), shape (columns, 4, rows), made white and free of free zeros."""
         white = np.zeros_like(differences)

@@ -84,7 +84,8 @@ def _lacking(
         for stem, quantity in effect.quantities.items()
         if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
-        and stem != "repeat"
+        # Free in every trial already, as `estimation.residuals` has it.
+        and stem not in ("repeat", effect.memory_start)
     }
     if any(quantity.usual is None for quantity in shown.values()):
         return None

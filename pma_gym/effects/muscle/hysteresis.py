@@ -16,6 +16,10 @@ class Hysteresis(NamedTuple):
     distance: Annotated[
         float, Quantity("mm", 0.05, 20, "literature on braided muscles: 1-2.5 mm", usual=1.5)
     ]
+    memory_at_start: Annotated[
+        float,
+        Quantity("1", -1, 1, "1: the muscle was filled and contracted; fitted by trial", 0.0),
+    ] = 0.0
 
 
 def hysteresis_force(memory, p):
@@ -25,7 +29,7 @@ def hysteresis_force(memory, p):
 
     Args:
         memory: hysteretic state z, between -1 and 1.
-        p: Hysteresis: force (N), distance (m).
+        p: Hysteresis: force (N), distance (m), memory_at_start (z where a trial begins).
     Returns:
         Force (N); positive shortens the muscle.
     Source:
@@ -57,6 +61,8 @@ HYSTERESIS = Effect(
     parameters=Hysteresis,
     law=hysteresis_force,
     rate_independent_law=hysteresis_path,
+    memory_start="memory_at_start",
+    held=("memory_at_start",),
     signature=(
         "loops whose area does not depend on rate, with nested minor loops; the force lags behind "
         "the way over some millimetres after a turn, where dry friction turns at once"

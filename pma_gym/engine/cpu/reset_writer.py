@@ -21,7 +21,7 @@ from pma_gym.engine.cpu.block_memory import BlockMemory, KernelSpec, narrowed, w
 from pma_gym.engine.state_layout import DRAW, TARE
 from pma_gym.integrator.integration import FUSED, memory
 from pma_gym.plant.program import FIRST_S, balanced
-from pma_gym.plant.system import static_force
+from pma_gym.plant.system import memories_at_start, static_force
 
 TARE_READINGS = 192
 """Readings at rest whose mean is the sensors' zero: half a second at 384 Hz, as one would do."""
@@ -72,7 +72,8 @@ class ResetWriter(BlockMemory):
         keys = self.step_graph.slot("key_0"), self.step_graph.slot("key_1")
         stream = self.step_graph.slot("episode") * 4 + DRAW
         self.share = uniform(philox((nothing, stream, nothing, nothing), keys)[0])
-        return [self.force, *self.reach, *self.line]
+        self.memories = memories_at_start(eq)
+        return [self.force, *self.reach, *self.line, *self.memories.values()]
 
     def _begin(self) -> None:
         """Begin trials of environments, at rest wherever their states are not set already.
@@ -123,6 +124,7 @@ class ResetWriter(BlockMemory):
         zero = balanced(b, self.eq, self.force, known, none, reach)
         at_rest = {"zero": zero, "pressure": pressure}
         real = {name: at_rest[what] for name, what in _AT_REST.items()}
+        real |= {name: known[value.id] for name, value in self.memories.items()}
         real |= {"zero_contraction": zero, "size": ir.Constant(DOUBLE, FIRST_S)}
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
         real |= self._asked_before(b, regulator)

@@ -22,7 +22,7 @@ from pma_gym.engine.reset.reset_state import (
 from pma_gym.engine.state_layout import START
 from pma_gym.plant.compiled_model import regulator_voltage
 from pma_gym.plant.equilibrium.solver import NoLoadEquilibria
-from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S, vector
 from pma_gym.tasks import Events, Task
@@ -45,7 +45,7 @@ class Episodes(EngineMemory):
         pressures: Sequence[Pressure] | None,
     ) -> None:
         """Check the pressures that are asked for, then compile."""
-        self.task, self.nominal_model = task, nominal_model(task, load_model(options.model))
+        self.task, self.nominal_model = task, nominal_model(task, options.nominal)
         # The very same model where nothing is added: its plant is known by that.
         rig = rig_model(task, replace(options, model=self.nominal_model))
         nominal = Plant(rig, options.tolerance)

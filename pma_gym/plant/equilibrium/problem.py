@@ -93,6 +93,7 @@ class EquilibriumProblem:
         self._numbers = numbers
         self._columns: dict[str, dict[str, np.ndarray]] = {}
         self.unbalanced = ""
+        put_memories(plant, self.vectors, self.state)
 
     @property
     def zero(self) -> np.ndarray:
@@ -185,6 +186,21 @@ class EquilibriumProblem:
         # With the zero at the contraction itself the cable is slack.
         self["contraction"] = contraction
         return self.parameters("slide")["mass"] * self.rate("velocity", zero=contraction)
+
+
+def put_memories(plant: SolvablePlant, vectors: np.ndarray | None, state: np.ndarray) -> None:
+    """Put memories where trials begin into states, shape (n, states); the others stay as they are.
+
+    Args:
+        plant: one of the plants.
+        vectors: parameters of each, shape (n, numbers); None where all have the plant's own.
+        state: the states, changed in place.
+    """
+    for effect in plant.effects.values():
+        if effect.memory_start:
+            begun = effect_parameters(plant, vectors, effect.name)[effect.memory_start]
+            for name in effect.memory_names:
+                state[:, plant.states.index(name)] = begun
 
 
 def effect_parameters(

@@ -5,7 +5,7 @@ import numpy as np
 from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition, check_voltages
 from pma_gym.plant.equilibrium.force_balance import balances
-from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters, put_memories
 from pma_gym.plant.model import Model
 
 
@@ -19,8 +19,8 @@ def equilibrium_at(
         motor_voltage: motor command (V).
         regulator_voltage: regulator command (V).
     Returns:
-        Where it stands: memories at zero, but for a load that has long arrived, and the
-        contraction x0 (m) that the muscle would have with no load at this pressure.
+        Where it stands: memories as the model says that trials begin, a load that has long arrived,
+        and the contraction x0 (m) that the muscle would have with no load at this pressure.
     Raises:
         ValueError: a voltage out of 0-10 V, or no contraction within twice the limits balances
             the load.
@@ -118,6 +118,7 @@ class NoLoadEquilibria:
             states[:, i] = zero
         for i in self._pressures:
             states[:, i] = pressures
+        put_memories(self.plant, vectors, states)
         return states, zero
 
 

@@ -3,9 +3,11 @@
     x_in = map(V, P)                                   static map of table 18
     u' = (K_M / B_M) (x_in - u)                        servo, or with inertia Eq. 10
     y' = (u - y) K / B                                 muscle, tau = B / K at the pressure
-    x = F_ce / K - y                                   contraction
+    c' = (F_ce / K - c) K / B                          what it contracts with no load, by Eq. 16 too
+    x = c - y                                          contraction
 
-One-way: the muscle does not load the motor. With J = 0 and one pressure this is Eq. 22. The load
+One-way: the muscle does not load the motor. With J = 0 and one pressure, at which c stays F_ce / K,
+this is Eq. 22. The load
 cell is taken to read the spring's share of the extension, K y, which is F_ce - K x.
 """
 
@@ -52,12 +54,17 @@ REFUSED_EFFECTS: dict[str, str] = {
 PARTS: tuple[str, ...] = ("contractile_force", "stiffness", "limits", "validity")
 """Effects that the cascade reads itself and cannot do without."""
 
-POSITION_TOLERANCES: dict[str, float] = {"extension": 0.003, "servo": 0.01}
+POSITION_TOLERANCES: dict[str, float] = {
+    "extension": 0.003,
+    "free_contraction": 0.003,
+    "servo": 0.01,
+}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
 SCALES: dict[str, float] = {
     "contraction": 25e-3,
     "extension": 25e-3,
+    "free_contraction": 25e-3,
     "servo": 25e-3,
     "servo_rate": 1.0,
     "pressure": 500e3,
@@ -78,10 +85,13 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("displacement_input", eq.one("position_map"))
     eq.let("muscle_stiffness", trace(spring_stiffness, eq["pressure"], stiffness))
     no_load = trace(contractile_force, eq["pressure"], force) / eq["muscle_stiffness"]
-    eq.let("contraction", no_load - eq["extension"])
+    eq.let("contraction", eq["free_contraction"] - eq["extension"])
     # Damping asks only for the sign: the muscle shortens where the motor lags behind it.
     eq.let("velocity", eq["extension"] - eq["servo"])
     eq.let("resistance", eq.one("muscle_damping"))
+    # By its own direction: one sign for both would make either jump where the other turns.
+    filling = no_load - eq["free_contraction"]
+    filling_pace = eq["muscle_stiffness"] / eq.one("muscle_damping", velocity=filling)
     eq.outputs = {
         "contraction": eq["contraction"],
         "rotation": eq["servo"] / eq.parameters["servo"].radius,
@@ -90,6 +100,7 @@ def write_equations(equations: PlantEquations) -> None:
     }
     pull = eq["muscle_stiffness"] / eq["resistance"] * (eq["servo"] - eq["extension"])
     eq.add_state("extension", pull, SCALES["extension"])
+    eq.add_state("free_contraction", filling_pace * filling, SCALES["free_contraction"])
     _write_servo(eq)
     eq.add_decaying("pressure", eq.one("regulator_lag"), SCALES["pressure"])
     eq.add_memories(("regulator_delay",))
@@ -116,6 +127,8 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
     """Put the motor where it stands still, and the muscle behind it."""
     problem.relax("servo", of="servo_rate" if "servo_rate" in problem.names else "servo")
     problem["extension"] = problem["servo"]
+    # From below: the muscle's pace there is that of shortening all the way.
+    problem.relax("free_contraction", about=-1.0)
     problem.zero[:] = problem.output("contraction") + problem["extension"]
 
 

@@ -159,7 +159,7 @@ def test_blocks_are_escaped_and_marked_up():
 )
 def test_the_verdict_follows_the_errors(slope, rmse, verdict):
     results = Results(load_suite(), Execution((), {}, True), {})
-    error = ReplayError("displacement", "displacement", 150, slope, 0.5, 0.0, rmse)
+    error = ReplayError("displacement", "displacement", 150, slope, 0.5, 0.0, rmse, 0.1, 0.1)
     assert verdict in displacement_verdict(results, [error])
 
 

@@ -67,6 +67,27 @@ def test_measured_scores_are_the_printed_ones():
     assert (score.rmse, score.percent_of_range) == pytest.approx((4.13, 4.59), abs=0.005)
 
 
+@pytest.mark.parametrize("task", PHASES)
+def test_line_part_and_scatter_make_up_every_printed_rmse(task):
+    """RMSE^2 = line^2 + scatter^2: tables 20, 21 and 24-29 give the RMSE of tables 22 and 30."""
+    for phase in PHASES[task]:
+        for pressure in pressures(task):
+            score = measured_score(task, phase, pressure)
+            # Slopes, intercepts and RMSEs are rounded in print.
+            whole = np.hypot(score.line_error, score.scatter)
+            assert whole == pytest.approx(score.rmse, abs=0.012)
+
+
+def test_line_part_and_scatter_are_what_their_names_say():
+    trial = trial_of("displacement", 150)
+    score = score_trial(trial, "displacement")["displacement"]
+    time, extension = trial.time, 1e3 * trial.truth["extension"]
+    line = np.polyval(np.polyfit(time, extension, 1), time)
+    assert score.line_error == pytest.approx(np.sqrt(np.mean((line - 5.0 * time) ** 2)))
+    assert score.scatter == pytest.approx(np.std(extension - line))
+    assert np.hypot(score.line_error, score.scatter) == pytest.approx(score.rmse, rel=1e-9)
+
+
 def test_table_i3_goes_further_than_the_trials_did():
     """Below 500 kPa it gives 100-104 deg for the voltages that held 85-93 deg."""
     for pressure in (275, 300, 350, 400, 450):
@@ -79,13 +100,16 @@ def test_table_i3_goes_further_than_the_trials_did():
 
 def test_means_of_signed_errors_cancel_and_absolute_ones_do_not():
     errors = [
-        ReplayError("displacement", "displacement", pressure, sign * 0.1, sign * 1.0, 0.0, 0.5)
+        ReplayError(
+            "displacement", "displacement", pressure, sign * 0.1, sign * 1.0, 0.0, 0.5, 0.3, -0.4
+        )
         for pressure, sign in ((150, 1.0), (200, -1.0))
     ]
     summary = summarise(errors)
     assert summary.signed["slope"] == 0.0
     assert summary.absolute["slope"] == pytest.approx(0.1)
     assert summary.absolute["rmse"] == 0.5
+    assert (summary.signed["scatter"], summary.absolute["scatter"]) == (-0.4, 0.4)
     assert summary.trials == 2
 
 

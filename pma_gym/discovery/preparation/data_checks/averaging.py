@@ -79,7 +79,8 @@ def _fewer(trial: Trial, factor: int) -> Trial:
         measurements[name] = np.full(time.size, np.nan)
         # A block with a gap has no middle of its own: NaN stays.
         measurements[name][at] = row[inner] @ _weights(factor)
-    return Trial(time, commands, measurements, provenance=trial.provenance)
+    kept = {"provenance": trial.provenance, "memory_at_start": trial.memory_at_start}
+    return Trial(time, commands, measurements, **kept)
 
 
 def _weights(count: int) -> Array:
