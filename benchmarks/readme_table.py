@@ -16,11 +16,11 @@ from typing import Annotated, Any
 import typer
 
 from benchmarks.files import write_text
-from benchmarks.hidden_effects.evaluation.readme import hidden_effects
+from benchmarks.hidden_effects.evaluation.readme import diagnosis
 from benchmarks.reproduction.score import PHASES, UNITS
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = (ROOT / "README.md", ROOT / "docs" / "benchmark.md")
+FILES = tuple(ROOT / name for name in ("README.md", "docs/benchmark.md", "docs/results.md"))
 SCORES = ROOT / "results" / "reproduction" / "scores.json"
 
 Run = Mapping[str, Any]
@@ -30,6 +30,8 @@ _BLOCK = re.compile(
     r"(?P<start><!-- figures: (?P<name>\w+) -->\n).*?(?P<end><!-- end of figures -->)", re.DOTALL
 )
 _REPLAY = "serres_replay"
+_SUMMARISED = (_REPLAY, "pid", "ppo")
+"""Controllers of the README's table."""
 _PARTS, _PART_NAMES = ("rmse", "line_error", "scatter"), ("RMSE", "line part", "scatter")
 _REPLAY_COLUMNS = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
 
@@ -46,6 +48,22 @@ def displacement(run: Run) -> str:
 def rotation(run: Run) -> str:
     """Table 30: RMSE in deg of phases I / II / III by pressure, measured and simulated."""
     return _rmse_table(run, "rotation", "{:.2f}")
+
+
+def summary(run: Run) -> str:
+    """Means of the RMSE over the pressures, of the measured trials and of three controllers."""
+    tasks = [_columns(run, task) for task in PHASES]
+    suite = {each["name"]: each["title"] or each["name"] for each in run["suite"]["controllers"]}
+    shown = ["Measured", *(suite[name] for name in _SUMMARISED if name in suite)]
+    rows = [
+        [title, *(f"{mean:.3g}" for columns in tasks for mean in _means(columns[title]))]
+        for title in tasks[0]
+        if title in shown
+    ]
+    phases = [f"{phase} (deg)" for phase in PHASES["rotation"]]
+    return _table(
+        ["Mean RMSE", "Displacement (mm)", "Rotation " + phases[0], *phases[1:]], rows, words=1
+    )
 
 
 def setting(run: Run) -> str:
@@ -145,11 +163,22 @@ def bound(run: Run) -> str:
 
 FIGURES: dict[str, Callable[[Run], str]] = {
     function.__name__: function
-    for function in (displacement, rotation, setting, speed, targets, replay, parts, reading, bound)
+    for function in (
+        displacement,
+        rotation,
+        summary,
+        setting,
+        speed,
+        targets,
+        replay,
+        parts,
+        reading,
+        bound,
+    )
 }
 """Blocks by name."""
 
-KEPT: dict[str, Callable[[], str]] = {hidden_effects.__name__: hidden_effects}
+KEPT: dict[str, Callable[[], str]] = {diagnosis.__name__: diagnosis}
 """Blocks that are not of the run: their figures were kept in `docs/figures`."""
 
 
@@ -227,20 +256,31 @@ def main(
 
 def _rmse_table(run: Run, task: str, form: str) -> str:
     """A row a pressure: RMSE of every phase, of the measured trial and of every controller."""
+    columns = _columns(run, task)
+    pressures = run["suite"]["pressures_kpa"][task]
+    rows = [
+        [f"{p:g}", *(" / ".join(map(form.format, column[p])) for column in columns.values())]
+        for p in pressures
+    ]
+    means = map(_means, columns.values())
+    rows.append(["mean", *(" / ".join(map(form.format, mean)) for mean in means)])
+    return _table(["Pressure (kPa)", *columns], rows)
+
+
+def _columns(run: Run, task: str) -> dict[str, dict[float, list[float]]]:
+    """RMSE of every phase by pressure, of the measured trials and of every controller by title."""
     suite = run["suite"]
     columns = {"Measured": _figures(run["measured"], task)}
     for controller in suite["controllers"]:
         own = [s for s in run["scores"] if s["controller"] == controller["name"]]
         own = [score for score in own if score["model"] == suite["models"][0]]
         columns[controller["title"] or controller["name"]] = _figures(own, task)
-    pressures = suite["pressures_kpa"][task]
-    rows = [
-        [f"{p:g}", *(" / ".join(map(form.format, column[p])) for column in columns.values())]
-        for p in pressures
-    ]
-    means = [[fmean(phase) for phase in zip(*c.values(), strict=True)] for c in columns.values()]
-    rows.append(["mean", *(" / ".join(map(form.format, mean)) for mean in means)])
-    return _table(["Pressure (kPa)", *columns], rows)
+    return columns
+
+
+def _means(column: Mapping[float, Sequence[float]]) -> list[float]:
+    """Mean of each phase over the pressures."""
+    return [fmean(phase) for phase in zip(*column.values(), strict=True)]
 
 
 def _figures(scores: Sequence[Mapping[str, Any]], task: str) -> dict[float, list[float]]:

@@ -23,6 +23,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.envs.reward_function": "pma_gym.engine.reward_function",
     "pma_gym.envs.cuda": "pma_gym.engine.cuda.engine",
     "pma_gym.envs.knowledge": "pma_gym.envs.station_info",
+    "pma_gym.tasks.guard": "pma_gym.tasks.safety_filter",
     "pma_gym.tasks.human": "pma_gym.tasks.operator",
     "pma_gym.envs.sb3": "pma_gym.sb3.vec_env",
     "pma_gym.envs.sb3_network": "pma_gym.sb3.network",

@@ -23,11 +23,16 @@ from benchmarks.suites.reproduction import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+RESULTS = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+FIRST_CONTROLLER = (ROOT / "docs" / "first-controller.md").read_text(encoding="utf-8")
 EXAMPLE = ROOT / "docs" / "examples" / "integral.py"
 
 
-def blocks(language):
-    return re.findall(rf"```{language}\n(.*?)\n```", README, re.DOTALL)
+def blocks(language, text=README):
+    return re.findall(rf"```{language}\n(.*?)\n```", text, re.DOTALL)
+
+
+SHOWN = [block for text in (README, RESULTS, FIRST_CONTROLLER) for block in blocks("bash", text)]
 
 
 def run(*command, cwd):
@@ -40,20 +45,31 @@ def run(*command, cwd):
 
 
 @pytest.mark.example
-def test_ten_lines_print_the_rmse_of_a_pid(tmp_path):
+def test_first_code_prints_the_rmse_of_a_pid_and_draws_its_trial(tmp_path):
     (code,) = (block for block in blocks("python") if "gym.make" in block)
     printed = run("-c", code, cwd=tmp_path)
     rmse = re.fullmatch(r"RMSE (\d\.\d{3}) mm\n", printed)
     assert rmse and float(rmse[1]) <= 0.10
+    assert (tmp_path / "trial.png").stat().st_size > 10_000
+
+
+def test_it_is_read_in_minutes():
+    words = README.split()
+    assert len(words) <= 600 and len(README.split("```")[0].split()) <= 120
 
 
 def test_example_of_a_controller_is_the_file():
-    assert EXAMPLE.read_text(encoding="utf-8").rstrip() in blocks("python")
+    assert EXAMPLE.read_text(encoding="utf-8").rstrip() in blocks("python", FIRST_CONTROLLER)
 
 
 @pytest.mark.example
 def test_example_of_a_controller_is_scored(tmp_path):
-    (command,) = (block for block in blocks("bash") if "integral.py:Integral --out" in block)
+    (command,) = (
+        line
+        for block in blocks("bash", FIRST_CONTROLLER)
+        for line in block.splitlines()
+        if "integral.py:Integral --out" in line
+    )
     _, controllers, _, out = command.split("-m benchmarks ")[1].split()
     mine = controllers.split(",")[1]
     selection = ["--model", "station", "--task", "rotation", "--pressures", "400"]
@@ -75,8 +91,8 @@ def test_make_targets_exist():
     [(pma_gym.cli.app, "pma-gym"), (benchmarks.__main__.app, "python -m benchmarks")],
 )
 def test_commands_exist_with_their_options(app, program):
-    lines = re.findall(rf"^.*{program} (.+)$", "\n".join(blocks("bash")), re.MULTILINE)
-    lines += re.findall(rf"`{program} ([^`]+)`", README)
+    lines = re.findall(rf"^.*{program} (.+)$", "\n".join(SHOWN), re.MULTILINE)
+    lines += re.findall(rf"`{program} ([^`]+)`", README + RESULTS)
     assert lines
     for line in lines:
         words = line.split()
@@ -91,7 +107,7 @@ def test_files_that_it_names_exist():
     links = [link for link in re.findall(r"\]\(([^)]+)\)", README) if "://" not in link]
     assert links and all((ROOT / link).is_file() for link in links)
     (picture,) = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README)
-    assert (ROOT / picture).stat().st_size < 200_000
+    assert (ROOT / picture).stat().st_size < 1_000_000
 
 
 def test_the_package_carries_it():
@@ -101,7 +117,7 @@ def test_the_package_carries_it():
 
 def table(name):
     """Header and rows of a block of figures."""
-    block = README.split(f"<!-- figures: {name} -->")[1].split("<!-- end of figures -->")[0]
+    block = RESULTS.split(f"<!-- figures: {name} -->")[1].split("<!-- end of figures -->")[0]
     lines = [line.strip("| ").split(" | ") for line in block.strip().splitlines()]
     return lines[0], lines[2:]
 
@@ -129,17 +145,28 @@ def small_run(**changed):
     suite = {
         **{"name": "reproduction", "version": 1, "selected": False, "seed": 2008},
         **{"control_rate_hz": 100.0, "noise": True, "models": ["station", "cascade"]},
-        "controllers": [{"name": "pid", "title": "PID"}],
+        "controllers": [
+            {"name": "pid", "title": "PID"},
+            {"name": "serres_replay", "title": "Feed-forward as printed"},
+        ],
         "pressures_kpa": {"displacement": [150], "rotation": [275]},
     }
     scores = []
     for task, pressure in (("displacement", 150), ("rotation", 275)):
         for model, rmse in (("station", 0.25), ("cascade", 9.0)):
-            phases = {phase: {"rmse": rmse} for phase in PHASES[task]}
-            case = {"model": model, "controller": "pid", "task": task, "pressure_kpa": pressure}
-            scores.append(case | {"failure": None, "phases": phases})
-    measured = [score | {"controller": None} for score in scores if score["model"] == "station"]
+            parts = {"rmse": rmse, "line_error": 0.6 * rmse, "scatter": 0.8 * rmse}
+            phases = {phase: parts for phase in PHASES[task]}
+            case = {"model": model, "task": task, "pressure_kpa": pressure, "failure": None}
+            scores += [
+                case | {"controller": name, "phases": phases} for name in ("pid", "serres_replay")
+            ]
+    measured = [
+        score | {"controller": None}
+        for score in scores
+        if (score["model"], score["controller"]) == ("station", "pid")
+    ]
     error = {"slope": -0.5, "intercept": 1.0, "mean": 0.0, "rmse": 0.25}
+    error |= {"line_error": 0.1, "scatter": 0.2}
     replay = [error | {"task": t, "phase": p} for t in PHASES for p in PHASES[t]]
     check = {"what": "replay", "limit": 1.0, "got": 0.5, "unit": "mm", "strict": True}
     info = {"wall_time_s": 60.0, "jobs": 2, "environment_steps_per_second": 1e4}
@@ -147,6 +174,10 @@ def small_run(**changed):
         **{"complete": True, "suite": suite, "scores": scores, "measured": measured, "run": info},
         **{"replay_errors": replay, "targets": [check | {"verdict": "met"}]},
         "achievable_rmse_phase_iii_deg": {"275": 0.03},
+        "rotation_reading": [
+            {"phase": phase, "measured": 4.0, "plain": 9.0, "read": 5.0}
+            for phase in PHASES["rotation"]
+        ],
     }
     return whole | changed
 
@@ -172,20 +203,20 @@ def command():
 
 
 def test_figures_that_were_kept_stand_in_the_readme_as_they_are():
-    assert "| two effects: both named |" in README
+    assert "| nothing hidden: an effect claimed |" in README
     assert refreshed(README, None) == README
 
 
 def test_a_kept_figure_is_written_without_a_run_which_is_left_alone():
     run_only = "<!-- figures: displacement -->\nold\n<!-- end of figures -->\n"
-    found = refreshed(run_only + "<!-- figures: hidden_effects -->\n<!-- end of figures -->", None)
+    found = refreshed(run_only + "<!-- figures: diagnosis -->\n<!-- end of figures -->", None)
     assert found.startswith(run_only)
     rates = json.loads(KEPT.read_text("utf-8"))["blocks"]["nothing"]["rates"]
     row = next(line for line in found.splitlines() if line.startswith("| nothing hidden"))
     assert float(row.split("|")[2].split("%")[0]) == pytest.approx(
         100.0 * rates["false alarm"]["rate"], abs=0.05
     )
-    assert row.endswith(f"| {rates['false alarm']['n']} | <= 1 % |")
+    assert row.endswith(f"| {rates['false alarm']['n']} |")
 
 
 def test_kept_figures_are_checked_without_a_run():

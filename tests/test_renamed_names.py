@@ -6,7 +6,13 @@ import warnings
 import pytest
 
 from pma_gym.envs import Measurement, PMAEnv, PMAVectorEnv, StationInfo
-from pma_gym.tasks import MomentProfile, Operator, OperatorState
+from pma_gym.tasks import (
+    MomentProfile,
+    Operator,
+    OperatorState,
+    infeasibility_reason,
+    moment_profile,
+)
 
 
 @pytest.mark.parametrize("module", ["pma_gym.envs", "pma_gym.envs.station_info"])
@@ -18,7 +24,14 @@ def test_an_old_class_name_is_the_new_class(module, old, new):
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("Human", Operator), ("Plan", MomentProfile), ("Mind", OperatorState)]
+    ("old", "new"),
+    [
+        ("Human", Operator),
+        ("Plan", MomentProfile),
+        ("Mind", OperatorState),
+        ("plan_of", moment_profile),
+        ("obstacle", infeasibility_reason),
+    ],
 )
 def test_an_old_name_of_the_tasks_is_the_new_class(old, new):
     with pytest.warns(DeprecationWarning, match=f"pma_gym.tasks.{old} is now {new.__name__}"):

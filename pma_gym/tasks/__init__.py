@@ -120,5 +120,12 @@ __all__ = [
 ]
 
 __getattr__ = renamed_names(
-    __name__, {"Human": Operator, "Plan": MomentProfile, "Mind": OperatorState}
+    __name__,
+    {
+        "Human": Operator,
+        "Plan": MomentProfile,
+        "Mind": OperatorState,
+        "plan_of": moment_profile,
+        "obstacle": infeasibility_reason,
+    },
 )
