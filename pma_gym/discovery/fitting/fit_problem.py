@@ -12,7 +12,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
-from pma_gym.estimation.fitting import Search
+from pma_gym.estimation.fitting import LevenbergMarquardt
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
 
@@ -223,7 +223,7 @@ class FitProblem:
                 model = model.replace(begun)
         whitened = self.whitened_residuals(model, extra, trials)
         try:
-            search = Search(whitened, False, 1.0)
+            search = LevenbergMarquardt(whitened, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
