@@ -5,7 +5,6 @@ A block of figures, of the run or of those that `docs/figures` keeps, stands bet
 and leaves its blocks alone. `--check` changes nothing and fails if a file is not as it would be.
 """
 
-import json
 import re
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +17,7 @@ import typer
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation.readme import diagnosis
 from benchmarks.reproduction.score import PHASES, UNITS
+from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
 FILES = tuple(ROOT / name for name in ("README.md", "docs/benchmark.md", "docs/results.md"))
@@ -138,10 +138,10 @@ def reading(run: Run) -> str:
     """Table 30 as measured, as replayed, and as the replay may have been read: means by phase."""
     rows = []
     for phase in PHASES["rotation"]:
-        found = [entry for entry in run["rotation_reading"] if entry["phase"] == phase]
-        means = [fmean(entry[who] for entry in found) for who in ("measured", "plain", "read")]
+        entries = [entry for entry in run["rotation_reading"] if entry["phase"] == phase]
+        means = [fmean(entry[who] for entry in entries) for who in ("measured", "plain", "read")]
         errors = [
-            fmean(abs(entry[who] - entry["measured"]) for entry in found)
+            fmean(abs(entry[who] - entry["measured"]) for entry in entries)
             for who in ("plain", "read")
         ]
         rows.append([f"phase {phase}", *(f"{value:.2f}" for value in (*means, *errors))])
@@ -189,8 +189,8 @@ def refreshed(text: str, run: Run | None) -> str:
         RunError: a block that nobody renders, or figures that are missing.
     """
 
-    def block(found: re.Match[str]) -> str:
-        name = found["name"]
+    def block(match: re.Match[str]) -> str:
+        name = match["name"]
         if name not in FIGURES and name not in KEPT:
             known = ", ".join([*FIGURES, *KEPT])
             raise RunError(f"no figures {name!r}; there are {known}")
@@ -202,10 +202,10 @@ def refreshed(text: str, run: Run | None) -> str:
                     f"what docs/figures keeps for {name} has no {error}; put a newer run's there"
                 ) from None
         elif run is None:
-            return found[0]
+            return match[0]
         else:
             figures = FIGURES[name](run)
-        return f"{found['start']}\n{figures}\n\n{found['end']}"
+        return f"{match['start']}\n{figures}\n\n{match['end']}"
 
     return _BLOCK.sub(block, text)
 
@@ -218,7 +218,10 @@ def load_run(scores: Path) -> Run:
     """
     if not scores.is_file():
         raise RunError(f"there is no file {scores}; run `python -m benchmarks` first")
-    run = json.loads(scores.read_text(encoding="utf-8"))
+    try:
+        run = read_json(scores, "journal_mib", own=True, finite=False)
+    except ValueError as error:
+        raise RunError(f"{error}; run `python -m benchmarks` again") from None
     failed = [score for score in run["scores"] if score["failure"]]
     if not run["complete"] or run["suite"]["selected"] or failed:
         raise RunError(
@@ -241,14 +244,14 @@ def main(
     try:
         run = None if kept else load_run(scores)
         texts = {path: path.read_text(encoding="utf-8") for path in FILES}
-        found = {path: refreshed(text, run) for path, text in texts.items()}
+        contents = {path: refreshed(text, run) for path, text in texts.items()}
     except RunError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(2) from None
-    changed = [path for path in FILES if found[path] != texts[path]]
+    changed = [path for path in FILES if contents[path] != texts[path]]
     for path in changed:
         if not check:
-            write_text(path, found[path])
+            write_text(path, contents[path])
         print(f"{path.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
     if check and changed:
         raise typer.Exit(1)

@@ -49,6 +49,7 @@ WORDS = {
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
 CLEAN = (
+    "benchmarks",
     "controllers",
     *(f"pma_gym/{room}" for room in ("codegen", "integrator", "plant", "estimation")),
     *(f"pma_gym/{room}" for room in ("effects", "data", "studies", "pages")),

@@ -86,8 +86,8 @@ class FixedStep:
         known |= {ZERO: zero, "step_size": size}
         for name, (value, slope) in zip(COMMANDS, (motor, regulator), strict=True):
             known |= {name: value, f"{name}_slope": slope}
-        found = np.array(self._function(*(known[name] for name in self._arguments)))
-        return found[: len(state)], found[len(state) :]
+        values = np.array(self._function(*(known[name] for name in self._arguments)))
+        return values[: len(state)], values[len(state) :]
 
 
 def smooth_plant(damping_n_s_per_mm: float) -> Plant:

@@ -212,8 +212,8 @@ def _checks_table() -> Table:
     table = Table(title="Limits and inertia", show_header=False)
     for damping in (0.05, 2.9, 14.5):
         # The finest steps of little damping come near the reference's own error.
-        found = orders(damping, np.array(SIZES_S[:3]))[1].min(axis=1)
-        words = ", ".join(f"{order:.2f}" for order in found)
+        orders_seen = orders(damping, np.array(SIZES_S[:3]))[1].min(axis=1)
+        words = ", ".join(f"{order:.2f}" for order in orders_seen)
         label = f"order of convergence, damping {damping:g} N s/mm, {SIZES_S[0] * 1e3:g} ms halved"
         table.add_row(label, words)
     for stiffness in (1e4, 1e5, 1e6):

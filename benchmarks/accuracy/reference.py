@@ -30,7 +30,7 @@ Rate = Callable[[float, NDArray[np.float64]], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class Commands:
-    """What a plant is told, held from each time to the next.
+    """A plant's commands, held from each time to the next.
 
     Attributes:
         time: times (s), shape (n,).
@@ -139,8 +139,8 @@ def integrated(
             span = solve_ivp(rate, (begin, end), state, "DOP853", rtol=rtol, atol=1e-13)
         pause = 1e-7 if moved else 4.0 * pause
         begin, state = float(span.t[-1]), span.y[:, -1].copy()
-        for factors, found in zip(kinks, span.t_events if moved else (), strict=False):
-            if len(found) and np.count_nonzero(factors) == 1:
+        for factors, crossings in zip(kinks, span.t_events if moved else (), strict=False):
+            if len(crossings) and np.count_nonzero(factors) == 1:
                 # On the switch to the last bit, so that it is not found again at once.
                 state[np.flatnonzero(factors)] = 0.0
     return state

@@ -49,9 +49,9 @@ def achievable_bound(model: str | Model, task: str, pressure_kpa: float) -> dict
     """
     protocol = TASKS[task].protocol
     positions = _ideal_positions(load_model(model), task, pressure_kpa)
-    found = [phase_rmse(protocol, position) for position in positions]
+    errors = [phase_rmse(protocol, position) for position in positions]
     unit = SI_FACTORS[protocol.unit]
-    return {phase.name: min(f[phase.name] for f in found) / unit for phase in protocol.phases}
+    return {phase.name: min(f[phase.name] for f in errors) / unit for phase in protocol.phases}
 
 
 def _ideal_positions(model: Model, task: str, pressure_kpa: float) -> Iterator[np.ndarray]:

@@ -13,6 +13,7 @@ from benchmarks.bounds.achievable import achievable_bound
 from benchmarks.executors.local import Background
 from benchmarks.files import write_text
 from benchmarks.runner.fingerprint import code_digest_with
+from pma_gym.documents import read_json
 from pma_gym.plant.model import dump_model, load_model
 
 BOUNDS = "bounds.json"
@@ -74,7 +75,7 @@ class Bounds:
         if self._path is None:
             return {}
         try:
-            document = json.loads(self._path.read_text(encoding="utf-8"))
+            document = read_json(self._path, own=True)
             rows = document["bounds"] if document["key"] == self._key else []
             return {(str(task), float(kpa)): float(least) for task, kpa, least in rows}
         except (OSError, ValueError, KeyError, TypeError):

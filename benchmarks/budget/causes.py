@@ -246,5 +246,8 @@ class OpenLoop:
             for muscle, row in zip(muscles, tension, strict=True):
                 muscle.remember(*way, NODE_S)
                 row[k] = muscle.tension(*way)
+        # The smooth muscle begins where it is without hysteresis, the statics where it is with.
+        bare = Statics(self.smooth, self.station.pressure)
+        tension[-1] += self.statics.force(motion.extension) - bare.force(motion.extension)
         friction, hysteresis = -np.diff(tension, axis=0)
         return {"hysteresis": (nodes, hysteresis), "dry friction": (nodes, friction)}

@@ -71,13 +71,13 @@ def contest(
     station = StationInfo(nominal.model, TASKS[task], 1e3 * pressure_kpa, PERIOD_S)
     open_loop = OpenLoop(nominal, station)
     faulty = open_loop.voltages(frozenset(causes_of(task)))
-    plants, found = [nominal, *drawn], {}
+    plants, by_plant = [nominal, *drawn], {}
     for name, volts in zip(CONTROLLERS, (faulty, open_loop.improved), strict=True):
         errors = simulated_errors(plants, station, [volts] * len(plants))
-        found[name] = np.array([error["all"] for error in errors])
+        by_plant[name] = np.array([error["all"] for error in errors])
     return Contest(
         task,
         pressure_kpa,
-        {name: float(values[0]) for name, values in found.items()},
-        {name: values[1:] for name, values in found.items()},
+        {name: float(values[0]) for name, values in by_plant.items()},
+        {name: values[1:] for name, values in by_plant.items()},
     )

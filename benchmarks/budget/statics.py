@@ -15,7 +15,7 @@ DIFFERENCE_M = 1e-5
 
 
 class Statics:
-    """A station's own static curve at one pressure, memories at zero.
+    """A station's own static curve at one pressure, memories where its trials begin.
 
     Args:
         plant: the station.
@@ -29,11 +29,18 @@ class Statics:
     def __init__(self, plant: Plant, pressure: float) -> None:
         drive = plant.model.parameters["drive"]
         self._force, self._pressure = muscle_force(plant.model), pressure
+        hysteresis = plant.model.parameters.get("hysteresis")
+        self._held = hysteresis.force * hysteresis.memory_at_start if hysteresis else 0.0
         self.load = np.maximum(0.0, drive.gain * GRID_V + drive.offset)
         everywhere = np.full(len(GRID_V), pressure)
-        contraction = contraction_at(self._force, everywhere, self.load)
+        contraction = contraction_at(self._force, everywhere, self.load + self._held)
         self.rest = float(contraction[0])
         self.extension = self.rest - contraction
+
+    def force(self, extension: np.ndarray) -> np.ndarray:
+        """Load that holds the muscle at an extension (N), same shape."""
+        pressure = np.full(len(extension), self._pressure)
+        return self._force(pressure, self.rest - extension) - self._held
 
     def stiffness(self, extension: np.ndarray) -> np.ndarray:
         """Slope of the force over the extension (N/m), same shape."""

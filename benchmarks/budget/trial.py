@@ -42,7 +42,7 @@ class Budget:
         task: `displacement` or `rotation`.
         pressure_kpa: of the trial (kPa).
         causes: its faults, in the order in which they are taken away.
-        by_faults: errors of the controller with each set of faults.
+        resultss: errors of the controller with each set of faults.
         improved: errors of the improved feed-forward.
         variants: errors of the printed voltages with one thing changed, by what is changed.
         measured: errors of the dissertation's own trial.
@@ -51,7 +51,7 @@ class Budget:
     task: str
     pressure_kpa: float
     causes: tuple[str, ...]
-    by_faults: Mapping[frozenset[str], Errors]
+    resultss: Mapping[frozenset[str], Errors]
     improved: Errors
     variants: Mapping[str, Errors]
     measured: Errors
@@ -65,16 +65,16 @@ class Budget:
     @property
     def printed(self) -> Errors:
         """Errors with all faults: the printed voltages."""
-        return self.by_faults[frozenset(self.causes)]
+        return self.resultss[frozenset(self.causes)]
 
     def waterfall(self, phase: str) -> list[float]:
         """RMSE with all faults, then after each is taken away in order, shape (causes + 1,)."""
         left = [frozenset(self.causes[k:]) for k in range(len(self.causes) + 1)]
-        return [self.by_faults[faults][phase] for faults in left]
+        return [self.resultss[faults][phase] for faults in left]
 
     def alone(self, cause: str, phase: str) -> float:
         """RMSE with all faults but one."""
-        return self.by_faults[frozenset(self.causes) - {cause}][phase]
+        return self.resultss[frozenset(self.causes) - {cause}][phase]
 
     def share(self, cause: str, phase: str) -> float:
         """What a fault adds to the mean square (mm^2 or deg^2), the mean over all orders.
@@ -87,9 +87,9 @@ class Budget:
         for size in range(count):
             weight = 1.0 / (count * math.comb(count - 1, size))
             for some in itertools.combinations(others, size):
-                without = self.by_faults[frozenset(some)][phase]
+                without = self.resultss[frozenset(some)][phase]
                 total += weight * (
-                    self.by_faults[frozenset({*some, cause})][phase] ** 2 - without**2
+                    self.resultss[frozenset({*some, cause})][phase] ** 2 - without**2
                 )
         return total
 
@@ -123,13 +123,13 @@ def simulated_errors(
     plants: Sequence[Plant], station: StationInfo, volts: Sequence[NDArray[np.float64]]
 ) -> list[Errors]:
     """RMSE (mm or deg) by phase of open-loop trials, one for each plant and its voltages."""
-    unit, found = SI_FACTORS[station.task.protocol.unit], []
+    unit, results = SI_FACTORS[station.task.protocol.unit], []
     for k in range(0, len(volts), AT_ONCE):
         part = slice(k, k + AT_ONCE)
         for position in open_loop_positions(plants[part], station, volts[part]):
             errors = phase_rmse(station.task.protocol, position)
-            found.append({name: value / unit for name, value in errors.items()})
-    return found
+            results.append({name: value / unit for name, value in errors.items()})
+    return results
 
 
 def _variants(open_loop: OpenLoop) -> dict[str, Errors]:
@@ -150,10 +150,10 @@ def _variants(open_loop: OpenLoop) -> dict[str, Errors]:
 def _measured(task: str, pressure_kpa: float) -> Errors:
     """The dissertation's RMSE (mm or deg) by phase."""
     protocol = TASKS[task].protocol
-    found = {
+    errors = {
         phase.name: measured_score(task, phase.name, pressure_kpa).rmse for phase in protocol.phases
     }
-    return found | {"all": math.sqrt(np.mean(np.square(list(found.values()))))}
+    return errors | {"all": math.sqrt(np.mean(np.square(list(errors.values()))))}
 
 
 def _subsets(causes: Iterable[str]) -> Iterable[tuple[str, ...]]:

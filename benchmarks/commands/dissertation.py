@@ -6,7 +6,16 @@ from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, OptionalOut, Out, refuse
+from benchmarks.commands.options import (
+    INTERRUPTED,
+    RESULTS,
+    Again,
+    Jobs,
+    OptionalOut,
+    Out,
+    Recompute,
+    refuse,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -51,7 +60,8 @@ def measured(
         Path | None,
         typer.Option(help="Write the trials to this folder, for pma-gym diagnose, and stop."),
     ] = None,
-    again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
+    recompute: Recompute = False,
+    again: Again = False,
 ) -> None:
     """Diagnose the dissertation's tables I2 and I3; an interrupted run goes on where it stopped."""
     from benchmarks.measured.job import run_measured, write_trials
@@ -64,7 +74,7 @@ def measured(
         print(f"{write_trials(write)} trials in {write}")
         return
     try:
-        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, again=again)
+        run_measured(out, jobs, seed, rounds or MOST_ROUNDS, recompute=recompute or again)
     except KeyboardInterrupt:
         print(f"Interrupted; run it again, it goes on from {out / 'stages'}", file=sys.stderr)
         raise typer.Exit(INTERRUPTED) from None

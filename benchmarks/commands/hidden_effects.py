@@ -8,8 +8,10 @@ import typer
 from benchmarks.commands.options import (
     LOCAL,
     RESULTS,
+    Again,
     ExecutorOption,
     Jobs,
+    Recompute,
     chosen_executor,
     refuse,
     require_writable,
@@ -45,7 +47,8 @@ def hidden_effects(
         int, typer.Option(min=0, max=3, help="Experiments that follow, in block undecidable.")
     ] = 2,
     keep: Annotated[bool, typer.Option("--keep", help="Keep the trials in FOLDER/data.")] = False,
-    again: Annotated[bool, typer.Option("--again", help="Anew what other code made.")] = False,
+    recompute: Recompute = False,
+    again: Again = False,
 ) -> None:
     """Hide effects in trials, diagnose them, count what was named right; goes on after Ctrl-C."""
     from benchmarks.hidden_effects.job import JobError, Order, ordered, run_hidden_effects
@@ -57,7 +60,7 @@ def hidden_effects(
         for each in blocks:
             usual = (out or RESULTS / "hidden_effects") / f"{each.name}-{seed}"
             folder = usual if out is None or len(blocks) > 1 else out
-            orders.append(Order(each, n, seed, folder, places, keep, again))
+            orders.append(Order(each, n, seed, folder, places, keep, recompute or again))
         code = run_hidden_effects(orders, json_file)
     except JobError as error:
         refuse(error)

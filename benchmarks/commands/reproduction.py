@@ -55,7 +55,7 @@ def reproduce(
 ) -> int:
     """The main job; its exit code."""
     from benchmarks.reproduction.job import run_job
-    from benchmarks.runner.controller_spec import ControllerError, parse_contenders
+    from benchmarks.runner.controller_spec import ControllerError, parse_controllers
     from benchmarks.suites.reproduction import SuiteError, load_suite
     from pma_gym.plant.model import ModelError, load_model
     from pma_gym.terminal import SafeConsole
@@ -65,7 +65,7 @@ def reproduce(
         models = listed(model)
         for name in models or suite.models:
             load_model(name)
-        chosen = parse_contenders(controllers, suite.controllers) if controllers else []
+        chosen = parse_controllers(controllers, suite.controllers) if controllers else []
         suite = suite.select(models, chosen, listed(task), _pressures(pressures))
         if out.exists() and not out.is_dir():
             raise SuiteError(f"--out {out} is a file; name a folder for the results")
@@ -78,7 +78,7 @@ def _pressures(text: str) -> list[float]:
     from benchmarks.suites.reproduction import SuiteError
     from pma_gym.numerals import parse_numbers
 
-    found = parse_numbers(text)
-    if found is None:
+    numbers = parse_numbers(text)
+    if numbers is None:
         raise SuiteError(f"--pressures must be numbers in kPa by commas, got {text!r}")
-    return found
+    return numbers

@@ -7,6 +7,7 @@ import typer
 
 from benchmarks.commands.options import (
     INTERRUPTED,
+    Again,
     Jobs,
     OptionalOut,
     listed,
@@ -52,9 +53,13 @@ def design(
     out: OptionalOut = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     jobs: Jobs = 2,
-    again: Annotated[
-        bool, typer.Option(help="Also what the file has already; else only what is missing.")
+    recompute: Annotated[
+        bool,
+        typer.Option(
+            "--recompute", help="Also what the file has already; else only what is missing."
+        ),
     ] = False,
+    again: Again = False,
     only: Annotated[
         str, typer.Option(help="Designs by suite and kind of task, such as 'hard/*'.")
     ] = "*",
@@ -64,7 +69,9 @@ def design(
     from controllers.design.designs import DESIGNS_FILE
 
     try:
-        complete = run_design(listed(controllers), out or DESIGNS_FILE, seed, jobs, again, only)
+        complete = run_design(
+            listed(controllers), out or DESIGNS_FILE, seed, jobs, recompute or again, only
+        )
     except ValueError as error:
         refuse(error)
     raise typer.Exit(0 if complete else INTERRUPTED)

@@ -92,8 +92,8 @@ def add(
         Path, typer.Option(help="Folder with a folder of results for each suite.")
     ] = RESULTS,
 ) -> None:
-    """Score your own controller on all suites, and say where it stands or what to mend."""
-    from benchmarks.comparison.add import own_contender, run_add
+    """Score your own controller on all suites, and say where it stands or what to fix."""
+    from benchmarks.comparison.add import own_controller, run_add
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite, suite_names
     from benchmarks.suites.reproduction import SuiteError
@@ -102,7 +102,7 @@ def add(
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
         frozen = [one for one in frozen if suite or not one.only_by_name]
-        code = run_add(own_contender(controller), frozen, results, jobs, SafeConsole())
+        code = run_add(own_controller(controller), frozen, results, jobs, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:

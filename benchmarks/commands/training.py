@@ -1,12 +1,21 @@
 """The commands about policies: `train` and `export`."""
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from benchmarks.commands.options import INTERRUPTED, RESULTS, refuse
+from benchmarks.commands.options import (
+    INTERRUPTED,
+    LOCAL,
+    RESULTS,
+    ExecutorOption,
+    Jobs,
+    chosen_executor,
+    refuse,
+)
 
 
 def register(app: typer.Typer) -> None:
@@ -28,6 +37,9 @@ def train(
         str, typer.Option(help="Name of a preset, or path of a .yml file of one's own.")
     ] = "increment",
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same policy.")] = 0,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="So many seeds from --seed on, each in a folder of its own.")
+    ] = 1,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Control steps; the preset's if not given.")
     ] = None,
@@ -40,14 +52,16 @@ def train(
     patience: Annotated[
         int, typer.Option(min=0, help="End after so many validations without progress; 0: never.")
     ] = 0,
+    jobs: Jobs = 1,
+    executor: ExecutorOption = LOCAL,
 ) -> None:
-    """Train a policy on stations that no suite has; an interrupted training goes on."""
+    """Train policies on stations that no suite has; an interrupted training goes on."""
     from pma_gym.terminal import SafeConsole
 
     try:
         from benchmarks.training.checkpoint import CheckpointError
         from benchmarks.training.configuration.preset import PresetError
-        from benchmarks.training.job import ordered, run_train
+        from benchmarks.training.job import ordered, run_seeds, run_train
     except ImportError as error:
         print(
             f"error: training needs Stable-Baselines3 ({error}); install it: "
@@ -55,12 +69,20 @@ def train(
             file=sys.stderr,
         )
         raise typer.Exit(2) from None
-    folder = out or RESULTS / "training" / f"{Path(preset).stem}-{algo}" / f"{task}-{seed}"
+    usual = RESULTS / "training" / f"{Path(preset).stem}-{algo}"
+    folder = out or usual / f"{task}-{seed}"
+    places = chosen_executor(executor, jobs)
     try:
         if folder.exists() and not folder.is_dir():
             raise PresetError(f"--out {folder} is a file; name a folder")
         order = ordered(algo, task, preset, seed, steps, device, threads, patience)
-        run_train(order, folder, SafeConsole())
+        if seeds == 1 and executor is LOCAL:
+            run_train(order, folder, SafeConsole())
+            return
+        numbers = range(seed, seed + seeds)
+        folders = [out / f"seed-{n}" if out else usual / f"{task}-{n}" for n in numbers]
+        trainings = [(replace(order, seed=n), f) for n, f in zip(numbers, folders, strict=True)]
+        run_seeds(trainings, places, SafeConsole())
     except PresetError as error:
         refuse(error)
     except CheckpointError as error:
@@ -68,7 +90,8 @@ def train(
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         print(
-            f"Interrupted; run it again, it goes on from {folder / 'checkpoints'}", file=sys.stderr
+            f"Interrupted; run it again, it goes on from the checkpoints in {folder}",
+            file=sys.stderr,
         )
         raise typer.Exit(INTERRUPTED) from None
 

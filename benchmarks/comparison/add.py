@@ -15,8 +15,8 @@ from benchmarks.executors.local import LocalProcesses
 from benchmarks.report.leaderboard import read_leaderboard
 from benchmarks.report.standings import Standings
 from benchmarks.runner.case import BY_LIMIT, Row
-from benchmarks.runner.controller_spec import Contender, ControllerError
-from benchmarks.runner.execution import Plan, compile_kernels, execute, plan
+from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
+from benchmarks.runner.execution import PendingCases, compile_kernels, execute, pending_cases
 from benchmarks.runner.provenance import check_folder, run_info, write_run
 from benchmarks.runner.user_controller import MAKE_S, probe
 from benchmarks.suites.frozen import FrozenSuite
@@ -34,7 +34,7 @@ class _EnoughError(Exception):
     """The rest of a suite is not worth running."""
 
 
-def own_contender(text: str) -> Contender:
+def own_controller(text: str) -> ControllerSpec:
     """The controller of `path/to/file.py:ClassName`, tried in a process of its own.
 
     Raises:
@@ -47,12 +47,12 @@ def own_contender(text: str) -> Contender:
         )
     if name in CONTROLLERS:
         raise ControllerError(f"{name} is a controller of the suites; rename the class in {path}")
-    contender = Contender(name, path=str(Path(path).resolve()))
+    spec = ControllerSpec(name, path=str(Path(path).resolve()))
     if not Path(path).is_file():
         raise ControllerError(f"there is no file {path}; check the name and the folder")
     results: list[object] = []
     process = LocalProcesses(1, MAKE_S, f"importing and making {name}")
-    works = [partial(probe, contender)]
+    works = [partial(probe, spec)]
     if not run_all(works, process, lambda _, result: results.append(result), untrusted=True):
         raise KeyboardInterrupt
     (result,) = results
@@ -60,16 +60,16 @@ def own_contender(text: str) -> Contender:
         raise result
     if isinstance(result, BaseException):
         raise ControllerError(f"cannot make {text}: {result}")
-    return Contender(name, str(result), contender.path)
+    return ControllerSpec(name, str(result), spec.path)
 
 
 def run_add(
-    contender: Contender, suites: Sequence[FrozenSuite], results: Path, jobs: int, console: Console
+    spec: ControllerSpec, suites: Sequence[FrozenSuite], results: Path, jobs: int, console: Console
 ) -> int:
     """Score somebody's own controller and say where it stands.
 
     Args:
-        contender: from `own_contender`.
+        spec: from `own_controller`.
         suites: what to run.
         results: folder with a folder of results for each suite.
         jobs: processes.
@@ -81,14 +81,14 @@ def run_add(
     for suite in suites:
         out = results / suite.name
         check_folder(suite, out)
-        todo = plan(suite, [suite.entry(contender)], out)
+        todo = pending_cases(suite, [suite.entry(spec)], out)
         rows = list(todo.known.values())
         console.print(
             f"{suite.name} version {suite.version}: {len(todo.cases)} cases of "
-            f"{contender.label}, {len(rows)} of them done before",
+            f"{spec.label}, {len(rows)} of them done before",
             highlight=False,
         )
-        info = run_info(todo, [suite.entry(contender)], out, jobs)
+        info = run_info(todo, [suite.entry(spec)], out, jobs)
         write_run(out, info, complete=False)
         complete = _run(todo, out, jobs, rows, console)
         write_run(out, info, complete=bool(complete))
@@ -103,11 +103,13 @@ def run_add(
             )
             return INTERRUPTED
         if complete:
-            _say_ranks(contender, suite, out, console)
+            _say_ranks(spec, suite, out, console)
     return FAILED if failed else 0
 
 
-def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) -> bool | None:
+def _run(
+    todo: PendingCases, out: Path, jobs: int, rows: list[Row], console: Console
+) -> bool | None:
     """Run what is missing, adding to the rows; whether it was worth it to the end.
 
     Returns:
@@ -132,25 +134,25 @@ def _run(todo: Plan, out: Path, jobs: int, rows: list[Row], console: Console) ->
         try:
             done = execute(todo, LocalProcesses(jobs), out, on_done, untrusted=True)
         except _EnoughError:
-            (contender,) = {case.contender for case in todo.cases}
+            (spec,) = {case.spec for case in todo.cases}
             suite = todo.suite
             console.print(
                 f"  {ENOUGH} cases failed: the other {len(todo.cases) - len(rows)} are "
                 "not run; correct it and run the same command again, or take its rows out: "
-                f"{remove_command(contender.name, suite, out)}",
+                f"{remove_command(spec.name, suite, out)}",
                 highlight=False,
             )
             return False
     return True if done else None
 
 
-def _say_ranks(contender: Contender, suite: FrozenSuite, out: Path, console: Console) -> None:
+def _say_ranks(spec: ControllerSpec, suite: FrozenSuite, out: Path, console: Console) -> None:
     """Its line in every measure of a suite, beside the other controllers in the folder."""
     leaderboard = read_leaderboard(suite, out)
     for name, standings in leaderboard.standings.items():
-        if contender.name in standings.errors.names:
-            console.print(f"  {name}: {_line(contender, standings)}", highlight=False)
-    others = {name for name, _ in leaderboard.record.rows} - {contender.name}
+        if spec.name in standings.errors.names:
+            console.print(f"  {name}: {_line(spec, standings)}", highlight=False)
+    others = {name for name, _ in leaderboard.record.rows} - {spec.name}
     if not others:
         console.print(
             f"  no other controller has results in {out} made with this code; for a rank: "
@@ -159,8 +161,8 @@ def _say_ranks(contender: Contender, suite: FrozenSuite, out: Path, console: Con
         )
 
 
-def _line(contender: Contender, standings: Standings) -> str:
-    mine = next(row for row in standings.rows if row.name == contender.name)
+def _line(spec: ControllerSpec, standings: Standings) -> str:
+    mine = next(row for row in standings.rows if row.name == spec.name)
     unit = standings.errors.measure.unit
     words = f"{mine.mean.estimate:.3g} {unit} ({mine.mean.low:.3g} to {mine.mean.high:.3g})"
     rivals = len(standings.rivals)

@@ -13,8 +13,8 @@ from benchmarks.comparison.scores import print_scores, write_scores
 from benchmarks.executors.executor import Executor
 from benchmarks.report.leaderboard import keep_bounds
 from benchmarks.runner.case import Row
-from benchmarks.runner.controller_spec import ControllerError, parse_contenders
-from benchmarks.runner.execution import Plan, compile_kernels, execute, plan
+from benchmarks.runner.controller_spec import ControllerError, parse_controllers
+from benchmarks.runner.execution import PendingCases, compile_kernels, execute, pending_cases
 from benchmarks.runner.journal import JOURNAL
 from benchmarks.runner.provenance import check_folder, run_info, write_run, write_stations
 from benchmarks.suites.frozen import Entry, FrozenSuite
@@ -31,15 +31,15 @@ def chosen(suite: FrozenSuite, controllers: str) -> list[Entry]:
     """
     if controllers.strip() in ("", "all"):
         return list(suite.entries)
-    known = [entry.contender for entry in suite.entries]
-    entries = [suite.entry(contender) for contender in parse_contenders(controllers, known)]
+    known = [entry.spec for entry in suite.entries]
+    entries = [suite.entry(spec) for spec in parse_controllers(controllers, known)]
     by_name: dict[str, Entry] = {}
     for entry in entries:
-        rival = by_name.setdefault(entry.contender.name, entry).contender
-        if rival.source != entry.contender.source:
+        rival = by_name.setdefault(entry.spec.name, entry).spec
+        if rival.source != entry.spec.source:
             raise ControllerError(
                 f"two controllers are called {rival.name}: {rival.source} and "
-                f"{entry.contender.source}; rename one class"
+                f"{entry.spec.source}; rename one class"
             )
     return list(by_name.values())
 
@@ -62,7 +62,7 @@ def run_comparison(
     """
     began = time.perf_counter()
     check_folder(suite, out)
-    todo = plan(suite, entries, out)
+    todo = pending_cases(suite, entries, out)
     console.print(_greeting(todo, entries, out, executor.jobs), highlight=False)
     info = run_info(todo, entries, out, executor.jobs)
     write_run(out, info, complete=False)
@@ -88,7 +88,7 @@ def run_comparison(
 
 
 def _run(
-    todo: Plan,
+    todo: PendingCases,
     entries: Sequence[Entry],
     out: Path,
     executor: Executor,
@@ -111,7 +111,7 @@ def _run(
         return execute(todo, executor, out, on_done)
 
 
-def _greeting(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> str:
+def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> str:
     suite, done = todo.suite, len(todo.known)
     words = (
         f"Suite {suite.name} version {suite.version}: {len(suite.stations)} stations, "
@@ -139,16 +139,18 @@ def _progress(console: Console) -> Progress:
     )
 
 
-def _bars(progress: Progress, todo: Plan, entries: Sequence[Entry]) -> Callable[[Row], None]:
+def _bars(
+    progress: Progress, todo: PendingCases, entries: Sequence[Entry]
+) -> Callable[[Row], None]:
     """A bar for each controller and one for all, which rows move on."""
-    wanted = Counter(case.contender.name for case in todo.cases)
+    wanted = Counter(case.spec.name for case in todo.cases)
     done = Counter(name for name, _ in todo.known)
     failures = Counter[str]()
     bars = {
-        entry.contender.name: progress.add_task(
-            entry.contender.label,
-            total=wanted[entry.contender.name],
-            completed=done[entry.contender.name],
+        entry.spec.name: progress.add_task(
+            entry.spec.label,
+            total=wanted[entry.spec.name],
+            completed=done[entry.spec.name],
             failed="",
         )
         for entry in entries
@@ -165,7 +167,7 @@ def _bars(progress: Progress, todo: Plan, entries: Sequence[Entry]) -> Callable[
     return advance
 
 
-def _leave(todo: Plan, rows: Sequence[Row], out: Path, console: Console) -> int:
+def _leave(todo: PendingCases, rows: Sequence[Row], out: Path, console: Console) -> int:
     console.print(
         f"Interrupted: {len(rows)} of {len(todo.cases)} cases are done and stay in "
         f"{out / JOURNAL}. The same command goes on from there.",

@@ -27,7 +27,7 @@ def print_suites(console: Console) -> None:
         )
     console.print(table)
     for suite in frozen:
-        names = ", ".join(entry.contender.name for entry in suite.entries)
+        names = ", ".join(entry.spec.name for entry in suite.entries)
         console.print(f"{suite.name}: {suite.title} ({_control(suite)})", highlight=False)
         console.print(f"  tasks: {', '.join(suite.tasks)}", highlight=False)
         console.print(f"  controllers: {names}", highlight=False)

@@ -39,10 +39,10 @@ def _removed(name: str, path: Path) -> int:
         count = len(journal.lines) - len(kept)
         journal.lines = kept
     info = read_run(path.parent)
-    contenders = info.get("contenders")
-    if isinstance(contenders, dict) and name in contenders:
-        rest = {each: entry for each, entry in contenders.items() if each != name}
-        write_run(path.parent, info, contenders=rest)
+    specs = info.get("contenders")
+    if isinstance(specs, dict) and name in specs:
+        rest = {each: entry for each, entry in specs.items() if each != name}
+        write_run(path.parent, info, specs=rest)
     return count
 
 

@@ -13,7 +13,7 @@ from benchmarks.executors.failures import ProcessDied, TookTooLong
 from benchmarks.files import write_text
 from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError
-from benchmarks.runner.execution import Plan, identity, row_identity
+from benchmarks.runner.execution import PendingCases, identity, row_identity
 from benchmarks.runner.user_controller import LateError
 from benchmarks.suites.frozen import Entry
 
@@ -35,15 +35,15 @@ TIMES = ("act_us", "act_us_worst")
 figures and times. All but the times are the same bits in every run."""
 
 
-def write_scores(out: Path, plan: Plan, rows: Sequence[Row]) -> None:
+def write_scores(out: Path, todo: PendingCases, rows: Sequence[Row]) -> None:
     """Write `scores.csv`, in the order of the plan's cases."""
-    write_text(out / SCORES, csv_text(plan, rows))
+    write_text(out / SCORES, csv_text(todo, rows))
 
 
-def csv_text(plan: Plan, rows: Sequence[Row]) -> str:
+def csv_text(todo: PendingCases, rows: Sequence[Row]) -> str:
     """A row for each case that is done."""
     by_case = {row_identity(row): row for row in rows}
-    ordered = [by_case[its] for case in plan.cases if (its := identity(case)) in by_case]
+    ordered = [by_case[its] for case in todo.cases if (its := identity(case)) in by_case]
     phases = list(dict.fromkeys(name for row in ordered for name in row.get("phases", ())))
     out = io.StringIO(newline="")
     writer = csv.writer(out, lineterminator="\n")
@@ -57,19 +57,19 @@ def csv_text(plan: Plan, rows: Sequence[Row]) -> str:
 
 
 def print_scores(
-    plan: Plan, entries: Sequence[Entry], rows: Sequence[Row], console: Console
+    todo: PendingCases, entries: Sequence[Entry], rows: Sequence[Row], console: Console
 ) -> None:
     """Median RMSE of every controller, and why cases failed."""
     units = list(dict.fromkeys(row["unit"] for row in rows if not row["failure"]))
-    table = Table("controller", title=f"Suite {plan.suite.name}", title_justify="left")
+    table = Table("controller", title=f"Suite {todo.suite.name}", title_justify="left")
     for heading in ("cases", "failed", *(f"median RMSE ({unit})" for unit in units), "act (us)"):
         table.add_column(heading, justify="right")
     for entry in entries:
-        mine = [row for row in rows if row["controller"] == entry.contender.name]
+        mine = [row for row in rows if row["controller"] == entry.spec.name]
         done = [row for row in mine if not row["failure"]]
         errors = [[row["rmse"] for row in done if row["unit"] == unit] for unit in units]
         table.add_row(
-            entry.contender.label,
+            entry.spec.label,
             str(len(mine)),
             str(len(mine) - len(done)),
             *(_figure(values) for values in errors),
@@ -98,24 +98,24 @@ def print_clipping(rows: Sequence[Row], console: Console) -> None:
 
 def print_failures(rows: Sequence[Row], console: Console) -> None:
     """Why cases failed, if any did: each reason once, the commonest first."""
-    found = sorted(failures(rows).items(), key=lambda item: -len(item[1]))
-    for reason, names in found[:MOST_REASONS]:
+    reasons = sorted(failures(rows).items(), key=lambda item: -len(item[1]))
+    for reason, names in reasons[:MOST_REASONS]:
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
         console.print(f"  {names[0]}{more}: {reason}", markup=False, highlight=False)
-    if len(found) > MOST_REASONS:
-        console.print(f"  and {len(found) - MOST_REASONS} other reasons, see the journal")
+    if len(reasons) > MOST_REASONS:
+        console.print(f"  and {len(reasons) - MOST_REASONS} other reasons, see the journal")
 
 
 def failures(rows: Sequence[Row]) -> dict[str, list[str]]:
     """Names of the cases that failed, by reason; ends by one limit are one, whenever they came."""
-    found: dict[str, list[str]] = {}
+    reasons: dict[str, list[str]] = {}
     for row in rows:
         if row["failure"]:
             controller, episode = row_identity(row)
             _, early, limit = row["failure"].partition(BY_LIMIT)
             reason = f"ended {early}{limit}" if early else _without_kind(row["failure"])
-            found.setdefault(reason, []).append(f"{controller}/{episode.name}")
-    return found
+            reasons.setdefault(reason, []).append(f"{controller}/{episode.name}")
+    return reasons
 
 
 def _without_kind(failure: str) -> str:

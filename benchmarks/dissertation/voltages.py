@@ -47,7 +47,7 @@ def run_voltages(order: Order, out: Path) -> int:
         The number of rows.
     Raises:
         ValueError: a controller that needs sensors, an unknown task, a pressure or rate out of
-            range, or what the controller cannot compute; with the mend.
+            range, or what the controller cannot compute; with the fix.
     """
     environment = _environment(order)
     rows = list(_rows(order, environment))

@@ -17,7 +17,7 @@ SHOWN = {"muscles": (1, 2, 3), "diameter": (10, 20, 40), "length": (250,)}
 
 
 class ChoiceError(ValueError):
-    """Options that cannot be used; says which, the rule and the mend."""
+    """Options that cannot be used; says which, the rule and the fix."""
 
 
 @dataclass(frozen=True)
@@ -75,10 +75,10 @@ def numbers(option: str, text: str) -> list[float]:
     Raises:
         ChoiceError: something in it is no number.
     """
-    found = parse_numbers(text)
-    if found is None:
+    values = parse_numbers(text)
+    if values is None:
         raise ChoiceError(
             f"--{option} must be a number, or several by commas, got {text!r}; for example "
             f"--{option} {'1,2' if option == 'muscles' else '20,40'}"
         )
-    return found
+    return values

@@ -44,21 +44,21 @@ def run_exercise(
     """
     model = load_model(MODEL)
     shown = choice.shown(model)
-    found = answer(model, choice.searched(model), wanted) if wanted else None
-    devices = sorted({*shown, found.device}) if found else shown
-    blocks = exercise_blocks(model, devices, found)
+    smallest = answer(model, choice.searched(model), wanted) if wanted else None
+    devices = sorted({*shown, smallest.device}) if smallest else shown
+    blocks = exercise_blocks(model, devices, smallest)
     for block in blocks:
         if isinstance(block, TextTable):
             console.print(terminal_table(block), "")
-    if found:
-        console.print(f"{found.words}. {found.how}", highlight=False)
-    pictures = {PICTURE: exercise_plot(model, devices, found)}
+    if smallest:
+        console.print(f"{smallest.words}. {smallest.how}", highlight=False)
+    pictures = {PICTURE: exercise_plot(model, devices, smallest)}
     write_bytes(out / PLOTS / f"{PICTURE}.png", pictures[PICTURE])
     write_text(out / "report.md", to_markdown(blocks, pictures, PLOTS))
     write_text(out / "report.html", to_html(blocks, pictures))
     write_csv(out / "moments.csv", COLUMNS, _cells(model, devices))
     console.print(f"Report: {out / 'report.html'}", highlight=False)
-    return found
+    return smallest
 
 
 def _cells(model: Model, devices: Sequence[Device]) -> list[tuple[str, ...]]:

@@ -31,17 +31,17 @@ _MAKERS = (
 )
 
 
-def exercise_blocks(model: Model, devices: Sequence[Device], found: Answer | None) -> list[Block]:
+def exercise_blocks(model: Model, devices: Sequence[Device], answer: Answer | None) -> list[Block]:
     """The whole report.
 
     Args:
         model: of the station.
         devices: whose ranges are shown.
-        found: a prescription's answer, or None.
+        answer: a prescription's answer, or None.
     """
     blocks: list[Block] = [Heading("The resistive exercise device", 1)]
-    if found is not None:
-        blocks.append(Callout(found.words, found.how, "good"))
+    if answer is not None:
+        blocks.append(Callout(answer.words, answer.how, "good"))
     return [
         *blocks,
         Picture(PICTURE, "Moment at 90 deg by constant pressure; moment over the angle."),

@@ -25,18 +25,18 @@ _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _DASHES = ("-", "--", "-.", ":")
 
 
-def exercise_plot(model: Model, devices: Sequence[Device], found: Answer | None) -> bytes:
+def exercise_plot(model: Model, devices: Sequence[Device], answer: Answer | None) -> bytes:
     """Both panels as PNG.
 
     Args:
         model: of the station.
         devices: whose moments are drawn.
-        found: a prescription's answer, or None.
+        answer: a prescription's answer, or None.
     """
     with picture(13.0, 6.2) as figure:
         left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
         _draw_pressures(left, model, devices)
-        _draw_angles(right, model, found)
+        _draw_angles(right, model, answer)
         return png(figure)
 
 
@@ -79,7 +79,7 @@ def _label_end(axis: Axes, device: Device, moment: np.ndarray, color: str) -> No
         axis.annotate(name, (575, moment[-1]), (4, -3), textcoords="offset points", color=color)
 
 
-def _draw_angles(axis: Axes, model: Model, found: Answer | None) -> None:
+def _draw_angles(axis: Axes, model: Model, answer: Answer | None) -> None:
     """Moment over angle: the knee, the tested muscle, and the prescription on its device."""
     angle = _DEG * np.linspace(0.0, 90.0, 91)
     degrees = angle / _DEG
@@ -92,25 +92,25 @@ def _draw_angles(axis: Axes, model: Model, found: Answer | None) -> None:
         moment = resistive_moment(model, own, pressure, angle).moment
         name = f"tested muscle, constant {1e-3 * pressure:g} kPa"
         axis.plot(degrees, moment, color="#0072B2", linestyle=line, label=name)
-    if found is not None:
-        _draw_answer(axis, model, found)
+    if answer is not None:
+        _draw_answer(axis, model, answer)
     axis.set(xlabel="angle (deg), 90 = straight leg", ylabel="moment (N m)", xlim=(0, 90))
     axis.set_ylim(0.0, 1.4 * axis.get_ylim()[1])
     axis.set_title("Over the angle, beside a young adult's knee")
     axis.legend(loc="upper left", ncols=2, frameon=False, fontsize=8.5)
 
 
-def _draw_answer(axis: Axes, model: Model, found: Answer) -> None:
-    degrees = found.wanted.angle / _DEG
-    label = f"smallest: {found.device}".replace(" on a pulley", "\non a pulley")
-    if found.wanted.scheduled:
-        _draw_band(axis, model, found.device, found.given, "#D55E00", label)
-        axis.plot(degrees, found.wanted.moment, color="#D55E00", marker=".", label="prescription")
+def _draw_answer(axis: Axes, model: Model, answer: Answer) -> None:
+    degrees = answer.wanted.angle / _DEG
+    label = f"smallest: {answer.device}".replace(" on a pulley", "\non a pulley")
+    if answer.wanted.scheduled:
+        _draw_band(axis, model, answer.device, answer.given, "#D55E00", label)
+        axis.plot(degrees, answer.wanted.moment, color="#D55E00", marker=".", label="prescription")
         return
     angle = _DEG * np.linspace(0.0, 90.0, 91)
-    moment = resistive_moment(model, found.device, found.given[0], angle).moment
+    moment = resistive_moment(model, answer.device, answer.given[0], angle).moment
     axis.plot(angle / _DEG, moment, color="#D55E00", label=label)
-    axis.plot(degrees, found.wanted.moment, "o", color="#D55E00", label="prescription")
+    axis.plot(degrees, answer.wanted.moment, "o", color="#D55E00", label="prescription")
 
 
 def _draw_band(

@@ -21,7 +21,7 @@ _FILL = 5.0
 
 
 class ProfileError(ValueError):
-    """A prescription that cannot be read; says file, row, column, rule, unit, what came, mend."""
+    """A prescription that cannot be read; says file, row, column, rule, unit, what came, fix."""
 
 
 class Prescription(NamedTuple):

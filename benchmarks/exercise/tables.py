@@ -69,15 +69,15 @@ def _range_row(model: Model, device: Device) -> list[str]:
     return cells
 
 
-def _pressures(found: Span | None) -> str:
-    return f"{1e-3 * found.lowest:.0f}–{1e-3 * found.highest:.0f}" if found else NONE
+def _pressures(span: Span | None) -> str:
+    return f"{1e-3 * span.lowest:.0f}–{1e-3 * span.highest:.0f}" if span else NONE
 
 
-def _moments(found: Span | None) -> str:
-    if found is None:
+def _moments(span: Span | None) -> str:
+    if span is None:
         return NONE
-    digits = 1 if found.high < 49.95 else 0
-    return f"{found.low:.{digits}f}–{found.high:.{digits}f}"
+    digits = 1 if span.high < 49.95 else 0
+    return f"{span.low:.{digits}f}–{span.high:.{digits}f}"
 
 
 def knee_table(model: Model) -> TextTable:

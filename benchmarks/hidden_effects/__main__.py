@@ -45,8 +45,10 @@ def draw(
             if name not in known:
                 raise typer.BadParameter(f"{name!r} is none of {', '.join(known)}")
     low, high = (float(end) for end in ratio.split(","))
-    plan = drawing.Plan(seed, tuple(blocks.split(",")), tuple(chosen), (low, high), trials, seconds)
-    drawing.draw(plan, cases, out, jobs)
+    case_set = drawing.CaseSet(
+        seed, tuple(blocks.split(",")), tuple(chosen), (low, high), trials, seconds
+    )
+    drawing.draw(case_set, cases, out, jobs)
 
 
 @app.command()

@@ -90,7 +90,7 @@ def detected(distance: Array | float) -> Array:
     return np.asarray(norm.cdf(np.asarray(distance) - norm.isf(ALARM)))
 
 
-def told(distance: Array | float) -> Array:
+def identified(distance: Array | float) -> Array:
     """Chance that the likelier of two hypotheses at a distance is the true one.
 
     >>> [round(float(p), 3) for p in (told(0.0), told(2.0))]
@@ -104,7 +104,7 @@ def true_noise(truth: Mapping[str, Any]) -> tuple[Whitening, ...]:
     factors = np.array([truth["noise_factors"][sensor] for sensor in SENSORS])
     levels = noise_levels(factors)
     coloured = np.array(NOISE) * factors * np.array(UNITS)
-    found = []
+    noise = []
     for channel, sensor in enumerate(SENSORS):
         lags = coloured[channel] ** 2 * truth["noise_memory"][sensor] ** np.arange(ORDER + 1)
         # Rounding of a moving signal is white (Widrow 1956).
@@ -112,8 +112,8 @@ def true_noise(truth: Mapping[str, Any]) -> tuple[Whitening, ...]:
         coefficients = solve_toeplitz(lags[:-1], lags[1:])
         innovation = np.sqrt(lags[0] - coefficients @ lags[1:])
         level = float(levels[channel])
-        found.append(Whitening(tuple(map(float, coefficients)), float(innovation), level))
-    return tuple(found)
+        noise.append(Whitening(tuple(map(float, coefficients)), float(innovation), level))
+    return tuple(noise)
 
 
 def left_by(problem: FitProblem, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> float:
@@ -139,16 +139,16 @@ def noiseless(dataset: Dataset, truth: Mapping[str, Any], given: Model) -> tuple
     noise = true_noise(truth)
     plain = FitProblem([_read(t, r) for t, r in zip(trials, base, strict=True)], given,
                   free_parameters(given), noise)  # fmt: skip
-    found = plain.careful_fit(given)
-    if found is None:
+    fit = plain.careful_fit(given)
+    if fit is None:
         raise ValueError(f"model {given.name} cannot be simulated on {dataset.title}")
-    readings = plain.whitened_residuals(found.model).readings(found.values)
+    readings = plain.whitened_residuals(fit.model).readings(fit.values)
     assert readings is not None
     changed = [
         _read(trial, held.T + after - before)
         for trial, held, before, after in zip(trials, readings, base, with_it, strict=True)
     ]
-    return FitProblem(changed, found.model, free_parameters(found.model), noise), found.model
+    return FitProblem(changed, fit.model, free_parameters(fit.model), noise), fit.model
 
 
 def _read(trial: Trial, readings: Array) -> Trial:
@@ -177,7 +177,7 @@ def distances(
     catalogue = candidate_effects(model, orders)
     scores = screen(baseline, catalogue, 0, lambda each: problem.probed(refitted.model, each))
     scores.sort(key=lambda each: -each.gain)
-    found = {
+    by_rival = {
         each.candidate.name: float(np.sqrt(max(whole**2 - each.gain, 0.0))) for each in scores
     }  # fmt: skip
     rivals = [each for each in scores if each.candidate.name != name and each.starts][:FITTED]
@@ -190,12 +190,12 @@ def distances(
         fit = problem.fit(refitted.model, (each.candidate,), {each.candidate.name: begun})
         if fit is not None:
             left = left_by(problem, fit, (each.candidate,))
-            found[each.candidate.name] = min(found[each.candidate.name], left)
-    others = {other: d for other, d in found.items() if other != name}
+            by_rival[each.candidate.name] = min(by_rival[each.candidate.name], left)
+    others = {other: d for other, d in by_rival.items() if other != name}
     apart = {other: d for other, d in others.items() if other not in group(name)}
     return {
         "nothing": whole,
-        "likeness": found.get(name),
+        "likeness": by_rival.get(name),
         "rival": min(others, key=lambda other: others[other]),
         "to_rival": min(others.values()),
         "rival_outside": min(apart, key=lambda other: apart[other]),
@@ -205,13 +205,13 @@ def distances(
 
 def bounded(folder: Path, case: str) -> dict[str, Any]:
     """Distances of one drawn case that hides one effect."""
-    truth = json.loads((folder / "truth" / f"{case}.json").read_text("utf-8"))
+    truth = read_json(folder / "truth" / f"{case}.json", "journal_mib", own=True, finite=False)
     dataset = read_dataset(folder / "cases" / case)
     problem, model = noiseless(dataset, truth, load_model(dataset.model or "station"))
     effect = truth["effects"][0]
     orders = [float(named.order or 0.0) for named in dataset.trials]
-    found = distances(problem, model, orders, effect["name"])
-    return {"case": case, "effect": effect["name"], "r": effect["r"], **found}
+    entry = distances(problem, model, orders, effect["name"])
+    return {"case": case, "effect": effect["name"], "r": effect["r"], **entry}
 
 
 def curves(some: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -231,8 +231,8 @@ def curves(some: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         "rivals": sorted(set(rivals), key=lambda name: -rivals.count(name)),
         "r": list(RATIOS),
         "detected": [float(np.mean(detected(at(r, "nothing")))) for r in RATIOS],
-        "told": [float(np.mean(told(at(r, "to_rival")))) for r in RATIOS],
-        "told_outside": [float(np.mean(told(at(r, "to_rival_outside")))) for r in RATIOS],
+        "told": [float(np.mean(identified(at(r, "to_rival")))) for r in RATIOS],
+        "told_outside": [float(np.mean(identified(at(r, "to_rival_outside")))) for r in RATIOS],
     }
 
 
@@ -277,13 +277,15 @@ def main(
         print(f"{next(done)}/{len(missing)}  {name}  ({took:.0f} s)", file=sys.stderr, flush=True)
 
     run_or_raise([partial(_bound_one, cases, name) for name in missing], local(jobs), tell)
-    found = [json.loads((kept / f"{name}.json").read_text("utf-8")) for name in names]
+    entries = [
+        read_json(kept / f"{name}.json", "journal_mib", own=True, finite=False) for name in names
+    ]
     by_effect = {
-        effect: curves([each for each in found if each["effect"] == effect])
-        for effect in dict.fromkeys(each["effect"] for each in found)
+        effect: curves([each for each in entries if each["effect"] == effect])
+        for effect in dict.fromkeys(each["effect"] for each in entries)
     }
     if json_file is not None:
-        document = {"alarm": ALARM, "effects": by_effect, "cases": found}
+        document = {"alarm": ALARM, "effects": by_effect, "cases": entries}
         replace_file(json_file, (json.dumps(document, indent=1) + "\n").encode())
     typer.echo(table(by_effect))
 
@@ -301,7 +303,7 @@ def _is_kept(path: Path) -> bool:
 
 
 def _counts(truth: Path) -> bool:
-    effects = json.loads(truth.read_text("utf-8"))["effects"]
+    effects = read_json(truth, "journal_mib", own=True, finite=False)["effects"]
     return len(effects) == 1 and effects[0]["name"] not in NOT_A_MEAN
 
 

@@ -36,7 +36,7 @@ SET, SCORE = "set.json", "score.json"
 
 
 class JobError(ValueError):
-    """An order that cannot be carried out; the message names what, the rule and the mend."""
+    """An order that cannot be carried out; the message names what, the rule and the fix."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Order:
         folder: of its records.
         executor: where cases are drawn and diagnosed.
         keep: keep the trials too.
-        again: anew what other code made.
+        recompute: anew what other code made.
         judge: makes the answers.
     """
 
@@ -60,7 +60,7 @@ class Order:
     folder: Path
     executor: Executor = field(default_factory=ThisProcess)
     keep: bool = False
-    again: bool = False
+    recompute: bool = False
     judge: Judge = diagnosed
 
 
@@ -95,7 +95,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
     done = {
         record.number: record
         for record in judgeable(order)
-        if (record.code == code or not order.again) and record.most_rounds >= order.block.rounds
+        if (record.code == code or not order.recompute) and record.most_rounds >= order.block.rounds
     }
     _tell(_greeting(order, done, code))
     missing = [number for number in range(1, order.count + 1) if number not in done]
@@ -128,18 +128,18 @@ def run_block(order: Order) -> dict[str, Any] | None:
 
 def judgeable(order: Order) -> list[Record]:
     """Records of an order's folder that can be judged; the other cases are made anew."""
-    found, damaged = list[Record](), list[str]()
+    kept_records, damaged = list[Record](), list[str]()
     for record in records.read(order.folder, order.count):
         try:
             if record.truth["seed"] != order.seed:
                 raise ValueError(f"it is of seed {record.truth['seed']!r}")
             scoring.count([scoring.outcome_of(record)])
-            found.append(record)
+            kept_records.append(record)
         except UNREADABLE as error:
             name = records.path_of(order.folder, record.number).name
             damaged.append(f"{name}: {reason(error)}")
     records.say_lost(order.folder, damaged)
-    return found
+    return kept_records
 
 
 def figures(order: Order, kept: Sequence[Record]) -> dict[str, Any]:
@@ -272,7 +272,7 @@ def _greeting(order: Order, done: dict[int, Record], code: str) -> str:
         words += f"; {len(done)} are done in {order.folder}"
     other = sum(record.code != code for record in done.values())
     if other:
-        words += f", {other} of them by other code than this (--again makes those anew)"
+        words += f", {other} of them by other code than this (--recompute makes those anew)"
     return words
 
 

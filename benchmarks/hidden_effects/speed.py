@@ -59,14 +59,14 @@ def measure(size: Size, jobs: int) -> tuple[float, float, str, list[str]]:
     """Seconds of a first and a second diagnosis, the verdict, and the effects named."""
     trials = data_set(size)
     first, _ = _timed(trials, jobs)
-    again, found = _timed(trials, jobs)
-    return first, again, found.verdict, [effect.name for effect in found.effects]
+    again, diagnosis = _timed(trials, jobs)
+    return first, again, diagnosis.verdict, [effect.name for effect in diagnosis.effects]
 
 
 def _timed(trials: list[Trial], jobs: int) -> tuple[float, Diagnosis]:
     begun = time.perf_counter()
-    found = diagnose(trials, lab_model(), jobs=jobs)
-    return time.perf_counter() - begun, found
+    diagnosis = diagnose(trials, lab_model(), jobs=jobs)
+    return time.perf_counter() - begun, diagnosis
 
 
 def _asked(size: Size, number: int, generator: np.random.Generator) -> Trial:

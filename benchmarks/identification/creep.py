@@ -64,17 +64,17 @@ def protocol_with_creep(model: Model, pressure: np.ndarray, load: np.ndarray) ->
         pressure: gauge pressures (Pa), shape (n,).
         load: loads at 10 s (N), shape (n,).
     """
-    march = _March(model, pressure)
-    x0 = march.contraction.copy()
+    quasi_static = _QuasiStatic(model, pressure)
+    x0 = quasi_static.contraction.copy()
     shares = np.arange(1, PARTS + 1) / PARTS
     for share in shares:
-        march.part(share * load, -1.0)
+        quasi_static.part(share * load, -1.0)
     for _ in shares:
-        march.part(load, -1.0)
-    x1 = march.contraction.copy()
+        quasi_static.part(load, -1.0)
+    x1 = quasi_static.contraction.copy()
     for share in shares:
-        march.part((1.0 - share) * load, 1.0)
-    return Protocol(x0, x0 - x1, march.contraction - x1)
+        quasi_static.part((1.0 - share) * load, 1.0)
+    return Protocol(x0, x0 - x1, quasi_static.contraction - x1)
 
 
 class CreepFold(NamedTuple):
@@ -115,7 +115,7 @@ def decided(folds: Sequence[CreepFold]) -> Decision:
     )
 
 
-class _March:
+class _QuasiStatic:
     """Muscles at their pressures, from part to part."""
 
     def __init__(self, model: Model, pressure: np.ndarray) -> None:

@@ -116,9 +116,9 @@ def _static_loading(model: Model) -> str:
     force = muscle_force(model)(pressure, np.zeros_like(pressure))
     inside = pressure >= 150e3
     error, measured = (force - load)[inside], float(np.mean(load[inside]))
-    found = contraction_at(muscle_force(model), pressure[inside], load[inside])
+    predicted = contraction_at(muscle_force(model), pressure[inside], load[inside])
     return (
         f"I1 (load held at the resting length, above 150 kPa): predicted {rms(error):.0f} N off, "
         f"mean {np.mean(error):+.0f} N of {measured:.0f} N: the model has that load "
-        f"{-1e3 * np.mean(found):.1f} mm beyond its resting length, another zero"
+        f"{-1e3 * np.mean(predicted):.1f} mm beyond its resting length, another zero"
     )

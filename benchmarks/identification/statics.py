@@ -157,7 +157,7 @@ def fit(
         tried = model.replace(dict(zip(names, values.tolist(), strict=True)))
         return weighted(tried, data, steps, predict)
 
-    found = least_squares(
+    solution = least_squares(
         cost,
         begin,
         x_scale=scale,
@@ -170,7 +170,7 @@ def fit(
         gtol=1e-10,
         max_nfev=200,
     )
-    return model.replace(dict(zip(names, found.x.tolist(), strict=True)))
+    return model.replace(dict(zip(names, solution.x.tolist(), strict=True)))
 
 
 def _bounds(model: Model, names: list[str]) -> tuple[list[float], list[float]]:

@@ -79,11 +79,11 @@ def undecidable(
     proposals: list[Proposal] = []
     left = [each.candidate for each in dim]
     while left and len(proposals) < MOST:
-        found = experiment_to_detect(rig.problem, fit, left, scores, seed)
-        if found is None:
+        proposal = experiment_to_detect(rig.problem, fit, left, scores, seed)
+        if proposal is None:
             break
-        proposals.append(Proposal(found.excitation, tuple(found.separates), found.minutes))
-        left = [candidate for candidate in left if candidate.name not in found.separates]
+        proposals.append(Proposal(proposal.excitation, tuple(proposal.separates), proposal.minutes))
+        left = [candidate for candidate in left if candidate.name not in proposal.separates]
     return [_entry(each, proposals) for each in dim], proposals
 
 

@@ -98,15 +98,15 @@ matter then."""
 
 
 def _compared(held: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Array]:
-    found: dict[str, list[float]] = {name: [] for name in FIGURES}
+    by_figure: dict[str, list[float]] = {name: [] for name in FIGURES}
     for simulated, each in zip(held, logged, strict=True):
         for name, (signal, plus, minus, unit) in FIGURES.items():
             channel = OUTPUTS.index(signal)
             if {plus, minus} & set(each.missing[channel].tolist()):
                 continue
             off = simulated[channel] - each.measured[channel]
-            found[name].append(float(off[plus] - off[minus]) / SI_FACTORS[unit])
-    return {name: np.array(errors) for name, errors in found.items()}
+            by_figure[name].append(float(off[plus] - off[minus]) / SI_FACTORS[unit])
+    return {name: np.array(errors) for name, errors in by_figure.items()}
 
 
 def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
@@ -117,9 +117,9 @@ def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
         data: trials of I3; those without a load are passed over.
     """
     loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
-    found = _errors(model, loaded, [each.trial for each in loaded])
+    errors = _errors(model, loaded, [each.trial for each in loaded])
     at_load = _errors(model, loaded, [_at_measured_load(each.trial, model) for each in loaded])
-    return {**found, AT_LOAD: at_load["extension_mm"]}
+    return {**errors, AT_LOAD: at_load["extension_mm"]}
 
 
 def _at_measured_load(trial: Trial, model: Model) -> Trial:
@@ -170,7 +170,7 @@ def repeat_scatter(data: Dataset) -> dict[str, float]:
     loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
     for i, each in enumerate(loaded):
         groups.setdefault(each.repeat_of or each.name, []).append(i)
-    found = {}
+    scatter = {}
     for name, (signal, plus, minus, unit) in FIGURES.items():
         squares, count = 0.0, 0
         for group in groups.values():
@@ -179,5 +179,5 @@ def repeat_scatter(data: Dataset) -> dict[str, float]:
             apart = apart[np.isfinite(apart)] / SI_FACTORS[unit]
             squares += float(np.sum((apart - apart.mean()) ** 2)) if apart.size else 0.0
             count += apart.size
-        found[name] = float(np.sqrt(squares / count)) if count else float("nan")
-    return {**found, AT_LOAD: found["extension_mm"]}
+        scatter[name] = float(np.sqrt(squares / count)) if count else float("nan")
+    return {**scatter, AT_LOAD: scatter["extension_mm"]}

@@ -69,7 +69,7 @@ def run_measured(
     seed: int = 0,
     most: int = MOST_ROUNDS,
     console: Console | None = None,
-    again: bool = False,
+    recompute: bool = False,
 ) -> Measured:
     """Diagnose, judge and write.
 
@@ -80,15 +80,15 @@ def run_measured(
         seed: of simulated chance.
         most: most diagnoses, one after the other.
         console: where to print.
-        again: anew what other code made.
+        recompute: anew what other code made.
     """
     console, begun = console or SafeConsole(), time.perf_counter()
-    stages, given = Stages(out / "stages", again), load_model(GIVEN)
+    stages, given = Stages(out / "stages", recompute), load_model(GIVEN)
     if others := stages.others():
         console.print(others, highlight=False, markup=False, soft_wrap=True)
     few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
     with _bar(console) as tell:
-        found, amended = rounds(
+        diagnoses, amended = rounds(
             (few, more),
             given,
             stages,
@@ -97,7 +97,7 @@ def run_measured(
             lambda number: _prefixed(tell, f"round {number}: "),
             most,
         )
-        effects = [name for each in found for name in each.effects]
+        effects = [name for each in diagnoses for name in each.effects]
         judged = judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA)
         stepped = steps(
             given,
@@ -126,7 +126,7 @@ def run_measured(
     held = held_against(models, given)
     seconds = time.perf_counter() - begun
     result = Measured(
-        found,
+        diagnoses,
         stepped,
         left_out,
         floors(),
@@ -153,14 +153,16 @@ def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[
     kept = stages.kept("reverse", asked, _explanations)
     if kept is not None:
         return kept
-    found = searched(model, REVERSE_ROUNDS, progress)
-    stages.keep("reverse", asked, {"found": [[asdict(each) for each in every] for every in found]})
-    return found
+    by_round = searched(model, REVERSE_ROUNDS, progress)
+    stages.keep(
+        "reverse", asked, {"explanations": [[asdict(each) for each in every] for every in by_round]}
+    )
+    return by_round
 
 
-def _explanations(found: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
-    check_shape(found, ListOf(ListOf(shape_of(Explanation, finite=False))), "found")
-    return [[Explanation(**each) for each in every] for every in found]
+def _explanations(explanations: list[list[dict[str, Any]]]) -> list[list[Explanation]]:
+    check_shape(explanations, ListOf(ListOf(shape_of(Explanation, finite=False))), "explanations")
+    return [[Explanation(**each) for each in every] for every in explanations]
 
 
 def diagnosed(

@@ -101,9 +101,9 @@ def _reverse_blocks(result: Measured) -> list[Block]:
         ),
         *(Paragraph(words) for words in reverse_words(result)),
     ]
-    for number, found in enumerate(result.reverse, 1):
+    for number, explanations in enumerate(result.reverse, 1):
         title = f"Explanations, {number}: rms (mm at the muscle)"
-        blocks.append(TextTable(title, REVERSE_HEADER, reverse_rows(found), words=2))
+        blocks.append(TextTable(title, REVERSE_HEADER, reverse_rows(explanations), words=2))
     blocks += [
         Heading("Validation under triangular pressure (figures 28 and 29)"),
         Paragraph(

@@ -7,7 +7,7 @@ from pathlib import Path
 from benchmarks.reproduction.execution import Execution, Outcome, run_case
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise
 from benchmarks.reproduction.results import Results
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.reproduction import Suite, load_suite
 
 PHASE_NAMES = {
@@ -69,7 +69,7 @@ def _outcome(suite: Suite, case) -> Outcome:  # noqa: ANN001
     return run_case(case, suite)
 
 
-def _replay(suite: Suite) -> Contender:
+def _replay(suite: Suite) -> ControllerSpec:
     return next(each for each in suite.controllers if each.name == suite.targets.replay)
 
 

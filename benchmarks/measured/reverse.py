@@ -98,7 +98,7 @@ def explanations(
     """
     summary = Summary.measured(model)
     every = [each for each in candidate_effects(model) if _reaches(each)]
-    found = [summary.explained(NOTHING, model, (), np.empty((1, 0)))]
+    candidates = [summary.explained(NOTHING, model, (), np.empty((1, 0)))]
     total = len(every) + len(PARAMETERS)
     for number, candidate in enumerate(every):
         if progress is not None:
@@ -109,14 +109,16 @@ def explanations(
             dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
         paths = tuple(np.array(candidate.paths)[free].tolist())
-        found.append(summary.explained(candidate.name, switched, paths, some[:, free]))
+        candidates.append(summary.explained(candidate.name, switched, paths, some[:, free]))
     for number, path in enumerate(PARAMETERS):
         if progress is not None:
             progress(len(every) + number, total)
         here = values(model, [path])
-        found.append(summary.explained(path, model, (path,), here[None] + 0.5 * prior(model, path)))
-    found.append(read_through_a_gap(summary, model))
-    return sorted(found, key=lambda each: each.left_out_mm)
+        candidates.append(
+            summary.explained(path, model, (path,), here[None] + 0.5 * prior(model, path))
+        )
+    candidates.append(read_through_a_gap(summary, model))
+    return sorted(candidates, key=lambda each: each.left_out_mm)
 
 
 def read_through_a_gap(summary: "Summary", model: Model) -> Explanation:
@@ -139,8 +141,8 @@ def read_through_a_gap(summary: "Summary", model: Model) -> Explanation:
         foretold[there] = left[best, there]
     best = int(np.argmin(np.sum(left**2, axis=1)))
     fitted = dict(zip(("gain", "gap_deg"), grid[best], strict=True))
-    found = summary.explanation(READ_THROUGH_A_GAP, fitted, left[best], foretold)
-    return replace(found, hypothesis=True)
+    explanation = summary.explanation(READ_THROUGH_A_GAP, fitted, left[best], foretold)
+    return replace(explanation, hypothesis=True)
 
 
 def searched(
@@ -150,33 +152,33 @@ def searched(
 
     It ends where the best gains less than a tenth at pressures left out.
     """
-    found = []
-    while len(found) < most:
+    by_round = []
+    while len(by_round) < most:
         every = explanations(model, progress)
-        found.append(every)
+        by_round.append(every)
         every = [each for each in every if not each.hypothesis]
         before = next(each.left_out_mm for each in every if each.name == NOTHING)
         if every[0].left_out_mm > GAIN * before:
             break
         model = _with(model, every[0])
-    return found
+    return by_round
 
 
-def _with(model: Model, found: Explanation) -> Model:
+def _with(model: Model, explanation: Explanation) -> Model:
     """The model with an explanation in it."""
     lacking = {each.name: each for each in candidate_effects(model)}
-    if found.name in lacking:
-        candidate = lacking[found.name]
+    if explanation.name in lacking:
+        candidate = lacking[explanation.name]
         model = candidate.model.replace(
             dict(zip(candidate.paths, candidate.probes[0].tolist(), strict=True))
         )
-    return model.replace(found.values)
+    return model.replace(explanation.values)
 
 
-def alike(found: Sequence[Explanation]) -> list[Explanation]:
+def alike(explanations: Sequence[Explanation]) -> list[Explanation]:
     """Explanations that cannot be told from the best."""
-    least = min(each.left_out_mm for each in found)
-    return [each for each in found if each.left_out_mm <= LIKE * least]
+    least = min(each.left_out_mm for each in explanations)
+    return [each for each in explanations if each.left_out_mm <= LIKE * least]
 
 
 def _reaches(candidate: CandidateEffect) -> bool:
@@ -263,7 +265,7 @@ class Summary:
         """
         if held is None or not all(np.isfinite(part).all() for part in held):
             return np.full(self.figures.shape, 1e3)
-        found = []
+        residuals = []
         for signals, trial, task in zip(held, self.trials, self.tasks, strict=True):
             contraction = signals[OUTPUTS.index("contraction")]
             position = (
@@ -275,12 +277,12 @@ class Summary:
                 begin = PHASE_DURATION * number
                 inside = (trial.time >= begin) & (trial.time <= begin + PHASE_DURATION)
                 line = regression(trial.time[inside] - begin, position[inside])
-                found += [
+                residuals += [
                     line.slope * PHASE_DURATION / np.sqrt(12.0),
                     line.intercept + 0.5 * PHASE_DURATION * line.slope,
                     np.sqrt(line.residual_mean_square),
                 ]
-        return np.clip(np.array(found) - self.figures, -1e3, 1e3)
+        return np.clip(np.array(residuals) - self.figures, -1e3, 1e3)
 
     def explained(self, name: str, model: Model, paths: Sequence[str], begun: Array) -> Explanation:
         """Fit parameters of a model, from the best of some beginnings, shape (starts, p)."""
@@ -309,15 +311,15 @@ class Summary:
 
         The step is simulated, and not taken where it does not help at the others.
         """
-        found, left = fit.fun.copy(), fit.fun
+        residuals, left = fit.fun.copy(), fit.fun
         for pressure in np.unique(self.pressure):
             there = self.pressure == pressure
             step, *_ = np.linalg.lstsq(fit.jac[~there], -left[~there], rcond=1e-8)
             at = np.clip(fit.x + step, whitened.lower, whitened.upper)
             moved = self.residuals(whitened, at)
             if np.sum(moved[~there] ** 2) <= np.sum(left[~there] ** 2):
-                found[there] = moved[there]
-        return found
+                residuals[there] = moved[there]
+        return residuals
 
     def explanation(
         self, name: str, fitted: dict[str, float], left: Array, foretold: Array

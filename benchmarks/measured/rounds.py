@@ -74,16 +74,16 @@ def rounds(
     Returns:
         The rounds, the last of which added nothing unless there were too many; the amended model.
     """
-    found: list[Round] = []
+    done: list[Round] = []
     model = given
     for some in data:
-        while len(found) < most:
-            number = len(found) + 1
+        while len(done) < most:
+            number = len(done) + 1
             each, model = _round(some, model, stages, seed, jobs, progress(number), number)
-            found.append(each)
+            done.append(each)
             if not each.effects:
                 break
-    return found, model
+    return done, model
 
 
 def _round(
@@ -108,15 +108,15 @@ def _round(
     diagnosis = diagnose(
         data, model, seed=seed, jobs=jobs, journal=stages.journal, progress=progress
     )
-    found = round_of(diagnosis, len(data))
-    write_text(amended, dump_model(diagnosis.model if found.effects else model))
-    stages.keep(name, asked, asdict(found))
+    result = round_of(diagnosis, len(data))
+    write_text(amended, dump_model(diagnosis.model if result.effects else model))
+    stages.keep(name, asked, asdict(result))
     # As it is read again, so that a job that goes on ends as one that was not interrupted.
-    return found, load_model(amended)
+    return result, load_model(amended)
 
 
 def round_of(diagnosis: Diagnosis, trials: int) -> Round:
-    """What a diagnosis found.
+    """Result of a diagnosis.
 
     A diagnosis that says `unknown`, because what it added leaves too much, has added effects to its
     model all the same: these count. One that cannot decide has not.

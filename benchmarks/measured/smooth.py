@@ -38,8 +38,8 @@ def smooth_errors(seen: Dataset, unseen: Dataset) -> dict[str, float]:
         Rms errors in file units (mm, deg) by `FIGURES`, as functions of the two voltages; and
         `AT_LOAD`, the extension as a function of regulator voltage and measured load.
     """
-    found = {name: _error(seen, unseen, name, at_load=False) for name in FIGURES}
-    return {**found, AT_LOAD: _error(seen, unseen, "extension_mm", at_load=True)}
+    errors = {name: _error(seen, unseen, name, at_load=False) for name in FIGURES}
+    return {**errors, AT_LOAD: _error(seen, unseen, "extension_mm", at_load=True)}
 
 
 def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:

@@ -28,6 +28,9 @@ ELSEWHERE = (
 
 T = TypeVar("T")
 
+_RENAMED = {"found": "explanations"}
+"""Names in stages of older versions."""
+
 
 @cache
 def fingerprint() -> str:
@@ -46,13 +49,13 @@ class Stages:
 
     Attributes:
         folder: where they are.
-        again: anew what other code made.
+        recompute: anew what other code made.
         code: fingerprint of this code.
         codes: how many stages of this run each code made.
     """
 
     folder: Path
-    again: bool = False
+    recompute: bool = False
     code: str = field(default_factory=fingerprint)
     codes: Counter[str] = field(default_factory=Counter)
 
@@ -72,18 +75,19 @@ class Stages:
         path = self._path(name)
         entry = self._entry(path)
         code = entry.pop("code", "")
-        if entry.pop("asked", None) != asked or (code != self.code and self.again):
+        entry = {_RENAMED.get(name, name): value for name, value in entry.items()}
+        if entry.pop("asked", None) != asked or (code != self.code and self.recompute):
             return None
         try:
             shape = shape_of(made, finite=False)
             if shape is not object:
                 check_shape(entry, shape)
-            found = made(**entry)
+            result = made(**entry)
         except UNREADABLE as error:
             say_damaged(path, reason(error))
             return None
         self.codes[code] += 1
-        return found
+        return result
 
     def keep(self, name: str, asked: str, entry: dict[str, Any]) -> None:
         """Keep a stage that this code has made; its file is there whole or not at all."""
@@ -96,11 +100,11 @@ class Stages:
         codes = [self._entry(path).get("code") for path in sorted(self.folder.glob("*.json"))]
         kept = [code for code in codes if code is not None]
         other = sum(code != self.code for code in kept)
-        if not other or self.again:
+        if not other or self.recompute:
             return ""
         return (
             f"{other} of {len(kept)} stages kept in {self.folder} are by other code than this "
-            "(--again makes those anew)"
+            "(--recompute makes those anew)"
         )
 
     def _path(self, name: str) -> Path:

@@ -60,7 +60,7 @@ def steps(
     rig = Rig.of(fitted, given, jobs)
     names = [AS_GIVEN, REFITTED, *effects]
     trials = [each.trial for part in data for each in part.trials]
-    found = []
+    done = []
     for number, name in enumerate(names):
         progress(number, len(names))
         some = tuple(effects[: max(number - 1, 0)])
@@ -70,9 +70,9 @@ def steps(
             model = given if name == AS_GIVEN else _fitted(rig, some, amended)
             step = _judged(name, some, model, seen, unseen, stages.folder / f"{stage}.toml")
             stages.keep(stage, asked, asdict(step))
-        found.append(step)
+        done.append(step)
     progress(len(names), len(names))
-    return found
+    return done
 
 
 def folds(

@@ -1,4 +1,4 @@
-"""What the job found, as rows of text: for the terminal and for the page."""
+"""Results of the job, as rows of text: for the terminal and for the page."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any
@@ -35,10 +35,10 @@ def readable(name: str) -> str:
     return name.replace("_", " ")
 
 
-def round_rows(found: Sequence[Round]) -> Rows:
+def round_rows(rounds: Sequence[Round]) -> Rows:
     """Each diagnosis: verdict, what it added, and with what that may be confused."""
     rows = []
-    for number, each in enumerate(found, 1):
+    for number, each in enumerate(rounds, 1):
         if not each.effects:
             rows.append((str(number), str(each.trials), each.verdict, "nothing", "", ""))
         for name in each.effects:
@@ -50,10 +50,10 @@ def round_rows(found: Sequence[Round]) -> Rows:
     return rows
 
 
-def equals(found: Round, name: str) -> list[str]:
+def equals(one: Round, name: str) -> list[str]:
     """Effects that explain a round's trials as well as one that it added."""
     words = f"explains these data as well as {name}"
-    return [other for other, _, _, why in found.rivals if why == words]
+    return [other for other, _, _, why in one.rivals if why == words]
 
 
 def error_rows(result: Measured) -> Rows:
@@ -84,7 +84,7 @@ def replay_rows(result: Measured, phase: str) -> Rows:
     ]
 
 
-def reverse_rows(found: Sequence[Explanation]) -> Rows:
+def reverse_rows(explanations: Sequence[Explanation]) -> Rows:
     """Explanations of what the station misses in tables 21-30, the best first."""
     return [
         (
@@ -95,11 +95,11 @@ def reverse_rows(found: Sequence[Explanation]) -> Rows:
             f"{each.displacement_mm:.2f}",
             f"{each.rotation_mm:.2f}",
         )
-        for each in found[:MOST_SHOWN]
+        for each in explanations[:MOST_SHOWN]
     ] + [
         (each.name, "", f"{each.fitted_mm:.2f}", f"{each.left_out_mm:.2f}",
          f"{each.displacement_mm:.2f}", f"{each.rotation_mm:.2f}")
-        for each in found[MOST_SHOWN:]
+        for each in explanations[MOST_SHOWN:]
         if each.name == NOTHING
     ]  # fmt: skip
 
@@ -114,28 +114,28 @@ MOST_SHOWN = 8
 
 def reverse_words(result: Measured) -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
-    for found in result.reverse:
-        plain = next(each for each in found if each.name == NOTHING)
-        yield from _hypothesis_words(found, plain)
-        found = [each for each in found if not each.hypothesis]
-        best, others = found[0], [each for each in alike(found) if each is not found[0]]
+    for explanations in result.reverse:
+        plain = next(each for each in explanations if each.name == NOTHING)
+        yield from _hypothesis_words(explanations, plain)
+        counted = [each for each in explanations if not each.hypothesis]
+        best, others = counted[0], [each for each in alike(counted) if each is not counted[0]]
         if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
             yield (
                 f"Nothing further explains a tenth of the {plain.left_out_mm:.2f} mm that are left "
                 "at pressures left out."
             )
             continue
-        told = ", ".join(_costs(each, plain) for each in others)
+        others_as_good = ", ".join(_costs(each, plain) for each in others)
         yield (
             f"Of {plain.left_out_mm:.2f} mm, {_costs(best, plain)} leaves {best.left_out_mm:.2f} "
             "mm at pressures left out, the least."
-            + (f" As good within 15 %: {told}." if told else "")
+            + (f" As good within 15 %: {others_as_good}." if others_as_good else "")
         )
 
 
-def _hypothesis_words(found: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
+def _hypothesis_words(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
     """What was thought of when the tables had been seen: told, and never counted."""
-    for each in found:
+    for each in explanations:
         if each.hypothesis:
             size = ", ".join(f"{name} {value:.3g}" for name, value in each.values.items())
             yield (
@@ -221,11 +221,11 @@ def print_measured(result: Measured, console: Console) -> None:
     for phase, label in PHASE_NAMES.items():
         title = f"Replay of the printed voltages, {label}: mean absolute error"
         _print(console, title, REPLAY_HEADER, replay_rows(result, phase))
-    for number, found in enumerate(result.reverse, 1):
+    for number, explanations in enumerate(result.reverse, 1):
         title = (
             f"The reverse, {number}: misfit of `station` in tables 21-30, rms (mm at the muscle)"
         )
-        _print(console, title, REVERSE_HEADER, reverse_rows(found))
+        _print(console, title, REVERSE_HEADER, reverse_rows(explanations))
     for line in reverse_words(result):
         console.print(line, highlight=False)
     _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))

@@ -63,7 +63,7 @@ def _limits(
 ) -> list[NamedTrial]:
     """Trials of I3."""
     table, data = load_table("I3"), station_limits()
-    found: list[NamedTrial] = []
+    trials: list[NamedTrial] = []
     firsts: dict[str, str] = {}
     for row, repeat in enumerate(_repeats()):
         pressure = float(table["pressure_nominal_kpa"][row])
@@ -75,7 +75,7 @@ def _limits(
         stem = f"I3_{pressure:.0f}kPa_{load:.0f}N"
         first = firsts.setdefault(stem, f"{stem}_{repeat}.csv")
         name = f"{stem}_{repeat}.csv"
-        found.append(
+        trials.append(
             NamedTrial(
                 name,
                 limit_trial(data, row),
@@ -84,18 +84,18 @@ def _limits(
                 None if name == first else first,
             )
         )
-    return found
+    return trials
 
 
 def _repeats() -> list[int]:
     """Which repeat each row of I3 is, 1 to 3: they stand in order."""
     table = load_table("I3")
     counts: Counter[tuple[float, float]] = Counter()
-    found = []
+    repeats = []
     for both in zip(table["pressure_nominal_kpa"], table["load_nominal_n"], strict=True):
         counts[both] += 1
-        found.append(counts[both])
-    return found
+        repeats.append(counts[both])
+    return repeats
 
 
 def limit_trial(data: StationLimits, row: int) -> Trial:
@@ -167,7 +167,7 @@ def _steps(pressures_kpa: Sequence[float] | None, every: int) -> list[NamedTrial
         return []
     table, limits = load_table("I2"), load_table("I3")
     nominal = np.unique(limits["pressure_nominal_kpa"])
-    found = []
+    trials = []
     for row in range(0, len(table["pressure_kpa"]), every):
         read = float(table["pressure_kpa"][row])
         # Read 1.016 P + 3.4 kPa, in steps of 25 kPa or more.
@@ -176,7 +176,7 @@ def _steps(pressures_kpa: Sequence[float] | None, every: int) -> list[NamedTrial
             continue
         load = float(table["load_n"][row])
         volts = limits.where(pressure_nominal_kpa=pressure)["regulator_voltage_v"][0]
-        found.append(
+        trials.append(
             NamedTrial(
                 f"I2_{pressure:.0f}kPa_{load:.0f}N_{row}.csv",
                 _trial(
@@ -195,7 +195,7 @@ def _steps(pressures_kpa: Sequence[float] | None, every: int) -> list[NamedTrial
                 order=0.0,
             )
         )
-    return found
+    return trials
 
 
 def _trial(

@@ -100,13 +100,13 @@ def held_against(models: dict[str, Model], own: Model) -> list[Held]:
         models: by name.
         own: the dissertation's model.
     """
-    found = []
+    rows = []
     for triangle in TRIANGLES:
         theirs = triangle.contraction(own)
         for name, model in models.items():
             ours = triangle.contraction(model)
             apart = (ours - ours.mean()) - (theirs - theirs.mean())
-            found.append(
+            rows.append(
                 Held(
                     triangle.figure,
                     name,
@@ -116,4 +116,4 @@ def held_against(models: dict[str, Model], own: Model) -> list[Held]:
                     triangle.rmse_mm,
                 )
             )
-    return found
+    return rows

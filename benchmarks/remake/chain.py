@@ -52,10 +52,10 @@ def content(path: Path) -> str:
     """Digest of a file, or of all files of a folder; empty if nothing is there."""
     whole = ROOT / path
     files = sorted(each for each in whole.rglob("*") if each.is_file()) if whole.is_dir() else []
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for each in files or ([whole] if whole.is_file() else []):
-        found.update(each.name.encode() + each.read_bytes())
-    return found.hexdigest() if files or whole.is_file() else ""
+        digest.update(each.name.encode() + each.read_bytes())
+    return digest.hexdigest() if files or whole.is_file() else ""
 
 
 def chain(jobs: int = 2) -> list[Step]:

@@ -40,9 +40,9 @@ def _reproduction(root: Path) -> Iterator[tuple[str, float]]:
     for score in run["scores"]:
         if score["model"] != run["suite"]["models"][0]:
             continue
-        for phase, found in score["phases"].items():
+        for phase, figures in score["phases"].items():
             name = f"{score['controller']}, {score['task']} {phase}: RMSE ({score['unit']})"
-            values.setdefault(name, []).append(found["rmse"])
+            values.setdefault(name, []).append(figures["rmse"])
     for error in run.get("replay_errors", []):
         for quantity in ("slope", "intercept", "mean", "rmse", "line_error", "scatter"):
             if quantity in error:
@@ -68,9 +68,12 @@ def _policies(root: Path) -> Iterator[tuple[str, float]]:
     """Validation errors of the policies that ship."""
     for path in sorted((root / "controllers" / "policies" / "shipped").glob("*.json")):
         scores = json.loads(path.read_text(encoding="utf-8"))["training"]["scores"]
-        found = scores.get("validation")
-        if found:
-            yield f"policy {path.stem}: validation ({found['unit']})", float(found["error"])
+        validation = scores.get("validation")
+        if validation:
+            yield (
+                f"policy {path.stem}: validation ({validation['unit']})",
+                float(validation["error"]),
+            )
 
 
 def compared(old: Mapping[str, float], new: Mapping[str, float]) -> list[tuple[str, str, str, str]]:

@@ -38,10 +38,10 @@ def raise_versions(folder: Path = SUITES, digest: str | None = None) -> list[str
     raised = []
     for path in sorted(folder.glob("*.toml")) if kept.is_file() else []:
         text = path.read_text(encoding="utf-8")
-        found = _VERSION.search(text)
-        if found:
-            new = f"version = {int(found[1]) + 1}"
-            write_text(path, text[: found.start()] + new + text[found.end() :])
+        match = _VERSION.search(text)
+        if match:
+            new = f"version = {int(match[1]) + 1}"
+            write_text(path, text[: match.start()] + new + text[match.end() :])
             raised.append(f"{path.stem} {new.removeprefix('version = ')}")
     # Last: whoever is interrupted before raises again what was raised, never too little.
     write_text(kept, now + "\n")

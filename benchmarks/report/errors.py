@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.report.statistics import Draws, resample
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.frozen import NOMINAL, Entry, Episode, FrozenSuite
 from controllers.design.designs import kind_of
 from pma_gym.data.protocol import PROTOCOLS
@@ -104,21 +104,21 @@ def measures(tasks: Iterable[str]) -> list[Measure]:
     for task in tasks:
         kind = kind_of(task_of(task))
         groups.setdefault((kind, kind in PROTOCOLS and task not in PROTOCOLS), []).append(task)
-    found = []
+    every = []
     for (kind, unseen), names in groups.items():
         title, unit = f"unseen {kind}" if unseen else kind, task_of(names[0]).protocol.unit
         returning = tuple(name for name in names if _returns(name))
         there = Measure(title, tuple(names), unit)
         if returning:
             phases = ", ".join(there.phases(returning[0]))
-            found.append(there._replace(name=f"{title} {phases}"))
-            found.append(Measure(f"{title} {RETURN}", returning, unit, returning=True))
+            every.append(there._replace(name=f"{title} {phases}"))
+            every.append(Measure(f"{title} {RETURN}", returning, unit, returning=True))
         else:
-            found.append(there)
+            every.append(there)
         if kind == "isokinetic":
             phases = [phase.name for phase in task_of(names[0]).protocol.phases]
-            found += [there._replace(name=f"{title} {name}", alone=name) for name in phases]
-    return found
+            every += [there._replace(name=f"{title} {name}", alone=name) for name in phases]
+    return every
 
 
 def pooled_measure(tasks: Iterable[str]) -> Measure:
@@ -194,14 +194,14 @@ class Record:
     @cached_property
     def entries(self) -> tuple[Entry, ...]:
         """The suite's controllers, then others that have rows, by name."""
-        own = {entry.contender.name for entry in self.suite.entries}
+        own = {entry.spec.name for entry in self.suite.entries}
         others = sorted({name for name, _ in self.rows} - own)
-        return (*self.suite.entries, *(Entry(Contender(name)) for name in others))
+        return (*self.suite.entries, *(Entry(ControllerSpec(name)) for name in others))
 
     def done(self, entry: Entry) -> tuple[int, int]:
         """How many of a controller's cases have a row, and how many there are."""
         wanted = [e for e in self.suite.episodes if entry.does(e.task)]
-        return sum((entry.contender.name, e) in self.rows for e in wanted), len(wanted)
+        return sum((entry.spec.name, e) in self.rows for e in wanted), len(wanted)
 
     def whole(self, tasks: tuple[str, ...]) -> list[Entry]:
         """Controllers that have a row for every episode of these tasks."""
@@ -209,7 +209,7 @@ class Record:
         return [
             entry
             for entry in self.entries
-            if all((entry.contender.name, episode) in self.rows for episode in episodes)
+            if all((entry.spec.name, episode) in self.rows for episode in episodes)
         ]
 
     def errors(self, measure: Measure) -> Errors:
@@ -218,10 +218,10 @@ class Record:
         As long as none did, of those that ran some, in the cases that all of them ran.
         """
         episodes = [e for e in self.suite.episodes if e.task in measure.tasks]
-        names = [entry.contender.name for entry in self.whole(measure.tasks)]
+        names = [entry.spec.name for entry in self.whole(measure.tasks)]
         if not names:
             begun = {name for name, e in self.rows if e.task in measure.tasks}
-            names = [e.contender.name for e in self.entries if e.contender.name in begun]
+            names = [e.spec.name for e in self.entries if e.spec.name in begun]
             episodes = [e for e in episodes if all((name, e) in self.rows for name in names)]
         values = [[measure.of_row(self.rows[name, e]) for e in episodes] for name in names]
         array = np.array(values, dtype=np.float64).reshape(len(names), len(episodes))
@@ -236,4 +236,4 @@ class Record:
 
 def is_bound(name: str) -> bool:
     """Whether a controller may see the true plant: no rival, but what rivals are measured by."""
-    return Contender(name).is_bound
+    return ControllerSpec(name).is_bound

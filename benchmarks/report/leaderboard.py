@@ -47,7 +47,7 @@ class Leaderboard:
     def labels(self) -> dict[str, str]:
         """What people call the controllers, by name, in the suite's order."""
         titles = {name: entry["title"] for name, entry in self.info.get("contenders", {}).items()}
-        entries = (entry.contender for entry in self.record.entries)
+        entries = (entry.spec for entry in self.record.entries)
         return {each.name: each.title or titles.get(each.name, each.name) for each in entries}
 
     @cached_property
@@ -65,8 +65,8 @@ class Leaderboard:
         if all(len(each.tasks) == 1 for each in measures(self.suite.tasks)):
             return {}
         single = [Measure(t, (t,), task_of(t).protocol.unit) for t in self.suite.tasks]
-        found = {measure.name: self.standings_of(measure) for measure in single}
-        return {name: each for name, each in found.items() if each.errors.values.size}
+        standings = {measure.name: self.standings_of(measure) for measure in single}
+        return {name: each for name, each in standings.items() if each.errors.values.size}
 
     def standings_of(self, measure: Measure) -> Standings:
         """Standings in a measure."""
@@ -128,16 +128,16 @@ class Leaderboard:
     @cached_property
     def loops(self) -> dict[str, list[Condition]]:
         """Loops of the linear controllers, by task, at its lowest, middle and highest pressure."""
-        found = {}
+        by_task = {}
         for task in self.suite.tasks:
-            names = [e.contender.name for e in self.record.entries if e.does(task)]
+            names = [e.spec.name for e in self.record.entries if e.does(task)]
             own = [CONTROLLERS[name]() for name in names if name in CONTROLLERS]
             if task in LOOP_TASKS and any(map(is_linear, own)):
-                found[task] = conditions(own, self._told(task))
-        return found
+                by_task[task] = conditions(own, self._station_infos(task))
+        return by_task
 
-    def _told(self, task: str) -> list[StationInfo]:
-        """What controllers are told at three pressures of a task."""
+    def _station_infos(self, task: str) -> list[StationInfo]:
+        """What controllers receive at three pressures of a task."""
         suite, environment = self.suite, self.suite.environment
         kpa = sorted({e.pressure_kpa for e in suite.episodes if e.task == task})
         delays = [environment.get(f"{name}_delay_s", 0.0) for name in ("action", "observation")]

@@ -36,7 +36,7 @@ COLUMN_IN, AXIS_IN = 3.4, 0.8
 """Width of a pressure's panels, and of what stands beside them all (inches)."""
 
 
-def loop_title(found: Sequence[Condition]) -> str:
+def loop_title(conditions: Sequence[Condition]) -> str:
     """What people call the task of loops: its name, and the load that the regulator works against.
 
     >>> from pma_gym.plant.model import load_model
@@ -47,23 +47,25 @@ def loop_title(found: Sequence[Condition]) -> str:
     Rotation
     Triangle low, against 150 N
     """
-    task = found[0].station.task
+    task = conditions[0].station.task
     words = capital(task.name.replace("_", " "))
     return f"{words}, against {task.load:g} N" if task.actuator == "regulator" else words
 
 
-def margin_table(found: Sequence[Condition], labels: Labels) -> TextTable:
+def margin_table(conditions: Sequence[Condition], labels: Labels) -> TextTable:
     """The least margins over the stroke of every controller at every pressure."""
     header = ["Controller", "Pressure (kPa)", "Gain margin | factor", "Gain margin | dB"]
     header += ["Phase margin (deg)", "Delay margin (ms)", "Largest sensitivity"]
     header += ["Crossover (Hz)", "Closed loop"]
     rows = []
-    for name in dict.fromkeys(loop.name for condition in found for loop in condition.everywhere):
-        for condition in found:
+    for name in dict.fromkeys(
+        loop.name for condition in conditions for loop in condition.everywhere
+    ):
+        for condition in conditions:
             mine = [loop for loop in condition.everywhere if loop.name == name]
             if mine:
                 rows.append([labels.get(name, name), *_margin_cells(condition, mine)])
-    title = f"{loop_title(found)}: least margins at 5, 50 and 95 % of the stroke"
+    title = f"{loop_title(conditions)}: least margins at 5, 50 and 95 % of the stroke"
     return TextTable(title, header, rows)
 
 
@@ -84,12 +86,12 @@ def _margin_cells(condition: Condition, mine: Sequence[Loop]) -> list[str]:
     ]
 
 
-def loop_plot(found: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
+def loop_plot(conditions: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
     """Bode plots and step responses: a column a pressure."""
-    unit = found[0].station.task.protocol.unit
-    with picture(COLUMN_IN * len(found) + AXIS_IN, 11.2) as canvas:
-        axes: Any = canvas.subplots(4, len(found), sharex="row", sharey="row", squeeze=False)
-        for column, condition in zip(axes.T, found, strict=True):
+    unit = conditions[0].station.task.protocol.unit
+    with picture(COLUMN_IN * len(conditions) + AXIS_IN, 11.2) as canvas:
+        axes: Any = canvas.subplots(4, len(conditions), sharex="row", sharey="row", squeeze=False)
+        for column, condition in zip(axes.T, conditions, strict=True):
             for loop in condition.pictured:
                 _draw(column, loop, condition.station, styles[loop.name])
             column[0].axhline(0.0, color="black", linewidth=0.8)
@@ -111,12 +113,12 @@ def loop_plot(found: Sequence[Condition], styles: Mapping[str, Style]) -> bytes:
         axes[0, 0].set_ylim(-40.0, 60.0)
         axes[1, 0].set_ylim(-360.0, 0.0)
         axes[1, 0].set_yticks(range(-360, 1, 90))
-        names = dict.fromkeys(loop.name for c in found for loop in c.pictured)
+        names = dict.fromkeys(loop.name for c in conditions for loop in c.pictured)
         handles = [
             Line2D([], [], color=styles[n].color, linestyle=styles[n].line, label=styles[n].label)
             for n in names
         ]
-        legend_below(canvas, handles, min(len(handles), 2 * len(found)))
+        legend_below(canvas, handles, min(len(handles), 2 * len(conditions)))
         return png(canvas)
 
 

@@ -79,7 +79,7 @@ class Condition(NamedTuple):
     """Loops of all linear controllers at one pressure.
 
     Attributes:
-        station: what they are told.
+        station: what they receive.
         everywhere: loops at all places of the stroke.
     """
 
@@ -94,8 +94,8 @@ class Condition(NamedTuple):
     @property
     def pictured(self) -> list[Loop]:
         """Loops in the middle of the stroke, in the first direction of motion."""
-        found = [loop for loop in self.everywhere if loop.share == MIDDLE]
-        return [loop for loop in found if loop.direction == found[0].direction]
+        middle = [loop for loop in self.everywhere if loop.share == MIDDLE]
+        return [loop for loop in middle if loop.direction == middle[0].direction]
 
 
 def conditions(
@@ -117,19 +117,19 @@ def loops(
 
     Args:
         controllers: those that are not linear are left out.
-        station: what they are told.
+        station: what they receive.
         shares: places, as shares of the task's range.
     """
     linear = [each for each in controllers if isinstance(each, LinearController)]
-    found = []
+    every = []
     for place in _different(linearised(station, shares)):
         plant, load = sampled(place, station), sampled(place, station, "motor")
         for each in linear:
             law = each.linear(station, place.share * station.task.protocol.span)
             check_law(each.name, law, station.period)
             known = margins(plant, law)
-            found.append(Loop(each.name, place.share, place.direction, plant, load, law, known))
-    return found
+            every.append(Loop(each.name, place.share, place.direction, plant, load, law, known))
+    return every
 
 
 def _different(places: Iterable[Place]) -> list[Place]:
@@ -208,19 +208,19 @@ def closed_poles(loop: control.StateSpace) -> NDArray[np.complex128]:
     return np.asarray(closed.poles())
 
 
-def worst(found: Sequence[Loop]) -> Margins:
+def worst(loops_: Sequence[Loop]) -> Margins:
     """The least margins of several loops: of a controller at all places of the stroke."""
 
     def least(field: Callable[[Margins], float]) -> float:
-        return min(field(loop.margins) for loop in found)
+        return min(field(loop.margins) for loop in loops_)
 
     return Margins(
-        stable=all(loop.margins.stable for loop in found),
+        stable=all(loop.margins.stable for loop in loops_),
         gain=least(lambda m: m.gain),
         phase=least(lambda m: m.phase),
         delay=least(lambda m: m.delay),
-        sensitivity=max(loop.margins.sensitivity for loop in found),
-        crossover=max(loop.margins.crossover for loop in found),
+        sensitivity=max(loop.margins.sensitivity for loop in loops_),
+        crossover=max(loop.margins.crossover for loop in loops_),
     )
 
 
@@ -241,5 +241,5 @@ def load_step(loop: Loop, duration: float) -> tuple[NDArray, NDArray]:
 def _step(system: Any, duration: float) -> tuple[NDArray, NDArray]:  # noqa: ANN401
     period = float(system.dt)
     times = period * np.arange(round(duration / period) + 1)
-    found = control.step_response(system, times)
-    return times, np.squeeze(np.asarray(found.outputs))
+    response = control.step_response(system, times)
+    return times, np.squeeze(np.asarray(response.outputs))

@@ -65,7 +65,10 @@ def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
 def loop_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     """Plots of the linear controllers' loops, as PNG by name."""
     styles = styles_of(leaderboard.labels)
-    return {f"loops_{task}": loop_plot(found, styles) for task, found in leaderboard.loops.items()}
+    return {
+        f"loops_{task}": loop_plot(conditions, styles)
+        for task, conditions in leaderboard.loops.items()
+    }
 
 
 def _opening(leaderboard: Leaderboard) -> list[Block]:
@@ -76,7 +79,7 @@ def _opening(leaderboard: Leaderboard) -> list[Block]:
     text = (
         f"{suite.title}. Suite `{suite.name}`, version {suite.version}: {len(suite.stations)} "
         f"station{'s' if len(suite.stations) > 1 else ''}, {len(suite.episodes)} episodes of "
-        f"{', '.join(suite.tasks)}; {environment}. Controllers are told model `{suite.model}`. "
+        f"{', '.join(suite.tasks)}; {environment}. Controllers receive model `{suite.model}`. "
         "Every trial is scored on the true motion at 384 Hz."
     )
     blocks: list[Block] = [Heading(f"Leaderboard: {suite.name}", 1), Paragraph(text)]
@@ -88,11 +91,11 @@ def _notes(leaderboard: Leaderboard) -> list[str]:
     """What the reader must know before the first figure: what is missing."""
     labels, notes = leaderboard.labels, []
     if leaderboard.missing:
-        names = ", ".join(labels[entry.contender.name] for entry in leaderboard.missing)
+        names = ", ".join(labels[entry.spec.name] for entry in leaderboard.missing)
         notes.append(f"**Not run: {names}.**")
     if leaderboard.incomplete:
         counts = ", ".join(
-            f"{labels[entry.contender.name]} ({done} of {wanted} cases)"
+            f"{labels[entry.spec.name]} ({done} of {wanted} cases)"
             for entry, done, wanted in leaderboard.incomplete
         )
         notes.append(
@@ -110,14 +113,16 @@ def _notes(leaderboard: Leaderboard) -> list[str]:
 
 def _shown(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
     """Standings with somebody in them, with or without that of all tasks together."""
-    found = [each for each in leaderboard.standings.values() if each.errors.values.size]
-    return found if pooled else [each for each in found if each.errors.measure.unit != PERCENT]
+    standings = [each for each in leaderboard.standings.values() if each.errors.values.size]
+    return (
+        standings if pooled else [each for each in standings if each.errors.measure.unit != PERCENT]
+    )
 
 
 def _headline(leaderboard: Leaderboard) -> Standings | None:
     """The measure that all controllers are compared in: all tasks, or the only one."""
-    found = _shown(leaderboard, pooled=True)
-    return found[-1] if found else None
+    standings = _shown(leaderboard, pooled=True)
+    return standings[-1] if standings else None
 
 
 def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
@@ -224,12 +229,12 @@ def _loop_blocks(leaderboard: Leaderboard) -> list[Block]:
         "The step of the reference is through the feedback alone."
     )
     blocks: list[Block] = [Heading("For the engineer: loops and margins"), Paragraph(text)]
-    for task, found in leaderboard.loops.items():
+    for task, conditions in leaderboard.loops.items():
         caption = (
-            f"{loop_title(found)}: Bode plot of the loop in the middle of the stroke, response to "
-            "a step of the reference and to a step of the load; unstable loops have no step."
+            f"{loop_title(conditions)}: Bode plot of the loop in the middle of the stroke, "
+            "response to a step of the reference and of the load; unstable loops have no step."
         )
-        blocks += [margin_table(found, leaderboard.labels), Picture(f"loops_{task}", caption)]
+        blocks += [margin_table(conditions, leaderboard.labels), Picture(f"loops_{task}", caption)]
     return blocks
 
 

@@ -24,12 +24,12 @@ THRESHOLDS = 120
 """Points of a performance profile."""
 
 
-def distribution_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+def distribution_plot(every: Sequence[Standings], styles: Styles) -> bytes:
     """Where each controller's cases lie, and its interquartile mean with its interval."""
-    most = max(len(standings.rows) for standings in found)
-    with picture(11.0, 0.9 + len(found) * (0.75 + 0.27 * most)) as canvas:
-        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
-        for axis, standings in zip(axes[:, 0], found, strict=True):
+    most = max(len(standings.rows) for standings in every)
+    with picture(11.0, 0.9 + len(every) * (0.75 + 0.27 * most)) as canvas:
+        axes: Any = canvas.subplots(len(every), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], every, strict=True):
             _boxes(axis, standings, styles)
         handles = [
             Line2D([], [], color=_GREY, linewidth=1.1, label="5–95 % of the cases"),
@@ -89,11 +89,11 @@ def _boxes(axis: Any, standings: Standings, styles: Styles) -> None:  # noqa: AN
     axis.set_title(capital(measure.name), loc="left")
 
 
-def profile_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+def profile_plot(every: Sequence[Standings], styles: Styles) -> bytes:
     """Share of the cases with an error up to a threshold, with 95 % bands."""
-    with picture(11.0, 0.9 + 3.6 * len(found)) as canvas:
-        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
-        for axis, standings in zip(axes[:, 0], found, strict=True):
+    with picture(11.0, 0.9 + 3.6 * len(every)) as canvas:
+        axes: Any = canvas.subplots(len(every), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], every, strict=True):
             errors = standings.errors
             positive = errors.values[errors.values > 0.0]
             thresholds = np.geomspace(positive.min() * 0.9, positive.max() * 1.1, THRESHOLDS)
@@ -117,7 +117,7 @@ def profile_plot(found: Sequence[Standings], styles: Styles) -> bytes:
             axis.set_ylabel("cases (%)")
             axis.set_xlabel(f"RMSE at most ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
-        legend_below(canvas, _handles(found, styles), 4)
+        legend_below(canvas, _handles(every, styles), 4)
         return png(canvas)
 
 
@@ -126,11 +126,11 @@ def _marked(share: np.ndarray, place: float) -> int:
     return int(np.argmax(share >= 0.15 + 0.7 * place))
 
 
-def pressure_plot(found: Sequence[Standings], styles: Styles) -> bytes:
+def pressure_plot(every: Sequence[Standings], styles: Styles) -> bytes:
     """Median error of every controller at every pressure, with the middle half of the best."""
-    with picture(11.0, 0.9 + 3.2 * len(found)) as canvas:
-        axes: Any = canvas.subplots(len(found), 1, squeeze=False)
-        for axis, standings in zip(axes[:, 0], found, strict=True):
+    with picture(11.0, 0.9 + 3.2 * len(every)) as canvas:
+        axes: Any = canvas.subplots(len(every), 1, squeeze=False)
+        for axis, standings in zip(axes[:, 0], every, strict=True):
             errors = standings.errors
             at_pressure = np.array([episode.pressure_kpa for episode in errors.episodes])
             pressures = np.unique(at_pressure)
@@ -150,7 +150,7 @@ def pressure_plot(found: Sequence[Standings], styles: Styles) -> bytes:
             axis.set_xlabel("pressure (kPa)")
             axis.set_ylabel(f"median RMSE ({errors.measure.unit})")
             axis.set_title(capital(errors.measure.name), loc="left")
-        legend_below(canvas, _handles(found, styles), 4)
+        legend_below(canvas, _handles(every, styles), 4)
         return png(canvas)
 
 
@@ -198,9 +198,9 @@ def _logarithmic(line: Any, axis: Any) -> None:  # noqa: ANN401
     line.grid(visible=True, which="minor", color="#eef0f3")
 
 
-def _handles(found: Sequence[Standings], styles: Styles) -> list[Line2D]:
+def _handles(every: Sequence[Standings], styles: Styles) -> list[Line2D]:
     """Entries of a legend, in the order of the styles."""
-    shown = {name for standings in found for name in standings.errors.names}
+    shown = {name for standings in every for name in standings.errors.names}
     return [
         Line2D([], [], color=s.color, marker=s.marker, linestyle=s.line, label=s.label)
         for name, s in styles.items()

@@ -107,11 +107,11 @@ def numbers_csv(leaderboard: Leaderboard) -> str:
         measure, cases = standings.errors.measure, len(standings.errors.episodes)
         for row in standings.rows:
             ranks = [row.rank.best, row.rank.worst] if row.rank else ["", ""]
-            found = [getattr(row, each) or (None, None, None) for each in intervals]
+            values = [getattr(row, each) or (None, None, None) for each in intervals]
             rows.append(
                 [suite.name, suite.version, name, measure.unit, row.name, cases, row.failures]
                 + [*ranks, row.percent]
-                + [value for interval in found for value in interval]
+                + [value for interval in values for value in interval]
             )
     return _csv(header, rows)
 

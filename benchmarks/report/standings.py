@@ -155,10 +155,10 @@ class Standings:
     def pairs(self) -> list[Pair]:
         """Every controller against every other, rivals and bounds."""
         places = {at: place for place, at in enumerate(self.rivals)}
-        found = []
+        pairs_ = []
         for first, second in permutations(range(len(self.errors.names)), 2):
             both = first in places and second in places
-            found.append(
+            pairs_.append(
                 Pair(
                     self.errors.names[first],
                     self.errors.names[second],
@@ -167,4 +167,4 @@ class Standings:
                     both and bool(self.ranking.separated[places[first], places[second]]),
                 )
             )
-        return found
+        return pairs_

@@ -190,8 +190,10 @@ def interval(
 def positive_interval(estimate: float, replicates: NDArray[np.float64], draws: Draws) -> Interval:
     """The same of a figure above 0, such as an error or a ratio: widened as a factor."""
     middle = np.log(max(estimate, SMALLEST))
-    found = interval(middle, np.log(np.maximum(replicates, SMALLEST)), draws)
-    return Interval(float(estimate), float(np.exp(found.low)), float(np.exp(found.high)))
+    logarithmic = interval(middle, np.log(np.maximum(replicates, SMALLEST)), draws)
+    return Interval(
+        float(estimate), float(np.exp(logarithmic.low)), float(np.exp(logarithmic.high))
+    )
 
 
 def profile(

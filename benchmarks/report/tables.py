@@ -103,14 +103,17 @@ def exercise_table(
     return TextTable(title, ["Controller", *EXERCISE_FIGURES.values()], rows)
 
 
-def tasks_table(found: Mapping[str, Standings], labels: Labels) -> TextTable:
+def tasks_table(standings: Mapping[str, Standings], labels: Labels) -> TextTable:
     """Interquartile mean of every controller in every single task."""
-    columns = [{row.name: row.mean for row in each.rows} for each in found.values()]
+    columns = [{row.name: row.mean for row in each.rows} for each in standings.values()]
     names = [name for name in labels if any(name in column for column in columns)]
-    units = [each.errors.measure.unit for each in found.values()]
+    units = [each.errors.measure.unit for each in standings.values()]
     header = [
         "Controller",
-        *(f"{task.replace('_', ' ')} ({unit})" for task, unit in zip(found, units, strict=True)),
+        *(
+            f"{task.replace('_', ' ')} ({unit})"
+            for task, unit in zip(standings, units, strict=True)
+        ),
     ]
     rows = [
         [
@@ -123,13 +126,13 @@ def tasks_table(found: Mapping[str, Standings], labels: Labels) -> TextTable:
 
 
 def obstacle_table(
-    obstacles: Mapping[tuple[str, float], str], found: Sequence[Standings]
+    obstacles: Mapping[tuple[str, float], str], every: Sequence[Standings]
 ) -> TextTable:
     """What keeps the actuator from following, and what the bound and the best rival reach."""
     rows = []
     for (task, kpa), why in sorted(obstacles.items()):
         # On the way there a motor pulls; what it cannot do shows on the way back.
-        *_, standings = (each for each in found if task in each.errors.measure.tasks)
+        *_, standings = (each for each in every if task in each.errors.measure.tasks)
         errors = standings.errors
         names = [at if at is None else errors.names[at] for at in _leaders(standings)]
         cells = [
@@ -195,11 +198,11 @@ def figure(value: float) -> str:
     return f"{value:.{min(decimals, 6)}f}"
 
 
-def ends(found: Interval) -> str:
+def ends(interval: Interval) -> str:
     """The ends of an interval; nothing where it is not known."""
-    if np.isnan(found.low):
+    if np.isnan(interval.low):
         return ""
-    return f"[{figure(found.low)}, {figure(found.high)}]"
+    return f"[{figure(interval.low)}, {figure(interval.high)}]"
 
 
 def _short(value: float) -> str:

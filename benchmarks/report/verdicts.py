@@ -66,7 +66,7 @@ def verdicts(
         units: of the measures, by name.
         bound: the achievable bound.
     """
-    found = []
+    results = []
     for target in targets:
         known = standings.get(target.measure)
         if target.figure == "to_other":
@@ -76,8 +76,8 @@ def verdicts(
         else:
             those = [_of_all(target, known, labels)]
         unit = UNITS.get(target.figure, units.get(target.measure, ""))
-        found += [verdict._replace(unit=unit) for verdict in those]
-    return found
+        results += [verdict._replace(unit=unit) for verdict in those]
+    return results
 
 
 def _of_one(
@@ -115,12 +115,12 @@ def largest_excess(means: Mapping[tuple[str, float], float], bound: Bound) -> fl
     >>> largest_excess({("rotation", 300.0): 0.3, ("rotation", 500.0): 0.2}, lambda *trial: 0.0625)
     0.2375
     """
-    found = -np.inf
+    largest = -np.inf
     for trial, mean in sorted(means.items(), key=lambda item: -item[1]):
-        if mean <= found:
+        if mean <= largest:
             break
-        found = max(found, mean - bound(*trial))
-    return found
+        largest = max(largest, mean - bound(*trial))
+    return largest
 
 
 def bounds_needed(
@@ -185,4 +185,4 @@ def mean_by_trial(standings: Standings, name: str) -> dict[tuple[str, float], fl
     values = standings.errors.of(name)
     for episode, value in zip(standings.errors.episodes, values, strict=True):
         by_trial.setdefault((episode.task, episode.pressure_kpa), []).append(float(value))
-    return {trial: float(np.mean(found)) for trial, found in by_trial.items()}
+    return {trial: float(np.mean(errors)) for trial, errors in by_trial.items()}

@@ -70,12 +70,12 @@ def replay_errors(results: Results, model: str, task: str, phase: str) -> list[R
 
 def all_replay_errors(results: Results, model: str) -> dict[tuple[str, str], list[ReplayError]]:
     """Errors of the replay by task and phase, for the phases that were run."""
-    found = {
+    by_phase = {
         (task, phase): replay_errors(results, model, task, phase)
         for task, phases in PHASES.items()
         for phase in phases
     }
-    return {key: errors for key, errors in found.items() if errors}
+    return {key: errors for key, errors in by_phase.items() if errors}
 
 
 def summarise(errors: Sequence[ReplayError]) -> ReplaySummary:

@@ -1,4 +1,4 @@
-"""What a run found, as rows and as files that appear whole or not at all."""
+"""Results of a run, as rows and as files that appear whole or not at all."""
 
 import csv
 import io
@@ -113,7 +113,7 @@ def csv_text(scores: Iterable[Score]) -> str:
 
 
 def json_text(results: Results, **more: object) -> str:
-    """Everything that the run found, with what it was made of.
+    """All results of the run, with what it was made of.
 
     Args:
         results: the run.

@@ -38,7 +38,7 @@ ROTATION_TABLES = tuple(f"I{number}" for number in range(13, 21))
 """Printed voltages of the rotation trials, a pressure each."""
 
 
-class Reading(NamedTuple):
+class RotationReading(NamedTuple):
     """How a potentiometer may have been read.
 
     Attributes:
@@ -65,9 +65,9 @@ class Reading(NamedTuple):
         return np.where(wound < self.gap_deg * DEG, 0.0, factor * wound)
 
 
-def reading(gain: float, gap_deg: float, slack: float) -> Reading:
+def reading(gain: float, gap_deg: float, slack: float) -> RotationReading:
     """A reading by its gain on the true angle, its gap (deg) and the slack (m) taken up."""
-    return Reading(gain * CALIBRATED_DEG_PER_V, CALIBRATED_DEG_PER_V, gap_deg, slack)
+    return RotationReading(gain * CALIBRATED_DEG_PER_V, CALIBRATED_DEG_PER_V, gap_deg, slack)
 
 
 DECODED_DEG_PER_V = 64.0
@@ -80,10 +80,10 @@ GAP_DEG = 20.0
 """360 deg of a turn less the part's 340 electrical ones."""
 
 
-def declared(plant: Plant) -> Reading:
+def declared(plant: Plant) -> RotationReading:
     """The declared reading, with the slack that a plant has to be freed of."""
     slack = plant.model.parameters["cable"].slack
-    return Reading(DECODED_DEG_PER_V, CALIBRATED_DEG_PER_V, GAP_DEG, slack)
+    return RotationReading(DECODED_DEG_PER_V, CALIBRATED_DEG_PER_V, GAP_DEG, slack)
 
 
 def rotation_trial(plant: Plant, table: str) -> Trial:
@@ -103,7 +103,7 @@ def rotation_trial(plant: Plant, table: str) -> Trial:
     return plant.simulate(Trial(time, commands), noise=False)
 
 
-def read_trial(trial: Trial, reading: Reading, radius: float) -> Trial:
+def read_trial(trial: Trial, reading: RotationReading, radius: float) -> Trial:
     """A trial whose true rotation is what a reading makes of it."""
     read = {**trial.truth, "rotation": reading.of(np.asarray(trial.truth["rotation"]), radius)}
     return Trial(trial.time, trial.commands, truth=read)
@@ -129,11 +129,11 @@ class ReadTrial:
 def read_trials(plant: Plant) -> list[ReadTrial]:
     """All rotation trials on a station, plain and through the declared reading."""
     radius, reading = plant.model.parameters["rotor"].radius, declared(plant)
-    found = []
+    trials = []
     for table in ROTATION_TABLES:
         pressure = float(load_table(table)["pressure_kpa"][0])
         trial = rotation_trial(plant, table)
-        found.append(
+        trials.append(
             ReadTrial(
                 pressure,
                 {name: measured_score("rotation", name, pressure) for name in PHASES["rotation"]},
@@ -141,7 +141,7 @@ def read_trials(plant: Plant) -> list[ReadTrial]:
                 score_trial(read_trial(trial, reading, radius), "rotation"),
             )
         )
-    return found
+    return trials
 
 
 def mean_absolute_error(trials: list[ReadTrial], read: bool, figure: str = "rmse") -> float:

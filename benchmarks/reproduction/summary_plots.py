@@ -35,8 +35,8 @@ def rmse_plot(results: Results, task: str) -> bytes:
             measured = [measured_score(task, phase, pressure).rmse for pressure in pressures]
             axis.plot(pressures, measured, **MEASURED)
             for name, style in styles.items():
-                found = [results.phase(suite.models[0], name, task, p, phase) for p in pressures]
-                values = [score.rmse if score else np.nan for score in found]
+                scores = [results.phase(suite.models[0], name, task, p, phase) for p in pressures]
+                values = [score.rmse if score else np.nan for score in scores]
                 axis.plot(pressures, values, color=style.color, marker=style.marker, markersize=5.5)
             if phase == "III" and results.bounds:
                 axis.plot(pressures, [results.bounds.get(p, np.nan) for p in pressures], **BOUND)

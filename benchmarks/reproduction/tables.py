@@ -24,13 +24,13 @@ Figures = Callable[[float], PhaseScore | None]
 
 def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Figures]:
     """Who stands in a table, measured first, and the figures of each by pressure."""
-    found: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
+    by_title: dict[str, Figures] = {MEASURED: lambda p: measured_score(task, phase, p)}
     for controller in results.suite.controllers:
         if not results.suite.does(controller, model):
             continue
         name = controller.name
-        found[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)
-    return found
+        by_title[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)
+    return by_title
 
 
 def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from benchmarks.reproduction.replay import replay_errors, summarise
 from benchmarks.reproduction.results import Results
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 
 _SIMPLE = {"slope": "mm/s", "intercept": "mm", "rmse": "mm"}
 _NAMES = {"slope": "slope", "intercept": "intercept", "rmse": "RMSE"}
@@ -80,9 +80,9 @@ def _replay_checks(results: Results) -> list[Check]:
     ]
 
 
-def _feedback_checks(results: Results, contender: Contender) -> list[Check]:
+def _feedback_checks(results: Results, spec: ControllerSpec) -> list[Check]:
     targets = results.suite.targets
-    label, controller = contender.label, contender.name
+    label, controller = spec.label, spec.name
     moving = [_worst(results, controller, "rotation", phase) for phase in ("I", "II")]
     known = [value for value in moving if value is not None]
     return [

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.runner.figures import Episode as Measured
 from benchmarks.runner.figures import figures
 from benchmarks.runner.isolated_controller import Isolated, driver
@@ -40,18 +40,18 @@ class Case:
 
     Attributes:
         suite: name of the suite, or path of its file.
-        contender: who drives.
+        spec: who drives.
         episode: what it drives.
     """
 
     suite: str
-    contender: Contender
+    spec: ControllerSpec
     episode: Episode
 
     @property
     def name(self) -> str:
         """What tells it from the suite's others: `pid/17/rotation/300/0`."""
-        return f"{self.contender.name}/{self.episode.name}"
+        return f"{self.spec.name}/{self.episode.name}"
 
 
 def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
@@ -61,7 +61,7 @@ def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
     interrupted compares them all. Tasks that a controller cannot do by its rule are left out.
     """
     return [
-        Case(suite.source, entry.contender, episode)
+        Case(suite.source, entry.spec, episode)
         for episode in suite.episodes
         for entry in entries
         if entry.does(episode.task)
@@ -79,17 +79,17 @@ def run_case(case: Case, model: Model | None = None) -> Row:
     Raises:
         Exception: whatever the controller or the environment raised.
     """
-    suite, contender = frozen_suite(case.suite), case.contender
+    suite, spec = frozen_suite(case.suite), case.spec
     environment = PMAEnv(
         task=case.episode.task,
         model=model or suite.station(case.episode.station).model,
         pressure_kpa=case.episode.pressure_kpa,
         **suite.environment,
     )
-    controller = driver(contender, environment.options.period)
-    told = nominal_model(environment.task, suite.nominal)
+    controller = driver(spec, environment.options.period)
+    nominal = nominal_model(environment.task, suite.nominal)
     seed = suite.seed_of(case.episode)
-    done = rollout(environment, controller, seed, told, reveal=contender.is_bound)
+    done = rollout(environment, controller, seed, nominal, reveal=spec.is_bound)
     if isinstance(controller, Isolated):
         done = replace(done, act_seconds=np.array(controller.act_seconds))
     share, farthest = done.clipped
@@ -104,11 +104,11 @@ def _figures(done: Rollout, environment: PMAEnv) -> Row:
     actuator = 1 if done.task.actuator == "regulator" else 0
     measured = Measured(done.position, done.commands[:, actuator], done.truth, done.act_seconds)
     limits = environment.plant.model.parameters["limits"]
-    found = figures(done.task, measured, done.period, limits).to_json()
+    row = figures(done.task, measured, done.period, limits).to_json()
     if done.task.exercise is None:
-        return found
+        return row
     summary = environment.episode_summary()
-    return found | {"exercise": {name: summary[name] for name in EXERCISE_FIGURES}}
+    return row | {"exercise": {name: summary[name] for name in EXERCISE_FIGURES}}
 
 
 def blank_row(case: Case) -> Row:
@@ -117,7 +117,7 @@ def blank_row(case: Case) -> Row:
     return {
         "suite": suite.name,
         "version": suite.version,
-        "controller": case.contender.name,
+        "controller": case.spec.name,
         **episode._asdict(),
         "seed": suite.seed_of(episode),
         "failure": "",

@@ -24,11 +24,11 @@ POLICY_FILES = (".json", ".safetensors")
 
 
 class ControllerError(ValueError):
-    """A controller that cannot be scored; the message says why and how to mend it."""
+    """A controller that cannot be scored; the message says why and how to fix it."""
 
 
 @dataclass(frozen=True)
-class Contender:
+class ControllerSpec:
     """A controller by its name; made anew for every case, in the process that runs the case.
 
     Attributes:
@@ -122,7 +122,7 @@ class Contender:
         return controller
 
 
-def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contender]:
+def parse_controllers(text: str, known: Sequence[ControllerSpec] = ()) -> list[ControllerSpec]:
     """Controllers from a list as the command line has it: `pid,path/to/mine.py:MyController`.
 
     Args:
@@ -131,22 +131,22 @@ def parse_contenders(text: str, known: Sequence[Contender] = ()) -> list[Contend
     Raises:
         ControllerError: one that cannot be made; each is tried.
     """
-    titled = {contender.name: contender for contender in known}
-    contenders = []
+    titled = {spec.name: spec for spec in known}
+    specs = []
     for item in (part.strip() for part in text.split(",")):
         if not item:
             raise ControllerError(f"an empty name in {text!r}; separate controllers by one comma")
         path, colon, name = item.rpartition(":")
         if item.endswith(".py") or (colon and not name):
             raise ControllerError(f"{item} names no class; write {item.rstrip(':')}:ClassName")
-        contender = _policy(item) or (
-            Contender(name, path=path) if colon else titled.get(item, Contender(item))
+        spec = _policy(item) or (
+            ControllerSpec(name, path=path) if colon else titled.get(item, ControllerSpec(item))
         )
-        made = contender.make()
-        if contender.path and not contender.title:
-            contender = replace(contender, title=_own_name(made))
-        contenders.append(contender)
-    return contenders
+        made = spec.make()
+        if spec.path and not spec.title:
+            spec = replace(spec, title=_own_name(made))
+        specs.append(spec)
+    return specs
 
 
 def _loaded(path: str) -> Policy:
@@ -166,7 +166,7 @@ def shipped_algorithm(name: str) -> str:
     return getattr(CONTROLLERS.get(name), "algorithm", "")
 
 
-def _policy(item: str) -> Contender | None:
+def _policy(item: str) -> ControllerSpec | None:
     """A policy's file, or a folder of policies with their algorithm (`folder:ppo`); else None.
 
     Raises:
@@ -174,16 +174,16 @@ def _policy(item: str) -> Contender | None:
     """
     if item.endswith(POLICY_FILES):
         words, _ = policy_pair(item)
-        return Contender(words.stem, path=str(words))
+        return ControllerSpec(words.stem, path=str(words))
     path, colon, algorithm = item.rpartition(":")
     if not colon or not Path(path).is_dir():
         return None
     folder = Path(path)
-    contender = Contender(f"{folder.name}-{algorithm}", path=path, algorithm=algorithm)
-    if not contender.kinds:
+    spec = ControllerSpec(f"{folder.name}-{algorithm}", path=path, algorithm=algorithm)
+    if not spec.kinds:
         has = ", ".join(file.stem for file in shipped_policies(folder)) or "no policy at all"
         raise ControllerError(f"{folder} has no policy of {algorithm!r}; it has {has}")
-    return replace(contender, title=f"{algorithm}, {folder.name}")
+    return replace(spec, title=f"{algorithm}, {folder.name}")
 
 
 def _own_name(controller: Controller) -> str:
@@ -192,19 +192,19 @@ def _own_name(controller: Controller) -> str:
     return name.strip() if isinstance(name, str) else ""
 
 
-def _class_of(contender: Contender) -> type:
+def _class_of(spec: ControllerSpec) -> type:
     """The contender's class, from its file."""
-    module = _module(Path(contender.path))
-    found = getattr(module, contender.name, None)
-    if isinstance(found, type):
-        return found
+    module = _module(Path(spec.path))
+    controller_class = getattr(module, spec.name, None)
+    if isinstance(controller_class, type):
+        return controller_class
     classes = [
         name
         for name, value in vars(module).items()
         if isinstance(value, type) and value.__module__ == module.__name__
     ]
     has = f"it has {', '.join(classes)}" if classes else "it has no class"
-    raise ControllerError(f"{contender.path} has no class {contender.name!r}; {has}")
+    raise ControllerError(f"{spec.path} has no class {spec.name!r}; {has}")
 
 
 def _module(path: Path) -> ModuleType:
@@ -259,18 +259,18 @@ def _same_file(name: str, path: Path) -> bool:
     return Path(name).resolve() == path.resolve()
 
 
-def _check_protocol(contender: Contender, controller: object) -> None:
+def _check_protocol(spec: ControllerSpec, controller: object) -> None:
     """Refuse an object that is no `controllers.controller.Controller`."""
     for method, arguments in (("reset", "(reference, station)"), ("act", "(observation, time)")):
-        found = getattr(controller, method, None)
-        if not callable(found):
+        function = getattr(controller, method, None)
+        if not callable(function):
             raise ControllerError(
-                f"{contender.source} has no method {method}{arguments}; a controller needs reset "
+                f"{spec.source} has no method {method}{arguments}; a controller needs reset "
                 f"and act, see {PROTOCOL}"
             )
         try:
-            inspect.signature(found).bind(None, None)
+            inspect.signature(function).bind(None, None)
         except (TypeError, ValueError):
             raise ControllerError(
-                f"{contender.source}: {method} must take {arguments}, see {PROTOCOL}"
+                f"{spec.source}: {method} must take {arguments}, see {PROTOCOL}"
             ) from None

@@ -18,7 +18,7 @@ Identity = tuple[str, Episode]
 
 
 @dataclass(frozen=True)
-class Plan:
+class PendingCases:
     """What is to be run, and what a journal has already.
 
     Attributes:
@@ -43,7 +43,7 @@ class Plan:
 
 def identity(case: Case) -> Identity:
     """What tells a case from its suite's others."""
-    return case.contender.name, case.episode
+    return case.spec.name, case.episode
 
 
 def row_identity(row: Row) -> Identity:
@@ -51,13 +51,13 @@ def row_identity(row: Row) -> Identity:
     return row["controller"], Episode(*(row[name] for name in Episode._fields))
 
 
-def plan(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Plan:
+def pending_cases(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> PendingCases:
     """What a folder's journal lacks of some controllers' cases.
 
     A row counts only if its key is that of now. One whose process died counts as not run.
     """
     entries = tuple(entries)
-    keys = {entry.contender.name: key(suite, entry.contender) for entry in entries}
+    keys = {entry.spec.name: key(suite, entry.spec) for entry in entries}
     wanted = tuple(cases(suite, entries))
     known, outdated = dict[Identity, Row](), 0
     for row in case_rows(out / JOURNAL):
@@ -69,20 +69,20 @@ def plan(suite: FrozenSuite, entries: Iterable[Entry], out: Path) -> Plan:
             known[row_identity(row)] = row
     asked = {identity(case) for case in wanted}
     known = {its: row for its, row in known.items() if its in asked}
-    return Plan(suite, keys, wanted, known, outdated)
+    return PendingCases(suite, keys, wanted, known, outdated)
 
 
 def execute(
-    plan: Plan,
+    todo: PendingCases,
     executor: Executor,
     out: Path,
     on_done: Callable[[Row], None],
     untrusted: bool = False,
 ) -> bool:
-    """Run what a plan lacks; each row is in the folder's journal before `on_done` is called.
+    """Run what is missing; each row is in the folder's journal before `on_done` is called.
 
     Args:
-        plan: what is to be run.
+        todo: what is to be run.
         executor: where the cases run.
         out: folder of the journal.
         on_done: called with each row.
@@ -90,18 +90,18 @@ def execute(
     Returns:
         Whether all of it was run; Ctrl-C ends the run at once, and what is done stays.
     """
-    missing = plan.missing
+    missing = todo.missing
     with Journal(out / JOURNAL) as journal:
 
         def keep(index: int, result: object) -> None:
             case = missing[index]
             row = failed_row(case, result) if isinstance(result, BaseException) else result
             assert isinstance(row, dict)
-            row = {"key": plan.keys[case.contender.name]} | row
+            row = {"key": todo.keys[case.spec.name]} | row
             journal.append(row)
             on_done(row)
 
-        return run_all([_work(case, plan.suite) for case in missing], executor, keep, untrusted)
+        return run_all([_work(case, todo.suite) for case in missing], executor, keep, untrusted)
 
 
 def _work(case: Case, suite: FrozenSuite) -> partial[Row]:

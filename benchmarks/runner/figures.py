@@ -119,9 +119,9 @@ class Figures:
         Raises:
             KeyError: a field is missing.
         """
-        found = {field.name: row[field.name] for field in fields(cls)}
-        found["phases"] = {name: PhaseFigures(**phase) for name, phase in row["phases"].items()}
-        return cls(**found)
+        values = {field.name: row[field.name] for field in fields(cls)}
+        values["phases"] = {name: PhaseFigures(**phase) for name, phase in row["phases"].items()}
+        return cls(**values)
 
 
 def figures(task: Task, episode: Episode, period: float, limits: Any) -> Figures:  # noqa: ANN401

@@ -6,7 +6,7 @@ from functools import cache
 from importlib import metadata
 from pathlib import Path
 
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.frozen import FrozenSuite
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -39,16 +39,16 @@ PACKAGES = ("numpy", "scipy", "control", "osqp", "llvmlite", "gymnasium")
 """Packages whose versions a figure may depend on."""
 
 
-def key(suite: FrozenSuite, contender: Contender) -> str:
+def key(suite: FrozenSuite, spec: ControllerSpec) -> str:
     """Fingerprint of everything that a controller's rows of a suite depend on.
 
     The suite's numbers, this repository's code, the packages' versions, for a controller of
     somebody's own its file, for a policy its files. What such a file imports or reads besides is
     not looked at.
     """
-    parts = [suite.name, str(suite.version), suite.digest, code_digest(), contender.name]
-    if contender.files:
-        parts.append(_digest(contender.files))
+    parts = [suite.name, str(suite.version), suite.digest, code_digest(), spec.name]
+    if spec.files:
+        parts.append(_digest(spec.files))
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 

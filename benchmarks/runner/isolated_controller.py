@@ -13,27 +13,27 @@ from multiprocessing.util import Finalize
 from typing import Any
 
 from benchmarks.runner.controller_process import ControllerProcess
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.runner.rollout import checked_volts
 from benchmarks.runner.user_controller import ACT_S, MAKE_S, RESET_S, Guarded
 from controllers.controller import Controller, Reference
 from pma_gym.envs import Measurement, StationInfo
 
 
-def driver(contender: Contender, period: float, keep_pace: bool = True) -> Controller:
+def driver(spec: ControllerSpec, period: float, keep_pace: bool = True) -> Controller:
     """What drives a case: of a class from a file an `Isolated`, of other files a `Guarded`.
 
     Args:
-        contender: whose controller is made.
+        spec: whose controller is made.
         period: of the control steps (s).
         keep_pace: whether `act` must keep up with the clock.
     Raises:
         ControllerError: it cannot be made.
     """
-    if not contender.path:
-        return contender.make()
-    kind = Guarded if contender.is_policy else Isolated
-    return kind(contender, period, keep_pace)
+    if not spec.path:
+        return spec.make()
+    kind = Guarded if spec.is_policy else Isolated
+    return kind(spec, period, keep_pace)
 
 
 class Isolated:
@@ -42,7 +42,7 @@ class Isolated:
     The process stays for this process's other cases of the same class.
 
     Args:
-        contender: whose controller is made and watched.
+        spec: whose controller is made and watched.
         period: of the control steps (s).
         keep_pace: whether `act` must keep up with the clock.
 
@@ -55,11 +55,11 @@ class Isolated:
         ControllerError: the controller cannot be made.
     """
 
-    def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
-        self._source = contender.source
+    def __init__(self, spec: ControllerSpec, period: float, keep_pace: bool = True) -> None:
+        self._source = spec.source
         self.act_seconds: list[float] = []
-        make = partial(_make, contender, period, keep_pace)
-        making = f"importing and making {contender.name}"
+        make = partial(_make, spec, period, keep_pace)
+        making = f"importing and making {spec.name}"
         self.name, self.repetitions = self._ask(make, making, MAKE_S)
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
@@ -108,9 +108,9 @@ _controller: Guarded
 """In a controller's process: the one of the present case."""
 
 
-def _make(contender: Contender, period: float, keep_pace: bool) -> tuple[str, int]:
+def _make(spec: ControllerSpec, period: float, keep_pace: bool) -> tuple[str, int]:
     global _controller
-    _controller = Guarded(contender, period, keep_pace)
+    _controller = Guarded(spec, period, keep_pace)
     return _controller.name, int(getattr(_controller, "repetitions", 1))
 
 

@@ -13,7 +13,7 @@ from benchmarks.files import write_text
 from benchmarks.runner.case import Row
 from benchmarks.runner.damaged_results import say_damaged
 from benchmarks.runner.environment_info import environment_info
-from benchmarks.runner.execution import Plan, row_identity
+from benchmarks.runner.execution import PendingCases, row_identity
 from benchmarks.runner.fingerprint import code_digest
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.suites.frozen import Entry, FrozenSuite
@@ -93,15 +93,15 @@ def finished_rows(out: Path) -> list[Row]:
     of a case that ran twice the later row.
     """
     keys = {name: entry["key"] for name, entry in read_run(out).get("contenders", {}).items()}
-    found = {
+    rows = {
         row_identity(row): row
         for row in case_rows(out / JOURNAL)
         if row.get("key") is not None and keys.get(row.get("controller")) == row["key"]
     }
-    return list(found.values())
+    return list(rows.values())
 
 
-def run_info(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> dict[str, Any]:
+def run_info(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> dict[str, Any]:
     """What a run was made with: its resolved configuration, versions, commit and command."""
     suite = todo.suite
     return {
@@ -117,16 +117,18 @@ def run_info(todo: Plan, entries: Sequence[Entry], out: Path, jobs: int) -> dict
             "environment": dict(suite.environment),
             "stations": list(suite.stations),
             "recipe": asdict(suite.recipe) if suite.recipe else None,
-            "episodes": [deal._asdict() for deal in suite.deals],
+            "episodes": [plan._asdict() for plan in suite.episode_plans],
         },
-        "contenders": _contenders(todo, entries, out),
+        "contenders": _controllers(todo, entries, out),
         "code": code_digest(),
         "jobs": jobs,
         **environment_info(),
     }
 
 
-def _contenders(todo: Plan, entries: Sequence[Entry], out: Path) -> dict[str, dict[str, str]]:
+def _controllers(
+    todo: PendingCases, entries: Sequence[Entry], out: Path
+) -> dict[str, dict[str, str]]:
     """Title, source, key and command of those that are run, and of earlier ones of this code."""
     before, now = read_run(out), (code_digest(), todo.suite.digest)
     same = (before.get("code"), before.get("suite", {}).get("digest")) == now
@@ -136,10 +138,10 @@ def _contenders(todo: Plan, entries: Sequence[Entry], out: Path) -> dict[str, di
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
     }
     return kept | {
-        entry.contender.name: {
-            "title": entry.contender.label,
-            "source": entry.contender.source,
-            "key": todo.keys[entry.contender.name],
+        entry.spec.name: {
+            "title": entry.spec.label,
+            "source": entry.spec.source,
+            "key": todo.keys[entry.spec.name],
             **command,
         }
         for entry in entries
@@ -148,10 +150,10 @@ def _contenders(todo: Plan, entries: Sequence[Entry], out: Path) -> dict[str, di
 
 def _stations(suite: FrozenSuite) -> list[dict[str, Any]]:
     """Every station of a suite, with every number."""
-    found = []
+    entries = []
     for number in suite.stations:
         drawn = suite.station(number)
-        found.append(
+        entries.append(
             {
                 "station": number,
                 "effects": drawn.present,
@@ -159,7 +161,7 @@ def _stations(suite: FrozenSuite) -> list[dict[str, Any]]:
                 "parameters": {name: drawn.model.at_the_door(name) for name in drawn.model.effects},
             }
         )
-    return found
+    return entries
 
 
 def write_run(out: Path, info: Mapping[str, Any], **more: object) -> None:

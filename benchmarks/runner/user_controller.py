@@ -4,7 +4,7 @@ import time
 from collections import deque
 from pathlib import Path
 
-from benchmarks.runner.controller_spec import Contender, ControllerError, raised_at
+from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, raised_at
 from controllers.controller import Reference
 from pma_gym.envs import Measurement, StationInfo
 
@@ -30,17 +30,17 @@ class Guarded:
     Everything else that it has (`repetitions`...) shows through.
 
     Args:
-        contender: whose controller is made and watched.
+        spec: whose controller is made and watched.
         period: of the control steps (s).
         keep_pace: whether `act` must keep up with the clock.
     Raises:
         ControllerError: the controller cannot be made.
     """
 
-    def __init__(self, contender: Contender, period: float, keep_pace: bool = True) -> None:
-        self._controller = contender.make()
-        self.name = str(getattr(self._controller, "name", contender.name))
-        self._file, self._period, self._keep_pace = contender.path, period, keep_pace
+    def __init__(self, spec: ControllerSpec, period: float, keep_pace: bool = True) -> None:
+        self._controller = spec.make()
+        self.name = str(getattr(self._controller, "name", spec.name))
+        self._file, self._period, self._keep_pace = spec.path, period, keep_pace
         self._latest: deque[float] = deque(maxlen=max(1, round(LATE_S / period)))
 
     def __getattr__(self, name: str) -> object:
@@ -89,7 +89,7 @@ class Guarded:
         return ControllerError(f"{method} raised {type(error).__name__}: {error} ({where}, {when})")
 
 
-def probe(contender: Contender) -> str:
+def probe(spec: ControllerSpec) -> str:
     """Make a controller to see that it can be made, in whatever process this is.
 
     Returns:
@@ -97,6 +97,6 @@ def probe(contender: Contender) -> str:
     Raises:
         ControllerError: it cannot be made.
     """
-    made = contender.make()
+    made = spec.make()
     name = getattr(made, "name", "")
     return name.strip() if isinstance(name, str) else ""

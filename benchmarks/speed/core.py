@@ -114,10 +114,10 @@ def counted() -> tuple[Counter[str], int]:
     }
     SimdEmitter(1, fused=FUSED).emit(b, [*writer.layout.outputs, *writer.extra], known)
     names = Counter(_name(instruction) for instruction in b.block.instructions)
-    found: Counter[str] = Counter()
+    counts: Counter[str] = Counter()
     for name, number in names.items():
-        found[_SORTS.get(name, "other")] += number
-    return found, sum(found[sort] for sort in OPERATIONS) + names["llvm.fma"]
+        counts[_SORTS.get(name, "other")] += number
+    return counts, sum(counts[sort] for sort in OPERATIONS) + names["llvm.fma"]
 
 
 def _name(instruction: Operand) -> str:

@@ -260,8 +260,8 @@ def _timed(
     model: Model, logged: Sequence[Trial], free: Sequence[str], threads: int
 ) -> tuple[Fit, float, float]:
     begin, busy = time.perf_counter(), time.process_time()
-    found = fit(model, logged, free, threads=threads)
-    return found, time.perf_counter() - begin, time.process_time() - busy
+    result = fit(model, logged, free, threads=threads)
+    return result, time.perf_counter() - begin, time.process_time() - busy
 
 
 _HEAD = (
@@ -272,13 +272,13 @@ _HEAD += f"{'rounds':>7}{'trials':>7}{'chi2/n':>10}"
 
 def _line(row: Mapping[str, Any]) -> str:
     times = [row[f"{name}_s"] for name in ("compile", "fit", "fit_cpu", "fit_one", "fit_one_cpu")]
-    told = "".join(
+    times = "".join(
         f"{value:{width}.2f}" for value, width in zip(times, (9, 8, 8, 9, 8), strict=True)
     )
     end = "" if row["converged"] else "  not converged"
     end += "" if row["same"] else "  other bits with one thread"
     return (
-        f"{row['title']:26}{row['free']:5}{told}{row['rounds']:7}"
+        f"{row['title']:26}{row['free']:5}{times}{row['rounds']:7}"
         f"{row['simulated']:7}{row['reduced_chi_square']:10.3g}{end}"
     )
 
@@ -286,13 +286,13 @@ def _line(row: Mapping[str, Any]) -> str:
 def main(quick: Annotated[bool, typer.Option(help="To see that all works.")] = False) -> None:
     """Print what `measure` finds."""
     print(_HEAD)
-    found = measure(quick, say=lambda line: print(line, flush=True))
+    run = measure(quick, say=lambda line: print(line, flush=True))
     print(
-        f"{len(found['candidates'])} candidates, {found['trials']} trials of "
-        f"{found['trial_s']:g} s, full joint fits on {THREADS} threads: {found['fit_s']:.1f} s "
-        f"({found['fit_cpu_s']:.1f} s of processor time; wanted: {LIMIT_S:g} s) and "
-        f"{found['compile_s']:.1f} s to compile; on one thread {found['fit_one_s']:.1f} s "
-        f"({found['fit_one_cpu_s']:.1f} s); {found['trials_per_s']:.0f} trials simulated a second"
+        f"{len(run['candidates'])} candidates, {run['trials']} trials of "
+        f"{run['trial_s']:g} s, full joint fits on {THREADS} threads: {run['fit_s']:.1f} s "
+        f"({run['fit_cpu_s']:.1f} s of processor time; wanted: {LIMIT_S:g} s) and "
+        f"{run['compile_s']:.1f} s to compile; on one thread {run['fit_one_s']:.1f} s "
+        f"({run['fit_one_cpu_s']:.1f} s); {run['trials_per_s']:.0f} trials simulated a second"
     )
 
 

@@ -90,11 +90,11 @@ def prepare(task: str, count: int, precision: str, held: bool = False) -> Prepar
         torch.cuda.synchronize()
         return BATCHES * count
 
-    def told() -> dict[str, Any]:
+    def facts() -> dict[str, Any]:
         attempts = float(envs.attempts.sum()) / count
         return {"attempts": attempts, "right_hand_sides": 3.0 * attempts} | envs.device.facts()
 
-    return Prepared(chunk, told)
+    return Prepared(chunk, facts)
 
 
 def differences(precision: str) -> dict[str, float]:
@@ -113,7 +113,7 @@ def differences(precision: str) -> dict[str, float]:
     own.reset(every)
     envs = CudaEngine(task, options, n, PRECISIONS[precision], seed=0)
     names = [*own.state_layout.states, "size"]
-    found = dict.fromkeys([*names, "observation", "reward"], 0.0)
+    largest = dict.fromkeys([*names, "observation", "reward"], 0.0)
     generator = np.random.default_rng(0)
     for _ in range(_CHECKED_STEPS):
         actions = generator.uniform(-1.0, 1.0, (n, 1)).astype(np.float32)
@@ -128,8 +128,8 @@ def differences(precision: str) -> dict[str, float]:
         pairs |= {"observation": (own.observations, seen), "reward": (rewards, paid)}
         for name, (one, other) in pairs.items():
             apart = np.abs(one - other.double().cpu().numpy()).max()
-            found[name] = max(found[name], float(apart))
-    return found
+            largest[name] = max(largest[name], float(apart))
+    return largest
 
 
 if __name__ == "__main__":

@@ -50,7 +50,7 @@ class Asked(Protocol):
 
 
 @dataclass(frozen=True)
-class Plan:
+class Repetition:
     """How long to measure.
 
     Attributes:
@@ -62,7 +62,7 @@ class Plan:
     seconds: float = 0.5
 
 
-QUICK = Plan(rounds=2, seconds=0.05)
+QUICK = Repetition(rounds=2, seconds=0.05)
 """To see that all works; its figures say little."""
 
 
@@ -112,7 +112,7 @@ class Measurement:
 
     Args:
         rows: what to measure.
-        plan: for how long.
+        repetition: for how long.
         clients: gives a peer's worker, or None if it is not installed.
         together: keys of rows that are measured one after the other, in groups; the others come
             anywhere.
@@ -126,7 +126,7 @@ class Measurement:
     def __init__(
         self,
         rows: Sequence[Row],
-        plan: Plan,
+        repetition: Repetition,
         clients: Callable[[Peer], Asked | None] | None = None,
         together: Sequence[Sequence[str]] = (),
     ) -> None:
@@ -134,7 +134,7 @@ class Measurement:
         grouped = {key for group in together for key in group}
         alone = [[key] for key in self.rows if key not in grouped]
         self._groups = [[self.rows[key] for key in group] for group in [*together, *alone]]
-        self.plan = plan
+        self.repetition = repetition
         self.versions: dict[str, dict[str, str]] = {}
         self.complete = False
         self._make = clients or client_of
@@ -143,14 +143,14 @@ class Measurement:
     @property
     def work(self) -> int:
         """How often `on_done` is called, if no row is left out."""
-        return len(self.rows) * (1 + self.plan.rounds)
+        return len(self.rows) * (1 + self.repetition.rounds)
 
     def run(self, on_done: OnDone = lambda title: None) -> None:
         """Prepare every row, then measure them round after round."""
         order = random.Random(SEED)
         try:
             self._each(list(self.rows.values()), self._prepare, on_done)
-            for number in range(self.plan.rounds):
+            for number in range(self.repetition.rounds):
                 if number:
                     self._end(anew=True)
                 groups = order.sample(self._groups, len(self._groups))
@@ -196,7 +196,7 @@ class Measurement:
         # Again only if the process had to be started anew.
         client.prepare(one.row.key, one.row.row, one.row.settings)
         time.sleep(_PAUSE_S)
-        answer = client.measure(one.row.key, self.plan.seconds)
+        answer = client.measure(one.row.key, self.repetition.seconds)
         one.rates[number] = answer["steps"] / answer["seconds"]
         one.facts = answer["facts"]
 

@@ -4,7 +4,6 @@ A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figu
 types one in. `--check` changes nothing and fails if the page is not as the run would have it.
 """
 
-import json
 import re
 import sys
 from collections.abc import Mapping, Sequence
@@ -14,8 +13,9 @@ from typing import Annotated, Any
 import typer
 
 from benchmarks.files import write_text
-from benchmarks.speed.measure import Plan
-from benchmarks.speed.report.tables import View, sentences, views
+from benchmarks.speed.measure import Repetition
+from benchmarks.speed.report.tables import SpeedTable, sentences, speed_tables
+from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "speed.md"
@@ -40,8 +40,11 @@ def load_run(path: Path) -> Mapping[str, Any]:
     advice = "run `python -m benchmarks speed --json results/speed.json`"
     if not path.is_file():
         raise RunError(f"there is no file {path}; {advice} first")
-    run = json.loads(path.read_text(encoding="utf-8"))
-    whole, made = Plan(), run["run"]
+    try:
+        run = read_json(path, "journal_mib", own=True, finite=False)
+    except ValueError as error:
+        raise RunError(f"{error}; {advice} again") from None
+    whole, made = Repetition(), run["run"]
     if not run["complete"] or made["rounds"] < whole.rounds or made["seconds"] < whole.seconds:
         raise RunError(f"{path} is no whole run; {advice} without --quick and let it finish")
     return run
@@ -52,11 +55,11 @@ def refreshed(text: str, run: Mapping[str, Any]) -> str:
 
     A table that the run has not becomes a sentence that says so.
     """
-    blocks = {view.name: _markdown(view) for view in views(run)}
+    blocks = {table.name: _markdown(table) for table in speed_tables(run)}
     blocks["setting"] = "\n".join(f"- {sentence}" for sentence in sentences(run))
 
-    def block(found: re.Match[str]) -> str:
-        return f"{found['start']}\n{blocks.get(found['name'], ABSENT)}\n\n{found['end']}"
+    def block(match: re.Match[str]) -> str:
+        return f"{match['start']}\n{blocks.get(match['name'], ABSENT)}\n\n{match['end']}"
 
     return _BLOCK.sub(block, text)
 
@@ -74,18 +77,18 @@ def main(
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(2) from None
     text = PAGE.read_text(encoding="utf-8")
-    found = refreshed(text, run)
-    if found == text:
+    content = refreshed(text, run)
+    if content == text:
         return
     if not check:
-        write_text(PAGE, found)
+        write_text(PAGE, content)
     print(f"{PAGE.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
     raise typer.Exit(1 if check else 0)
 
 
-def _markdown(view: View) -> str:
-    rules = [":--" if column < view.words else "--:" for column in range(len(view.header))]
-    lines: Sequence[Sequence[str]] = (view.header, rules, *view.rows)
+def _markdown(table: SpeedTable) -> str:
+    rules = [":--" if column < table.words else "--:" for column in range(len(table.header))]
+    lines: Sequence[Sequence[str]] = (table.header, rules, *table.rows)
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 

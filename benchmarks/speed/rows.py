@@ -173,23 +173,23 @@ def _batches() -> Iterator[Row]:
     each = own | {"count": EACH}
     yield _batch("own_pair", f"{title}, 2 processes of so many", "own", each, **pair)
     for toy, step in _STEPS.items():
-        told: dict[str, Any] = {"right_hand_sides": 1, "step": step}
+        settings: dict[str, Any] = {"right_hand_sides": 1, "step": step}
         for count in COUNTS:
             named = {"name": f"{toy}-v1", "count": count}
             if toy == "CartPole":
                 array = named | {"mode": "vector_entry_point"}
                 title = "Gymnasium vector CartPole"
-                yield _batch("vector_CartPole", title, "classic", array, **told)
+                yield _batch("vector_CartPole", title, "classic", array, **settings)
             if count in SYNC_COUNTS:
                 title, sync = f"SyncVectorEnv {toy}", named | {"mode": "sync"}
-                yield _batch(f"sync_{toy}", title, "classic", sync, **told)
+                yield _batch(f"sync_{toy}", title, "classic", sync, **settings)
             if count <= ENVPOOL_MOST:
-                yield _batch(f"envpool_{toy}", f"EnvPool {toy}", "envpool", named, **told)
+                yield _batch(f"envpool_{toy}", f"EnvPool {toy}", "envpool", named, **settings)
             if count in SYNC_COUNTS:
                 title, kept = f"EnvPool {toy}, on one processor", named | {"kept": True}
-                yield _batch(f"envpool_{toy}_kept", title, "envpool", kept, **told)
+                yield _batch(f"envpool_{toy}_kept", title, "envpool", kept, **settings)
             title = f"gymnax {toy}"
-            yield _batch(f"gymnax_{toy}", title, "gymnax", named, row="loop", **told)
+            yield _batch(f"gymnax_{toy}", title, "gymnax", named, row="loop", **settings)
 
 
 def _batch(

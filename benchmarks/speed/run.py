@@ -12,7 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 from benchmarks.files import write_text
-from benchmarks.speed.measure import QUICK, Measurement, Plan
+from benchmarks.speed.measure import QUICK, Measurement, Repetition
 from benchmarks.speed.report.document import Document, document, started
 from benchmarks.speed.report.ratios import (
     CHECKS,
@@ -23,7 +23,7 @@ from benchmarks.speed.report.ratios import (
     neighbours,
     wanted_rows,
 )
-from benchmarks.speed.report.tables import View, rate, views
+from benchmarks.speed.report.tables import SpeedTable, rate, speed_tables
 from benchmarks.speed.rows import RequestError, Row, all_rows, select
 from pma_gym.files import OutputError, check_output
 from pma_gym.terminal import SafeConsole
@@ -64,18 +64,18 @@ def run_speed(
     targets = CHECKS if check else TARGETS
     rows = chosen_rows(targets if check else (), only)
     together = neighbours(targets, [row.key for row in rows])
-    measurement = Measurement(rows, QUICK if quick else Plan(), together=together)
+    measurement = Measurement(rows, QUICK if quick else Repetition(), together=together)
     info, begin = started(), time.perf_counter()
     try:
         _measure(measurement, console)
     except KeyboardInterrupt:
         console.print("Interrupted: what follows is what was measured so far.")
     verdicts = judge_all(targets, measurement.rows)
-    found = document(measurement, verdicts, info, time.perf_counter() - begin)
-    for view in views(found):
-        console.print(_table(view))
+    report = document(measurement, verdicts, info, time.perf_counter() - begin)
+    for table in speed_tables(report):
+        console.print(_table(table))
     if json_file is not None:
-        _write(found, json_file, console)
+        _write(report, json_file, console)
     if not measurement.complete:
         return INTERRUPTED
     return _checked(verdicts, console) if check else DONE
@@ -116,9 +116,9 @@ def _measure(measurement: Measurement, console: Console) -> None:
         measurement.run(lambda title: progress.update(bar, advance=1, last=title))
 
 
-def _write(found: Document, json_file: Path, console: Console) -> None:
-    path = json_file if found["complete"] else partial_file(json_file)
-    write_text(path, json.dumps(found, indent=1) + "\n")
+def _write(report: Document, json_file: Path, console: Console) -> None:
+    path = json_file if report["complete"] else partial_file(json_file)
+    write_text(path, json.dumps(report, indent=1) + "\n")
     console.print(f"Written to {path}", highlight=False)
 
 
@@ -126,24 +126,24 @@ def _checked(verdicts: Sequence[Verdict], console: Console) -> int:
     """Exit code of a check: what could not be measured does not count as passed."""
     failed = [v for v in verdicts if v.word == "missed" or (v.got is None and not v.excused)]
     for verdict in failed:
-        print(f"failed: {_told(verdict)}", file=sys.stderr)
+        print(f"failed: {_sentence(verdict)}", file=sys.stderr)
     if not failed:
         console.print("The check passed: batches are computed in lanes and on all threads.")
     return FAILED if failed else DONE
 
 
-def _told(verdict: Verdict) -> str:
+def _sentence(verdict: Verdict) -> str:
     target = verdict.target
     if verdict.got is None:
         return f"{target.title}: not measured: {verdict.absence}"
     return f"{target.title}: {rate(verdict.got[1])}, at least {rate(target.limit)} wanted"
 
 
-def _table(view: View) -> Table:
-    table = Table(title=view.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(view.header):
-        words = number < view.words
+def _table(table: SpeedTable) -> Table:
+    table = Table(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for number, name in enumerate(table.header):
+        words = number < table.words
         table.add_column(name, justify="left" if words else "right", no_wrap=not words)
-    for row in view.rows:
+    for row in table.rows:
         table.add_row(*row)
     return table

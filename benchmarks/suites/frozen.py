@@ -9,7 +9,7 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.recipe import Recipe, parse_recipe
 from benchmarks.suites.reproduction import SUITES, SuiteError
 from benchmarks.suites.stations import DrawnStation, draw_station
@@ -102,7 +102,7 @@ class Episode(NamedTuple):
         return f"{self.station}/{self.task}/{self.pressure_kpa:g}/{self.repeat}"
 
 
-class Deal(NamedTuple):
+class EpisodePlan(NamedTuple):
     """Trials that are dealt to the stations in turn, so that each comes equally often.
 
     Attributes:
@@ -133,11 +133,11 @@ class Entry(NamedTuple):
     """A controller of a suite.
 
     Attributes:
-        contender: who.
+        spec: who.
         only: tasks that it can do; all if empty.
     """
 
-    contender: Contender
+    spec: ControllerSpec
     only: tuple[str, ...] = ()
 
     def does(self, task: str) -> bool:
@@ -155,11 +155,11 @@ class FrozenSuite:
         title: one line for people.
         version: changes whenever a number does.
         seed: every episode's seed is derived from it.
-        model: name of the model that controllers are told.
+        model: name of the model that controllers receive.
         environment: keyword arguments of the environments.
         stations: numbers of the stations, in order.
         recipe: how stations are drawn; None if only the nominal one is there.
-        deals: which trials they get.
+        episode_plans: which trials they get.
         entries: who is compared, in the order of the tables.
         targets: what is asked of them.
         digest: of all numbers, controllers and targets apart.
@@ -175,7 +175,7 @@ class FrozenSuite:
     environment: Mapping[str, Any]
     stations: tuple[int, ...]
     recipe: Recipe | None
-    deals: tuple[Deal, ...]
+    episode_plans: tuple[EpisodePlan, ...]
     entries: tuple[Entry, ...]
     targets: tuple[Target, ...]
     digest: str
@@ -187,9 +187,9 @@ class FrozenSuite:
         return tuple(
             Episode(station, task, pressure, repeat)
             for at, station in enumerate(self.stations)
-            for deal in self.deals
-            for task, pressure in deal.trials(at)
-            for repeat in range(deal.repeats)
+            for plan in self.episode_plans
+            for task, pressure in plan.trials(at)
+            for repeat in range(plan.repeats)
         )
 
     @property
@@ -200,7 +200,7 @@ class FrozenSuite:
     @property
     def tasks(self) -> tuple[str, ...]:
         """Names of its tasks."""
-        return tuple(dict.fromkeys(task for deal in self.deals for task in deal.tasks))
+        return tuple(dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks))
 
     def seed_of(self, episode: Episode) -> int:
         """An episode's seed, the same for every controller: they are compared under one noise."""
@@ -216,34 +216,34 @@ class FrozenSuite:
 
     @cached_property
     def nominal(self) -> Model:
-        """The model that controllers are told."""
+        """The model that controllers receive."""
         return load_model(self.model)
 
-    def entry(self, contender: Contender) -> Entry:
+    def entry(self, spec: ControllerSpec) -> Entry:
         """The suite's entry of a controller; one of its own for a controller it does not have.
 
         Raises:
             SuiteError: none of the suite's tasks is of a kind that the controller can do.
         """
         for entry in self.entries:
-            if entry.contender.source == contender.source:
+            if entry.spec.source == spec.source:
                 return entry
-        kinds = contender.kinds
+        kinds = spec.kinds
         able = tuple(task for task in self.tasks if kind_of(task) in kinds)
         if kinds and not able:
             there = sorted({kind_of(task) for task in self.tasks})
             raise SuiteError(
-                f"{contender.name} does {', '.join(sorted(kinds))} alone, and suite {self.name} "
+                f"{spec.name} does {', '.join(sorted(kinds))} alone, and suite {self.name} "
                 f"has {', '.join(there)}; name another controller, or another suite"
             )
-        return Entry(contender, able)
+        return Entry(spec, able)
 
 
 def kind_of(task: str) -> str:
     """Kind of a task of a suite."""
-    found = named_task(task)
-    assert found is not None
-    return designs.kind_of(found)
+    known = named_task(task)
+    assert known is not None
+    return designs.kind_of(known)
 
 
 @lru_cache(maxsize=4096)
@@ -265,7 +265,7 @@ def frozen_suite(source: str) -> FrozenSuite:
     """A suite by its name, or from a file of one's own.
 
     Raises:
-        SuiteError: there is none, or its file is not as it should be; names the file and the mend.
+        SuiteError: there is none, or its file is not as it should be; names the file and the fix.
     """
     path = Path(source) if is_path(source) else SUITES / f"{source}.toml"
     if is_path(source) and missing_file(path):
@@ -302,10 +302,10 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
     numbers = tuple(range(int(stations.get("count", 0))))
     if not numbers or stations.get("nominal", False):
         numbers = (NOMINAL, *numbers)
-    deals = tuple(_deal(entry) for entry in document["episodes"])
+    episode_plans = tuple(_episode_plan(entry) for entry in document["episodes"])
     episodes = len(numbers) * sum(
-        deal.repeats * (deal.per_station or len(deal.tasks) * len(deal.pressures_kpa))
-        for deal in deals
+        plan.repeats * (plan.per_station or len(plan.tasks) * len(plan.pressures_kpa))
+        for plan in episode_plans
     )
     if episodes > MOST_EPISODES:
         raise ValueError(
@@ -326,7 +326,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         environment=dict(document["environment"]),
         stations=numbers,
         recipe=_recipe(stations, document["model"]),
-        deals=deals,
+        episode_plans=episode_plans,
         entries=tuple(_entry(entry) for entry in document["controllers"]),
         targets=tuple(parse_target(given) for given in document.get("targets", ())),
         digest=_digest(json.dumps(frozen, sort_keys=True)),
@@ -347,11 +347,11 @@ def _recipe(stations: Mapping[str, Any], model: str) -> Recipe | None:
     return other.recipe
 
 
-def _deal(given: Mapping[str, Any]) -> Deal:
+def _episode_plan(given: Mapping[str, Any]) -> EpisodePlan:
     unknown = [task for task in given["tasks"] if named_task(task) is None]
     if unknown:
         raise ValueError(f"unknown tasks: {', '.join(unknown)}; known: {', '.join(EVERY_TASK)}")
-    return Deal(
+    return EpisodePlan(
         tasks=tuple(given["tasks"]),
         pressures_kpa=tuple(given["pressures_kpa"]),
         per_station=given.get("per_station", 0),
@@ -360,7 +360,7 @@ def _deal(given: Mapping[str, Any]) -> Deal:
 
 
 def _entry(given: Mapping[str, Any]) -> Entry:
-    return Entry(Contender(given["name"], given["title"]), tuple(given.get("only", ())))
+    return Entry(ControllerSpec(given["name"], given["title"]), tuple(given.get("only", ())))
 
 
 def _digest(text: str) -> str:

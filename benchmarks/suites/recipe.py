@@ -9,7 +9,7 @@ from pma_gym.plant.model import load_model
 
 
 class RecipeError(ValueError):
-    """A recipe that no station can be drawn by; the message says why and the mend."""
+    """A recipe that no station can be drawn by; the message says why and the fix."""
 
 
 class Occasional(NamedTuple):

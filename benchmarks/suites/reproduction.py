@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from pma_gym.documents import read_toml
 from pma_gym.tasks import TASKS
 
@@ -58,7 +58,7 @@ class Case:
     """
 
     model: str
-    controller: Contender
+    controller: ControllerSpec
     task: str
     pressure_kpa: float
 
@@ -95,14 +95,14 @@ class Suite:
     control_rate_hz: float
     noise: bool
     models: tuple[str, ...]
-    controllers: tuple[Contender, ...]
+    controllers: tuple[ControllerSpec, ...]
     pressures_kpa: Mapping[str, tuple[float, ...]]
     pictured_kpa: Mapping[str, tuple[float, ...]]
     targets: Targets
     only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     selected: bool = field(default=False)
 
-    def does(self, controller: Contender, model: str) -> bool:
+    def does(self, controller: ControllerSpec, model: str) -> bool:
         """Whether a controller runs on a model."""
         return model in self.only.get(controller.name, (model,))
 
@@ -132,7 +132,7 @@ class Suite:
     def select(
         self,
         models: Sequence[str] = (),
-        controllers: Sequence[Contender] = (),
+        controllers: Sequence[ControllerSpec] = (),
         tasks: Sequence[str] = (),
         pressures_kpa: Sequence[float] = (),
     ) -> "Suite":
@@ -195,7 +195,7 @@ def load_suite(name: str = "reproduction") -> Suite:
         control_rate_hz=document["control_rate_hz"],
         noise=document["noise"],
         models=tuple(document["models"]),
-        controllers=tuple(Contender(**entry) for entry in entries),
+        controllers=tuple(ControllerSpec(**entry) for entry in entries),
         pressures_kpa={t: tuple(v["pressures_kpa"]) for t, v in document["tasks"].items()},
         pictured_kpa={t: tuple(v["pictured_kpa"]) for t, v in document["tasks"].items()},
         targets=Targets(**targets),
@@ -203,13 +203,13 @@ def load_suite(name: str = "reproduction") -> Suite:
     )
 
 
-def _distinct(controllers: Sequence[Contender]) -> tuple[Contender, ...]:
+def _distinct(controllers: Sequence[ControllerSpec]) -> tuple[ControllerSpec, ...]:
     """The controllers once each, every one with a label of its own.
 
     Raises:
         SuiteError: two with one name, which no results could tell apart.
     """
-    by_name: dict[str, Contender] = {}
+    by_name: dict[str, ControllerSpec] = {}
     for controller in controllers:
         rival = by_name.setdefault(controller.name, controller)
         if rival.source != controller.source:

@@ -24,7 +24,7 @@ class DrawnStation(NamedTuple):
     """A station as it was drawn.
 
     Attributes:
-        model: its own model, which no controller is told.
+        model: its own model, which no controller receives.
         present: names of the occasional effects that it has.
         refused: why draws before this one were not taken.
     """

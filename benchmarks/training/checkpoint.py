@@ -39,7 +39,7 @@ def save_checkpoint(
     number: int,
     model: BaseAlgorithm,
     average: WeightAverage | None,
-    told: Mapping[str, Any],
+    content: Mapping[str, Any],
 ) -> None:
     """Save all that the next leg of a training depends on; the last one stays until this is whole.
 
@@ -48,7 +48,7 @@ def save_checkpoint(
         number: of legs that are done.
         model: what is trained.
         average: its averaged weights.
-        told: what else is to be remembered, as JSON.
+        content: what else is to be remembered, as JSON.
     Raises:
         CheckpointError: it could not be written; the one before is still there.
     """
@@ -67,7 +67,7 @@ def save_checkpoint(
             {key: one.contiguous().clone() for key, one in tensors.items()},
             partial / "state.safetensors",
         )
-        content = json.dumps({"numbers": numbers, "told": dict(told)}, indent=1)
+        content = json.dumps({"numbers": numbers, "told": dict(content)}, indent=1)
         (partial / "state.json").write_text(content, encoding="utf-8")
         if final.exists():
             # Whole under another name until the new one is there: a kill may come between.
@@ -96,8 +96,8 @@ def latest(folder: Path) -> tuple[int, Path] | None:
     What a killed training left half-written beside them is removed.
     """
     clean_folder(folder)
-    found = [path for path in _numbered(folder) if (path / "state.json").is_file()]
-    return (int(found[-1].name), found[-1]) if found else None
+    checkpoints = [path for path in _numbered(folder) if (path / "state.json").is_file()]
+    return (int(checkpoints[-1].name), checkpoints[-1]) if checkpoints else None
 
 
 def usable(folder: Path, keys: Mapping[str, Any]) -> tuple[int, Path, dict[str, Any]] | None:
@@ -111,13 +111,13 @@ def usable(folder: Path, keys: Mapping[str, Any]) -> tuple[int, Path, dict[str, 
         if not (path / "state.json").is_file():
             continue
         try:
-            found = told(path, keys)
-            check_shape(found, keys)
+            content = read_content(path, keys)
+            check_shape(content, keys)
             _check_tensors(path / "state.safetensors")
         except (CheckpointError, OSError, ValueError) as error:
             say_damaged(path, reason(error.__cause__ or error), "the one before it serves, if any")
             continue
-        return int(path.name), path, found
+        return int(path.name), path, content
     return None
 
 
@@ -126,7 +126,7 @@ def _numbered(folder: Path) -> list[Path]:
     return sorted(path for path in folder.glob("*") if re.fullmatch("[0-9]{6}", path.name))
 
 
-def told(path: Path, keys: Collection[str]) -> dict[str, Any]:
+def read_content(path: Path, keys: Collection[str]) -> dict[str, Any]:
     """What a checkpoint remembers besides its tensors.
 
     Args:
@@ -136,8 +136,8 @@ def told(path: Path, keys: Collection[str]) -> dict[str, Any]:
         CheckpointError: it is damaged.
     """
     try:
-        found = _words(path)["told"]
-        return {key: found[key] for key in keys}
+        content = _words(path)["told"]
+        return {key: content[key] for key in keys}
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise _damaged(path, error) from error
 

@@ -60,13 +60,13 @@ def _made(
         view = preset.view
         options |= {"preview": view.preview, "history": view.history}
         return SB3VecEnv(count, preset.task, threads=threads, **options)
-    told = str(preset.options.get("model", "station"))
+    nominal = str(preset.options.get("model", "station"))
     return PilotedVecEnv(
         count,
         preset.task,
         preset.view,
         preset.form,
-        told,
+        nominal,
         staggered,
         preset.reward_scale,
         threads=threads,

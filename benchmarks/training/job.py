@@ -1,5 +1,7 @@
 """`python -m benchmarks train`: from a preset to a policy file, with progress, to go on later."""
 
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -12,6 +14,7 @@ from rich.progress import (
     TimeRemainingColumn,
 )
 
+from benchmarks.executors.executor import Executor, run_or_raise
 from benchmarks.training.configuration.preset import Preset, PresetError, load_preset
 from benchmarks.training.policy_export.product import policy_name, policy_of
 from benchmarks.training.run import Order, Point, Trained, train
@@ -50,14 +53,14 @@ def ordered(
     from benchmarks.training.learner import check_device
 
     environment, options = _environment_of(task)
-    found = load_preset(preset, algorithm, environment)
+    settings = load_preset(preset, algorithm, environment)
     if options:
-        found = found.changed(options={**found.options, **options})
-    _check_base(found)
+        settings = settings.changed(options={**settings.options, **options})
+    _check_base(settings)
     check_device(device)
     if steps is not None:
-        found = found.changed(steps=steps)
-    return Order(found, seed, device, threads, patience)
+        settings = settings.changed(steps=steps)
+    return Order(settings, seed, device, threads, patience)
 
 
 def _check_base(preset: Preset) -> None:
@@ -78,8 +81,8 @@ def _environment_of(task: str) -> tuple[str, dict[str, str]]:
     name = SHORT.get(task, task)
     if name in ENVIRONMENT_OF:
         return ENVIRONMENT_OF[name], {}
-    found = named_task(name)
-    if found is None or found.exercise is None:
+    known = named_task(name)
+    if known is None or known.exercise is None:
         names = (*ENVIRONMENT_OF, *SHORT, *(one for one in EXERCISES if one not in ENVIRONMENT_OF))
         raise PresetError(f"task must be one of {', '.join(names)}, got {task!r}")
     return EXERCISE, {"task": name}
@@ -109,15 +112,48 @@ def run_train(order: Order, out: Path, console: Console) -> Path:
     with Progress(*columns, console=console, transient=True) as progress:
         bar = progress.add_task(policy_name(order.preset), total=order.preset.steps)
 
-        def told(steps: int, point: Point | None) -> None:
+        def on_progress(steps: int, point: Point | None) -> None:
             progress.update(bar, completed=min(steps, order.preset.steps))
             if point is not None:
                 progress.console.print(_line(point, unit))
 
-        trained = train(order, out, told)
+        trained = train(order, out, on_progress)
     path = save_policy_file(policy_of(order, trained), out / policy_name(order.preset))
     console.print(_closing(trained, unit, path))
     return path
+
+
+def run_seeds(
+    trainings: Sequence[tuple[Order, Path]], executor: Executor, console: Console
+) -> list[Path]:
+    """Train several seeds, and write a policy each; one that is interrupted goes on later.
+
+    Args:
+        trainings: what is to be trained, and the folder of its policy, checkpoints and logs.
+        executor: where; on other machines the folders must be the same ones.
+        console: where a line for each is printed.
+    Returns:
+        The policies' .json files.
+    Raises:
+        CheckpointError: see `train`.
+        KeyboardInterrupt: Ctrl-C; the checkpoints stay.
+    """
+    paths = [Path()] * len(trainings)
+
+    def keep(index: int, result: tuple[Path, str]) -> None:
+        paths[index], closing = result
+        console.print(f"Seed {trainings[index][0].seed}: {closing}", highlight=False)
+
+    run_or_raise([partial(_trained, order, out) for order, out in trainings], executor, keep)
+    return paths
+
+
+def _trained(order: Order, out: Path) -> tuple[Path, str]:
+    """Train without a display; the policy's file and a line on it."""
+    out.mkdir(parents=True, exist_ok=True)
+    trained = train(order, out, lambda steps, point: None)
+    path = save_policy_file(policy_of(order, trained), out / policy_name(order.preset))
+    return path, _closing(trained, unit_of(order.preset.task), path)
 
 
 def _line(point: Point, unit: str) -> str:

@@ -56,7 +56,7 @@ def check_device(device: str) -> None:
     """Refuse a device that this machine has not.
 
     Raises:
-        PresetError: names it and the mend.
+        PresetError: names it and the fix.
     """
     try:
         torch.zeros(1, device=device)

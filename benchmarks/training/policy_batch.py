@@ -27,7 +27,7 @@ class PilotedVecEnv(EngineVecEnv):
         task: name of the task.
         view: what the policy sees; `tracking`.
         form: what its action does.
-        told: name of the model that controllers are told.
+        nominal: name of the model that controllers receive.
         staggered: cut each environment's first episode at a random length, so that a rollout has
             all parts of a trial in it.
         reward_scale: factor on the bounded rewards.
@@ -43,14 +43,14 @@ class PilotedVecEnv(EngineVecEnv):
         task: str,
         view: ObservationSpec,
         form: ActionMapping,
-        told: str = "station",
+        nominal: str = "station",
         staggered: bool = False,
         reward_scale: float = 1.0,
         **options: Any,
     ) -> None:
         """Make the environments and who pilots them."""
         self.envs = PMAVectorEnv(count, task, autoreset_mode=AutoresetMode.DISABLED, **options)
-        chosen, model = self.envs.options, load_model(told)
+        chosen, model = self.envs.options, load_model(nominal)
 
         def station(pressure: float) -> StationInfo:
             late = chosen.action_delay * chosen.period, chosen.observation_delay * chosen.period
@@ -110,15 +110,15 @@ class PilotedVecEnv(EngineVecEnv):
     ) -> dict[str, Any]:
         """What is told of an environment whose episode ends; errors unless it was cut."""
         name = f"rmse_by_phase_{self.envs.task.protocol.suffix}"
-        told: dict[str, Any] = {
+        info: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,
             "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
         }
         if name in info and info[f"_{name}"][i]:
             phases = info[name]
-            told[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
-        return told
+            info[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
+        return info
 
     def _begin_again(self, which: NDArray[np.int64], over: NDArray[np.bool_]) -> None:
         self.envs.reset(options={"reset_mask": over})

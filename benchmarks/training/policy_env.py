@@ -61,8 +61,8 @@ class PilotedEnv(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], NDArray[A
         self.pilot = PolicyAdapter(
             ObservationSpec.of(view), ActionMapping.of({"base": None} | dict(form))
         )
-        told = rig.station
-        entries = len(self.pilot.view.rows(told, self.pilot.form.base))
+        station = rig.station
+        entries = len(self.pilot.view.rows(station, self.pilot.form.base))
         self.observation_space = spaces.Box(-BOUND, BOUND, (entries,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (1,), np.float32)
 

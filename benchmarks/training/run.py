@@ -118,7 +118,7 @@ class Course:
 
 
 class Trained(NamedTuple):
-    """What came of a training.
+    """Result of a training.
 
     Attributes:
         model: with its averaged weights.
@@ -158,7 +158,7 @@ def train(order: Order, out: Path, told_of: Told) -> Trained:
     Args:
         order: what is to be trained.
         out: folder of its checkpoints and logs.
-        told_of: is told of progress.
+        told_of: called with the progress.
     Raises:
         PresetError: a device that is absent.
         CheckpointError: a checkpoint of another training, a damaged one, or one that cannot be
@@ -211,10 +211,10 @@ def _resumed(
     order: Order, out: Path, model: BaseAlgorithm, average: WeightAverage | None
 ) -> Course:
     """Where the training stands, with the model put there."""
-    found = usable(out / "checkpoints", _CONTENT)
-    if found is None:
+    checkpoint = usable(out / "checkpoints", _CONTENT)
+    if checkpoint is None:
         return Course()
-    number, path, content = found
+    number, path, content = checkpoint
     here = json.loads(json.dumps(order.to_json()))
     if content["order"] != here:
         raise CheckpointError(
@@ -303,10 +303,10 @@ class _Watch(BaseCallback):
     def _validate(self) -> None:
         started = time.perf_counter()
         with averaged(self.model, self._average):
-            found = validate(self.model, self._checks, self._order.preset.task)
+            validation = validate(self.model, self._checks, self._order.preset.task)
         self.validating_s += time.perf_counter() - started
         wall = self._course.wall_s + time.perf_counter() - self._began
-        point = Point(self.model.num_timesteps, round(wall, 3), *found)
+        point = Point(self.model.num_timesteps, round(wall, 3), *validation)
         curve = self._course.curve
         curve.append(point)
         errors = [one.error for one in curve]

@@ -87,5 +87,5 @@ def _station(recipe: Recipe, number: int, added: tuple[str, ...]) -> Model:
     model = _station(recipe, number, tuple(others))
     if last == "operator":
         return model.with_effects(OPERATOR)
-    # Any exercise will do: all have the leg that controllers are told of.
+    # Any exercise will do: all have the leg that controllers receive.
     return nominal_model(EXERCISES["isokinetic_exercise"], model)

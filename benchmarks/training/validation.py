@@ -32,9 +32,9 @@ class Validation(NamedTuple):
 
 def measure_of(task: str) -> Measure:
     """The suites' first measure of a task; of an exercise all phases together."""
-    found = task_of(task)
-    if found.exercise is not None:
-        return Measure(found.title, (task,), found.protocol.unit)
+    named = task_of(task)
+    if named.exercise is not None:
+        return Measure(named.title, (task,), named.protocol.unit)
     return measures([task])[0]
 
 

@@ -20,12 +20,12 @@ def chosen(names: Iterable[str], only: str) -> list[str]:
     known = list(dict.fromkeys(names))
     wanted: set[str] = set()
     for pattern in (part.strip() for part in only.split(",")):
-        found = fnmatch.filter(known, pattern)
-        if not found:
+        matching = fnmatch.filter(known, pattern)
+        if not matching:
             near = difflib.get_close_matches(pattern, known, 1)
             hint = f"; did you mean {near[0]}?" if near else ""
             raise ValueError(
                 f"only must match a table, got {pattern!r}; tables: {', '.join(known)}{hint}"
             )
-        wanted.update(found)
+        wanted.update(matching)
     return [name for name in known if name in wanted]

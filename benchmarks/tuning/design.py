@@ -15,7 +15,7 @@ For every controller with settings, loop and kind of task:
 
 Training stations are drawn with a seed of their own: no suite scores them. The same seed gives the
 same settings on the same machine and versions. Every search that ends is written at once; the same
-command goes on with those that are missing. Single designs are made anew by `--again` with
+command goes on with those that are missing. Single designs are made anew by `--recompute` with
 `--controllers lqg,mpc`, `--only 'hard/*'` or both; all others stay as they are.
 """
 
@@ -73,7 +73,7 @@ class DesignError(ValueError):
 
 
 @dataclass(frozen=True)
-class Search:
+class DesignProblem:
     """One search: settings of a controller for the tasks of a kind in a suite's loop.
 
     Attributes:
@@ -100,8 +100,8 @@ class Search:
 
 
 @dataclass(frozen=True)
-class Found:
-    """What a search found.
+class DesignResult:
+    """Settings that a search ends with.
 
     Attributes:
         values: settings by name.
@@ -127,7 +127,7 @@ class _Drill:
 
 
 def run_design(
-    controllers: list[str], out: Path, seed: int, jobs: int, again: bool, only: str = "*"
+    controllers: list[str], out: Path, seed: int, jobs: int, recompute: bool, only: str = "*"
 ) -> bool:
     """Search the settings of controllers and write them; those of others stay.
 
@@ -136,7 +136,7 @@ def run_design(
         out: file of settings.
         seed: of the noise.
         jobs: processes.
-        again: also what the file has already.
+        recompute: also what the file has already.
         only: which designs, by suite and kind of task: patterns such as `hard/*` by commas.
     Returns:
         Whether all of it was done; Ctrl-C leaves what is done in the file.
@@ -145,26 +145,27 @@ def run_design(
         DesignError: a controller without settings, a broken file, or a search that failed.
     """
     document = _read(out)
-    asked = searches_of(controllers or designable(), seed, only)
-    searches = [s for s in asked if again or s.name not in document["provenance"]]
-    if len(searches) < len(asked):
-        there = len(asked) - len(searches)
-        print(f"{out} has {there} of {len(asked)} designs asked for; --again makes them anew")
+    asked = problems_of(controllers or designable(), seed, only)
+    problems = [s for s in asked if recompute or s.name not in document["provenance"]]
+    if len(problems) < len(asked):
+        there = len(asked) - len(problems)
+        print(f"{out} has {there} of {len(asked)} designs asked for; --recompute makes them anew")
     with Progress(console=SafeConsole()) as progress:
-        bar = progress.add_task("Designing", total=len(searches))
+        bar = progress.add_task("Designing", total=len(problems))
 
         def keep(index: int, result: object) -> None:
-            search = searches[index]
+            problem = problems[index]
             if isinstance(result, BaseException):
-                raise DesignError(f"{search.name}: {type(result).__name__}: {result}") from result
-            assert isinstance(result, Found)
-            _write(out, document, search, result)
+                raise DesignError(f"{problem.name}: {type(result).__name__}: {result}") from result
+            assert isinstance(result, DesignResult)
+            _write(out, document, problem, result)
             progress.update(bar, advance=1)
             progress.console.print(
-                f"{search.name}: cost {result.first_cost:.3f} -> {result.cost:.3f}, {result.values}"
+                f"{problem.name}: cost {result.first_cost:.3f} -> {result.cost:.3f}, "
+                f"{result.values}"
             )
 
-        complete = run_all([partial(design, search) for search in searches], local(jobs), keep)
+        complete = run_all([partial(design, problem) for problem in problems], local(jobs), keep)
     if not complete:
         print(f"Interrupted; {out} has what is done, run again to go on.", file=sys.stderr)
     return complete
@@ -179,7 +180,7 @@ def _bounds(controller: str) -> Mapping[str, tuple[float, float]]:
     return getattr(inspect.getmodule(CONTROLLERS[controller]), "BOUNDS", {})
 
 
-def searches_of(controllers: Iterable[str], seed: int, only: str = "*") -> list[Search]:
+def problems_of(controllers: Iterable[str], seed: int, only: str = "*") -> list[DesignProblem]:
     """The searches of controllers, each once, in the suites and kinds of task that patterns match.
 
     Raises:
@@ -189,9 +190,9 @@ def searches_of(controllers: Iterable[str], seed: int, only: str = "*") -> list[
     names = list(dict.fromkeys(controllers))
     for name in names:
         _check_designable(name)
-    found = [search for name in names for search in _searches(name, seed)]
-    wanted = chosen((search.table for search in found), only)
-    return [search for search in found if search.table in wanted]
+    problems = [problem for name in names for problem in _problems(name, seed)]
+    wanted = chosen((problem.table for problem in problems), only)
+    return [problem for problem in problems if problem.table in wanted]
 
 
 def _check_designable(controller: str) -> None:
@@ -199,32 +200,32 @@ def _check_designable(controller: str) -> None:
     if controller in known:
         return
     near = difflib.get_close_matches(controller, known, 1)
-    mend = f"; did you mean {near[0]}?" if near else ""
+    hint = f"; did you mean {near[0]}?" if near else ""
     if controller in TUNED:
-        mend = "; its gains are tuned: python -m benchmarks tune"
+        hint = "; its gains are tuned: python -m benchmarks tune"
     raise DesignError(
         f"controllers must have settings to search, got {controller!r}; there are "
-        f"{', '.join(known)}{mend}"
+        f"{', '.join(known)}{hint}"
     )
 
 
-def _searches(controller: str, seed: int) -> Iterator[Search]:
+def _problems(controller: str, seed: int) -> Iterator[DesignProblem]:
     for suite in SUITES:
         quantities = {_task_quantity(name) for name in frozen_suite(suite).tasks}
         for kind in sorted(KINDS[quantity] for quantity in quantities):
-            yield Search(controller, suite, kind, seed)
+            yield DesignProblem(controller, suite, kind, seed)
 
 
 def _task_quantity(task: str) -> str:
     return PMAEnv(task=task, pressure_kpa=300.0).task.protocol.quantity
 
 
-def design(search: Search) -> Found:
+def design(problem: DesignProblem) -> DesignResult:
     """The settings of least cost that a search finds."""
-    factory: Any = CONTROLLERS[search.controller]
-    bounds = _bounds(search.controller)
-    drills = _drills(search)
-    start = inspect.getmodule(factory).DEFAULTS[search.kind]  # type: ignore[union-attr]
+    factory: Any = CONTROLLERS[problem.controller]
+    bounds = _bounds(problem.controller)
+    drills = _drills(problem)
+    start = inspect.getmodule(factory).DEFAULTS[problem.kind]  # type: ignore[union-attr]
     names = list(bounds)
 
     def settings(logs: np.ndarray) -> Any:  # noqa: ANN401
@@ -232,30 +233,30 @@ def design(search: Search) -> Found:
         return start._replace(**values)
 
     def cost(logs: np.ndarray) -> float:
-        return mean_cost(factory, settings(logs), drills, search.suite)
+        return mean_cost(factory, settings(logs), drills, problem.suite)
 
     limits = np.log([bounds[name] for name in names])
     first = np.log([getattr(start, name) for name in names])
-    scattered = LatinHypercube(len(names), rng=np.random.default_rng(search.seed))
+    scattered = LatinHypercube(len(names), rng=np.random.default_rng(problem.seed))
     points = [first, *scale(scattered.random(SCATTERED), limits[:, 0], limits[:, 1])]
     costs = [cost(point) for point in points]
     nearest = points[int(np.argmin(costs))]
     simplex = np.vstack(
         [nearest, nearest + 0.5 * np.diag(np.where(nearest < limits.mean(1), 1, -1))]
     )
-    found = minimize(
+    minimum = minimize(
         cost,
         nearest,
         method="Nelder-Mead",
         bounds=limits,
         options={"maxfev": EVALUATIONS, "initial_simplex": simplex},
     )
-    best, least = (settings(found.x), float(found.fun))
+    best, least = (settings(minimum.x), float(minimum.fun))
     if costs[0] <= least:
         best, least = start, costs[0]
-    station = _environment(search.suite, drills[0]).station
+    station = _environment(problem.suite, drills[0]).station
     values = {name: getattr(best, name) for name in names}
-    return Found(values, least, costs[0], loop_name(station))
+    return DesignResult(values, least, costs[0], loop_name(station))
 
 
 def mean_cost(factory: Any, settings: Any, drills: list[_Drill], suite: str) -> float:  # noqa: ANN401
@@ -297,19 +298,19 @@ def _environment(suite: str, drill: _Drill) -> PMAEnv:
     )
 
 
-def _drills(search: Search) -> list[_Drill]:
+def _drills(problem: DesignProblem) -> list[_Drill]:
     """Trials of a kind on training stations: pressures and tasks of the suite in turn."""
-    suite = frozen_suite(search.suite)
+    suite = frozen_suite(problem.suite)
     deck = [
         (task, pressure)
-        for deal in suite.deals
-        for task in deal.tasks
-        for pressure in deal.pressures_kpa
-        if KINDS[_task_quantity(task)] == search.kind
+        for plan in suite.episode_plans
+        for task in plan.tasks
+        for pressure in plan.pressures_kpa
+        if KINDS[_task_quantity(task)] == problem.kind
     ]
     step = max(1, len(deck) // STATIONS)
     return [
-        _Drill(*deck[(number * step) % len(deck)], _training(suite, number), search.seed + number)
+        _Drill(*deck[(number * step) % len(deck)], _training(suite, number), problem.seed + number)
         for number in range(STATIONS)
     ]
 
@@ -324,9 +325,9 @@ def _read(path: Path) -> dict[str, Any]:
     document = {"schema": SCHEMA, "controllers": {}, "provenance": {}}
     if path.exists():
         try:
-            found = read_json(path)
-            check_shape(found, {"controllers?": {"*": {"*": dict}}, "provenance?": dict})
-            document |= found
+            content = read_json(path)
+            check_shape(content, {"controllers?": {"*": {"*": dict}}, "provenance?": dict})
+            document |= content
         except (ValueError, TypeError) as error:
             raise DesignError(
                 f"{path} is no file of settings ({error}); delete it or name another"
@@ -336,18 +337,20 @@ def _read(path: Path) -> dict[str, Any]:
     return document
 
 
-def _write(out: Path, document: dict[str, Any], search: Search, found: Found) -> None:
-    loops = document["controllers"].setdefault(search.controller, {})
-    loops.setdefault(found.loop, {})[search.kind] = dict(found.values)
-    document["provenance"][search.name] = {
+def _write(
+    out: Path, document: dict[str, Any], problem: DesignProblem, result: DesignResult
+) -> None:
+    loops = document["controllers"].setdefault(problem.controller, {})
+    loops.setdefault(result.loop, {})[problem.kind] = dict(result.values)
+    document["provenance"][problem.name] = {
         "written_by": "benchmarks/tuning/design.py",
-        "suite_version": frozen_suite(search.suite).version,
-        "training_seed": getattr(frozen_suite(search.suite).recipe, "training_seed", None),
-        "seed": search.seed,
+        "suite_version": frozen_suite(problem.suite).version,
+        "training_seed": getattr(frozen_suite(problem.suite).recipe, "training_seed", None),
+        "seed": problem.seed,
         "stations": STATIONS,
         "evaluations": 1 + SCATTERED + EVALUATIONS,
-        "cost_of_defaults": round(found.first_cost, 4),
-        "cost": round(found.cost, 4),
+        "cost_of_defaults": round(result.first_cost, 4),
+        "cost": round(result.cost, 4),
     }
     for part in ("controllers", "provenance"):
         document[part] = dict(sorted(document[part].items()))

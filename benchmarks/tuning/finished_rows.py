@@ -54,18 +54,18 @@ class KeptRows:
             return {}
         if document["made_with"] != self.made_with:
             return {}
-        found, damaged = dict[str, tuple[Gains, float]](), list[str]()
+        rows, damaged = dict[str, tuple[Gains, float]](), list[str]()
         for name, row in document["rows"].items():
             try:
                 check_shape(row, ListOf(object, 2), name)
                 gains, cost = row
                 check_shape([*gains, cost], ListOf(Real()), name)
-                found[name] = Gains._make(gains), float(cost)
+                rows[name] = Gains._make(gains), float(cost)
             except (ValueError, TypeError) as error:
                 damaged.append(str(error))
         if damaged:
             say_damaged(self.path, damaged[0], f"{len(damaged)} rows are computed anew")
-        return found
+        return rows
 
 
 def name_of(row: Job) -> str:

@@ -199,14 +199,14 @@ def tuned(job: Job) -> tuple[Gains, float]:
         return cost(gains_from(logarithms, job.start_factor))
 
     simplex = np.vstack([start, start + 0.4 * np.eye(len(start))])
-    found = minimize(
+    minimum = minimize(
         objective,
         start,
         method="Nelder-Mead",
         bounds=[(value - SEARCH_WIDTH, value + SEARCH_WIDTH) for value in start],
         options={"maxfev": EVALUATIONS, "initial_simplex": simplex, "xatol": 0.02, "fatol": 1e-3},
     )
-    gains = gains_from(found.x, job.start_factor)
+    gains = gains_from(minimum.x, job.start_factor)
     return gains, cost(gains)
 
 

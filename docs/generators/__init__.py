@@ -54,7 +54,7 @@ from generators.policies import (
 )
 from generators.source import misprints, rates, verdicts, wrong_in_print
 from generators.suite import controllers, example, targets, trials, tuning
-from generators.suites import deals, occasional, suites
+from generators.suites import episode_plans, occasional, suites
 
 GENERATORS: dict[str, Callable[..., str]] = {
     function.__name__: function
@@ -65,7 +65,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(differences, identification, misfit, parameters, shipped),
         *(misprints, rates, verdicts, wrong_in_print),
         *(controllers, example, targets, trials, tuning),
-        *(suites, deals, occasional),
+        *(suites, episode_plans, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_ways, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
         hidden_confused,

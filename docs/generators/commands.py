@@ -36,7 +36,7 @@ def commands(program: str) -> str:
 
 def _command(called: str, command: Any) -> str:  # noqa: ANN401 - typer does not export its type
     given = [p for p in command.params if p.param_type_name == "argument"]
-    options = [p for p in command.params if p.param_type_name == "option"]
+    options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
     words = [called, *(p.name.upper() for p in given)]
     words += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
     words += ["[OPTIONS]"] if any(not p.required for p in options) else []

@@ -6,7 +6,7 @@ from typing import Any
 
 from benchmarks.hidden_effects.baselines.comparison import COLUMNS
 from benchmarks.hidden_effects.baselines.registry import WAYS
-from benchmarks.hidden_effects.bound import detected, told
+from benchmarks.hidden_effects.bound import detected, identified
 from benchmarks.hidden_effects.evaluation.summary import report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
@@ -125,7 +125,10 @@ def hidden_bound() -> str:
 
 def _bound(each: dict[str, Any]) -> list[str]:
     """One case: r, what it is apart from, and what the ideal test makes of that."""
-    chances = (100.0 * float(detected(each["nothing"])), 100.0 * float(told(each["to_rival"])))
+    chances = (
+        100.0 * float(detected(each["nothing"])),
+        100.0 * float(identified(each["to_rival"])),
+    )
     found, known = (f"{chance:.0f}" for chance in chances)
     rival = code(each["rival"])
     return [

@@ -19,7 +19,7 @@ def example(name: str) -> str:
 
 def controllers() -> str:
     """Every controller that comes with the project."""
-    scored = {contender.name for contender in load_suite().controllers}
+    scored = {spec.name for spec in load_suite().controllers}
     rows = [
         [code(name), summary(made), "yes" if name in scored else "no"]
         for name, made in CONTROLLERS.items()

@@ -16,16 +16,16 @@ def suites() -> str:
     return table(header, rows, right=(1, 3, 4, 5))
 
 
-def deals(name: str) -> str:
+def episode_plans(name: str) -> str:
     """Which trials the stations of a suite get."""
     rows = [
         [
-            ", ".join(map(code, deal.tasks)),
-            ", ".join(map(number, deal.pressures_kpa)),
-            deal.per_station or "all",
-            deal.repeats,
+            ", ".join(map(code, plan.tasks)),
+            ", ".join(map(number, plan.pressures_kpa)),
+            plan.per_station or "all",
+            plan.repeats,
         ]
-        for deal in frozen_suite(name).deals
+        for plan in frozen_suite(name).episode_plans
     ]
     return table(["Tasks", "Pressures (kPa)", "Trials a station", "Noise seeds"], rows, (2, 3))
 

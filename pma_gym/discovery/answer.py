@@ -8,6 +8,7 @@ import numpy as np
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import (
     ADDED,
+    Approximate,
     Candidate,
     Diagnosis,
     Estimate,
@@ -23,6 +24,8 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.fitting.trial_states import misfits, trial_states
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.report.approximate_text import why_approximate
+from pma_gym.discovery.report.range_text import widened_ranges
 from pma_gym.discovery.report.records import floors_in_file_units, gaps, judgements, trial_records
 from pma_gym.discovery.report.verdict_text import doubt, sentence, steps, twin, unidentified
 from pma_gym.discovery.screening.localisation import localise
@@ -30,11 +33,12 @@ from pma_gym.discovery.screening.residuals import residuals
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.backward_elimination import as_given
 from pma_gym.discovery.selection.forward_selection import passes
+from pma_gym.discovery.verdict.approximate import closing
 from pma_gym.discovery.verdict.decision import suspicious, verdict_of
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import residual_fraction, tones
 from pma_gym.discovery.verdict.residual_laws import residual_law
-from pma_gym.discovery.verdict.unknown import shapeless_laws, telling, why_unknown
+from pma_gym.discovery.verdict.unknown import Reason, shapeless_laws, telling, why_unknown
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
@@ -76,6 +80,13 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
     off = any(moved.significant for moved in parameters.values())
     unknown = why_unknown(findings, left, laws)
     verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
+    records = trial_records(findings)
+    count = 0 if unknown is None else len(unknown.effects)
+    closes = closing(gaps(records), count) if count else None
+    if closes is not None and closes.named:
+        # An approximate law is a name where a right one would be; else the verdict stays.
+        named = verdict_of(findings, None, not_detectable, bool(coarse), off)
+        verdict = named if named == "effect" else verdict
     effects = (*_effects(findings), *coarse) if verdict == "effect" else ()
     model = _amended(findings, verdict)
     tell("putting the answer together", 1, 3)
@@ -85,7 +96,6 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
         np.array([floor.level for floor in findings.floors]),
         findings.seed,
     )
-    records = trial_records(findings)
     states = trial_states(*_proposal(findings, verdict), [each.name for each in findings.named])
     tell("putting the answer together", 2, 3)
     diagnosis = Diagnosis(
@@ -105,7 +115,12 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
             if path not in parameters
         },
         not_detectable=not_detectable,
-        law=residual_law(laws[0]) if verdict == "unknown" and telling(findings, laws) else None,
+        approximate=(
+            Approximate(_effects(findings), closes.left, closes.held_out)
+            if closes is not None and closes.worth_saying
+            else None
+        ),
+        law=residual_law(laws[0]) if unknown is not None and telling(findings, laws) else None,
         tones=tones(findings) if verdict == "unknown" else {},
         floors=floors_in_file_units(findings),
         adequacy=judgements(findings),
@@ -113,13 +128,19 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
         states=states,
         written=misfits(findings.named, model, states),
         maps=maps,
-        warnings=_warnings(findings),
+        warnings=(*_warnings(findings), *_approximations(verdict, unknown)),
         converged=findings.proposed[1].converged,
         worsened=_worsened(findings, verdict, records),
     )
+    reason = unknown if verdict == "unknown" else None
     return replace(
-        diagnosis, sentence=sentence(diagnosis, unknown), steps=steps(findings, diagnosis, left)
+        diagnosis, sentence=sentence(diagnosis, reason), steps=steps(findings, diagnosis, left)
     )
+
+
+def _approximations(verdict: Verdict, unknown: Reason | None) -> list[str]:
+    """Why the law of what is named is only approximate."""
+    return [why_approximate(unknown)] if verdict == "effect" and unknown is not None else []
 
 
 def _effects(findings: Findings) -> tuple[NamedEffect, ...]:
@@ -137,6 +158,10 @@ def _effects(findings: Findings) -> tuple[NamedEffect, ...]:
                 parameters={
                     path.partition(".")[2]: _estimate(findings, fit, path)
                     for path in candidate.fitted_paths
+                },
+                undetermined={
+                    path.partition(".")[2]: findings.selection.undetermined[path]
+                    for path in candidate.left
                 },
             )
         )
@@ -168,7 +193,7 @@ def _bounds(findings: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]
     if findings.elimination is not None and fit is findings.elimination.fit:
         problem = findings.elimination.problem
     chosen = findings.selection.chosen if fit is findings.selection.fit else ()
-    whitened = problem.whitened_residuals(fit.model, chosen)
+    whitened = problem.whitened_at(fit, chosen)
     pairs = zip(whitened.lower.tolist(), whitened.upper.tolist(), strict=True)
     return dict(zip((free.path for free in whitened.free), pairs, strict=True))
 
@@ -325,6 +350,8 @@ def _amended(findings: Findings, verdict: Verdict) -> Model:
             value - 1.96 * error if known else None,
             value + 1.96 * error if known else None,
         )
+    for path in findings.selection.undetermined if verdict in ("effect", "unknown") else ():
+        notes[path] = Note("not determined by the trials: held where its law is at a limit")
     return replace(
         fit.model,
         name=f"{findings.given.name}_amended",
@@ -404,7 +431,7 @@ def _doubts(findings: Findings) -> list[str]:
 
 
 def _warnings(findings: Findings) -> tuple[str, ...]:
-    words = _doubts(findings)
+    words = [*_doubts(findings), *widened_ranges(findings.problem, findings.proposed[1])]
     if findings.discarded is not None:
         given, refitted = findings.discarded
         words.append(

@@ -104,6 +104,21 @@ class Place:
 
 
 @dataclass(frozen=True)
+class Undetermined:
+    """A parameter of an effect that the data do not determine: it has left the effect's law.
+
+    Attributes:
+        above: value above which it lies (95 %), in its unit; None where nothing tells.
+        below: the same from above.
+        unit: the unit.
+    """
+
+    above: float | None
+    below: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
 class NamedEffect:
     """An effect that the diagnosis adds to the model.
 
@@ -112,12 +127,41 @@ class NamedEffect:
         confused_with: other candidates that explain these data as well.
         p_value: family-wise over the whole catalogue.
         parameters: estimates by column name.
+        undetermined: parameters without an estimate, by column name (`nested_laws`).
     """
 
     name: str
     confused_with: tuple[str, ...]
     p_value: float
     parameters: Mapping[str, Estimate]
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
+
+    def document(self) -> dict[str, Any]:
+        """The effect in `diagnosis.json`."""
+        return {
+            "name": self.name,
+            "confused_with": list(self.confused_with),
+            "p_value": self.p_value,
+            "parameters": {name: vars(each) for name, each in self.parameters.items()},
+            "not_determined": {name: vars(each) for name, each in self.undetermined.items()},
+        }
+
+
+@dataclass(frozen=True)
+class Approximate:
+    """Effects that carry most of what is missing by laws that fit only approximately.
+
+    Attributes:
+        effects: they, with their sizes: what the verdict `effect` names, or the best candidates of
+            the verdict `unknown`.
+        left: share of the misfit beyond noise (mean square, summed over signals in units of their
+            noise) that they leave.
+        held_out: whether it is that of readings which the fits had not seen.
+    """
+
+    effects: tuple[NamedEffect, ...]
+    left: float
+    held_out: bool
 
 
 @dataclass(frozen=True)
@@ -331,7 +375,10 @@ class Diagnosis:
         given: the model as it was given.
         not_identifiable: paths of parameters that these data do not determine, with the reason.
         not_detectable: effects that these data would not have shown at their usual size.
-        law: the residual law, where the verdict is `unknown` and one explains enough.
+        approximate: effects whose law is only approximate, and what they leave; None where there
+            are none, or where they leave too much for their size to mean anything.
+        law: the residual law, where the verdict is `unknown` or the law of an effect approximate,
+            and one explains enough.
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
             oscillates, for those that do.
         floors: noise by column name.
@@ -361,6 +408,7 @@ class Diagnosis:
     given: Model
     not_identifiable: Mapping[str, str] = field(default_factory=dict)
     not_detectable: tuple[str, ...] = ()
+    approximate: Approximate | None = None
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
@@ -388,17 +436,14 @@ class Diagnosis:
             "verdict": self.verdict,
             "sentence": self.sentence,
             "where": [vars(place) for place in self.where],
-            "effects": [
-                {
-                    "name": effect.name,
-                    "confused_with": list(effect.confused_with),
-                    "p_value": effect.p_value,
-                    "parameters": {
-                        name: vars(estimate) for name, estimate in effect.parameters.items()
-                    },
-                }
-                for effect in self.effects
-            ],
+            "effects": [effect.document() for effect in self.effects],
+            "approximate": self.approximate
+            and {
+                "effects": [effect.document() for effect in self.approximate.effects],
+                "closed": 1.0 - self.approximate.left,
+                "left": self.approximate.left,
+                "held_out": self.approximate.held_out,
+            },
             "parameters": {
                 path: {
                     "from": moved.start,

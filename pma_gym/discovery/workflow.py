@@ -30,6 +30,7 @@ from pma_gym.discovery.selection.backward_elimination import (
     backward_elimination,
 )
 from pma_gym.discovery.selection.forward_selection import Selection, select
+from pma_gym.discovery.selection.nested_laws import nested
 from pma_gym.discovery.selection.rivals import rivals
 from pma_gym.discovery.verdict.adequacy import Residual, adequacy
 from pma_gym.discovery.verdict.decision import suspicious
@@ -81,8 +82,8 @@ def diagnose(
         >>> time = np.arange(0.0, 4.0, 1 / 64)
         >>> volts = 1.0 + np.clip(time - 0.5, 0.0, 2.0)
         >>> asked = Trial(time, {"motor_voltage": volts, "regulator_voltage": 0 * time + 6.0})
-        >>> found = diagnose([Plant("serres2008").simulate(asked)], "serres2008", propose=False)
-        >>> found.verdict, "regulator_delay" in found.not_detectable
+        >>> diagnosis = diagnose([Plant("serres2008").simulate(asked)], "serres2008", propose=False)
+        >>> diagnosis.verdict, "regulator_delay" in diagnosis.not_detectable
         ('undecidable', True)
     """
     with linear_algebra_alone():
@@ -128,7 +129,7 @@ class _Work:
         named, words = prepared(named, given)
         words = (*said, *words)
         trials = [each.trial for each in named]
-        journal = Journal(self.folder, trials, given, f"diagnosis 2 seed {self.seed}")
+        journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
         floors = self._timed("noise", lambda: initial_floors(given, logged, named))
         own = free_parameters(given)
@@ -156,7 +157,8 @@ class _Work:
                 else _nothing(problem, refitted)
             ),
         )
-        found = Findings(
+        selection = self._timed("nested laws", lambda: self._nested(selection))
+        findings = Findings(
             named=tuple(named),
             given=given,
             floors=floors,
@@ -167,13 +169,13 @@ class _Work:
             searched=search,
             seed=self.seed,
         )
-        found = replace(
-            found, elimination=self._timed("fewest", lambda: _backward_elimination(found))
+        findings = replace(
+            findings, elimination=self._timed("fewest", lambda: _backward_elimination(findings))
         )
-        found = _without_worse(found)
-        found = self._timed("confirmation", lambda: self._confirmed(found))
-        found = self._timed("adequacy", lambda: self._judged(found, logged))
-        diagnosis = self._timed("report", lambda: answer(found, self._tell, self.propose))
+        findings = _without_worse(findings)
+        findings = self._timed("confirmation", lambda: self._confirmed(findings))
+        findings = self._timed("adequacy", lambda: self._judged(findings, logged))
+        diagnosis = self._timed("report", lambda: answer(findings, self._tell, self.propose))
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
@@ -197,14 +199,22 @@ class _Work:
         return list(asked.trials), model, asked.checked or ()
 
     def _refitted(self, problem: FitProblem, journal: Journal) -> Fitted:
-        found = problem.careful_fit(problem.given)
-        if found is None:
+        refit = problem.careful_fit(problem.given)
+        if refit is None:
             raise ModelError(
                 f"model {problem.given.name} cannot be simulated on these trials: its muscle does "
                 "not balance the load where one begins, or it runs away; check the units of the "
                 "commands and the model's drive and force"
             )
-        return found
+        return refit
+
+    def _nested(self, selection: Selection) -> Selection:
+        """Without the parameters of effects that the trials do not determine."""
+        if not selection.chosen:
+            return selection
+        # Where all is determined it takes milliseconds, else a few fits: no step of its own.
+        less = nested(selection.problem, selection.fit, selection.chosen)
+        return replace(selection, chosen=less.chosen, fit=less.fit, undetermined=less.undetermined)
 
     def _confirmed(self, findings: Findings) -> Findings:
         """With rivals of each effect, and how it fares on trials that it was not fitted to."""

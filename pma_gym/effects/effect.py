@@ -57,6 +57,9 @@ class Effect:
             where it begins at 0.
         held: parameters (field names) that a diagnosis leaves at their usual values when it fits
             the effect: geometry, and what only switches the law on.
+        ties: simpler laws in it, each a row of parameters (field names): where the first equals the
+            second, the others do nothing. A diagnosis takes the simpler law where its data do not
+            refuse it.
         replaces: what it is one of several forms of, so that it stands in place of another effect
             and not beside it: a model's force law or damping (compare such models as models), a
             person, or a law of free shape. A diagnosis proposes none of these as missing.
@@ -76,6 +79,7 @@ class Effect:
     memories: int = 1
     memory_start: str = ""
     held: tuple[str, ...] = ()
+    ties: tuple[tuple[str, ...], ...] = ()
     replaces: str = ""
 
     @cached_property

@@ -174,6 +174,7 @@ class EnvironmentOptions(TypedDict, total=False):
 
     pressure_kpa: Pressure
     model: str | Path | Model
+    memory_at_start: float | None
     control_rate_hz: float
     preview: int
     noise: bool

@@ -98,11 +98,11 @@ def lag_bounds(
         model: the station, with the lag that it has.
         on_row: called as each `Foreknown` is done.
     """
-    station, found = load_model(model), []
+    station, rows = load_model(model), []
     for row in foreknown_bounds(task, seeds, pressures_kpa, factors, safeties, station):
-        found.append(row)
+        rows.append(row)
         on_row()
-    return LagBounds(tuple(found), causal_bounds(task, station), swings(task, station))
+    return LagBounds(tuple(rows), causal_bounds(task, station), swings(task, station))
 
 
 def foreknown_bounds(
@@ -131,16 +131,16 @@ def courses_by_lag(exertion: Exertion, lags: Sequence[float]) -> dict[float, Cou
 
     A joint that chatters at the end of its reach may hold a search up; another lag leads out of it.
     """
-    own, found = lag_of(exertion.model, 1.0), dict[float, Course]()
+    own, courses = lag_of(exertion.model, 1.0), dict[float, Course]()
     for lag in (own, *lags, own):
-        source = min(found, key=lambda each: found[each].cost, default=None)
-        if lag in found and source == lag:
+        source = min(courses, key=lambda each: courses[each].cost, default=None)
+        if lag in courses and source == lag:
             continue
-        starts = [] if source is None else [retimed(found[source].voltages, source, lag)]
+        starts = [] if source is None else [retimed(courses[source].voltages, source, lag)]
         course = foreknown_course(_slowed(exertion, lag), starts)
-        if lag not in found or course.cost < found[lag].cost:
-            found[lag] = course
-    return {lag: found[lag] for lag in lags}
+        if lag not in courses or course.cost < courses[lag].cost:
+            courses[lag] = course
+    return {lag: courses[lag] for lag in lags}
 
 
 def _slowed(exertion: Exertion, lag: float) -> Exertion:

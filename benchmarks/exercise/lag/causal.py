@@ -93,16 +93,16 @@ def causal_bounds(
     """
     exercise, own = EVERY_TASK[task].exercise, model.parameters["regulator_lag"].time_constant
     assert exercise is not None
-    who, found = human or exercise.population.typical, []
+    who, rows = human or exercise.population.typical, []
     for point in points(task, model):
         for lag in (factor * own or NO_LAG for factor in factors):
             near = rates(point, model.replace({LAG: lag}))
-            found += [
+            rows += [
                 causal_bound(point, near, lag, delay, sensed, who)
                 for delay in delays
                 for sensed in (False, True)
             ]
-    return tuple(found)
+    return tuple(rows)
 
 
 def causal_bound(
@@ -176,8 +176,8 @@ class Loop:
     def deviations(self, gain: NDArray[np.float64], sensed: bool) -> tuple[float, float]:
         """Standard deviations of what the exercise holds (deg or N m) and of the voltage (V)."""
         closed = self.a - np.outer(self.by_voltage, gain)
-        unknown, news = self._filtered if sensed else (np.zeros_like(self.a), self._chance)
-        known = solve_discrete_lyapunov(closed, news, method="bilinear")
+        unknown, correction = self._filtered if sensed else (np.zeros_like(self.a), self._chance)
+        known = solve_discrete_lyapunov(closed, correction, method="bilinear")
         rows = (self.output, unknown + known), (gain, known)
         output, voltage = (math.sqrt(max(0.0, float(row @ spread @ row))) for row, spread in rows)
         return output, voltage
@@ -190,9 +190,9 @@ class Loop:
     def _filtered(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Kalman's filter: covariance of what it does not know, and of what each reading tells."""
         before = solve_discrete_are(self.a.T, self.seen.T, self._chance, self.noise)
-        told = self.seen @ before @ self.seen.T + self.noise
-        news = before @ self.seen.T @ np.linalg.solve(told, self.seen @ before)
-        return before - news, news
+        innovation = self.seen @ before @ self.seen.T + self.noise
+        correction = before @ self.seen.T @ np.linalg.solve(innovation, self.seen @ before)
+        return before - correction, correction
 
     def cheapest_within(self, most: float, sensed: bool) -> float:
         """The smallest price with which the voltage's standard deviation stays below (V)."""

@@ -96,9 +96,9 @@ def prescribed(few: Rehearsals) -> list[NDArray[np.float64]]:
     line, plan = model.parameters["regulator_line"], exercise.prescription
     wanted = np.array([plan.at(angle) for angle in ANGLES.tolist()])
     rest = line.gain * held + line.offset
-    found = follow_from(model, own_device(model), ANGLES, wanted, rest, exercise.start_moment)
+    course = follow_from(model, own_device(model), ANGLES, wanted, rest, exercise.start_moment)
     paces = [PACE.at(step / RATE_HZ) for step in range(few.steps)]
-    pressures = np.interp(paces, ANGLES, found.pressure)
+    pressures = np.interp(paces, ANGLES, course.pressure)
     return [constant, np.clip((pressures - line.offset) / line.gain, 0.0, HIGHEST_VOLTAGE)]
 
 

@@ -45,16 +45,16 @@ def run_lag(
     rows = operators * max(1, len(pressures_kpa)) * len(LAG_FACTORS) * len(safeties)
     with Progress(console=console, transient=True) as progress:
         shown = progress.add_task("Searches", total=rows)
-        found = lag_bounds(
+        bounds = lag_bounds(
             task,
             range(FIRST_SEED, FIRST_SEED + operators),
             list(pressures_kpa) or ("random",),
             safeties=safeties,
             on_row=lambda: progress.advance(shown),
         )
-    text = "\n\n".join(bound_tables(found))
+    text = "\n\n".join(bound_tables(bounds))
     console.print(text, highlight=False, markup=False, soft_wrap=True)
     write_text(out / "bounds.md", text + "\n")
-    write_bytes(out / "bounds.png", bound_plot(found.causal, found.swings))
+    write_bytes(out / "bounds.png", bound_plot(bounds.causal, bounds.swings))
     console.print(f"Picture: {out / 'bounds.png'}", highlight=False)
-    return found
+    return bounds

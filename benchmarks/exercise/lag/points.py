@@ -81,8 +81,8 @@ def points(task: str, model: Model) -> tuple[Point, ...]:
     else:
         rest, held = EVERY_TASK[task].starts[0], exercise.start_moment
         wanted = np.array([exercise.prescription.at(angle) for angle in angles.tolist()])
-        found = follow_from(model, own_device(model), angles, wanted, rest, held)
-        rests = [(rest, held, found.pressure)]
+        course = follow_from(model, own_device(model), angles, wanted, rest, held)
+        rests = [(rest, held, course.pressure)]
     return tuple(
         _point(task, model, float(angle), float(at), rest, held)
         for rest, held, pressures in rests
@@ -142,6 +142,6 @@ def rates(point: Point, model: Model) -> Rates:
     excess = radius * seen["load"] - point.slope * seen["rotation"]
     output = angle if point.paced else excess
     a = np.asarray(system.A) * sizes / sizes[:, None]
-    heard = np.stack([seen[name] for name, _ in SENSORS.values()])
+    measured = np.stack([seen[name] for name, _ in SENSORS.values()])
     noise = noise_levels(model)
-    return Rates(a, motor / (radius * gain), regulator, angle, output, heard, noise)
+    return Rates(a, motor / (radius * gain), regulator, angle, output, measured, noise)

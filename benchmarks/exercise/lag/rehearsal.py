@@ -156,16 +156,16 @@ class Rehearsals:
     def _scores(
         self, info: Mapping[str, Any], alive: NDArray[np.bool_]
     ) -> dict[str, NDArray[np.float64]]:
-        found = info.get(f"rmse_by_phase_{self._suffix}")
-        if found is None:
+        phases = info.get(f"rmse_by_phase_{self._suffix}")
+        if phases is None:
             return {name: np.full(self.count, np.nan) for name in self._phases}
-        return {name: np.where(alive, found.get(name, np.nan), np.nan) for name in self._phases}
+        return {name: np.where(alive, phases.get(name, np.nan), np.nan) for name in self._phases}
 
     def course(self, voltages: NDArray[np.float64], iterations: int = 0) -> Course:
         """The exercise by one row of voltages (V), shape (steps,)."""
-        found = self.run(voltages[:, None])
-        by_phase = {name: float(values[0]) for name, values in found.by_phase.items()}
-        return Course(voltages, found.error[:, 0], by_phase, iterations)
+        run = self.run(voltages[:, None])
+        by_phase = {name: float(values[0]) for name, values in run.by_phase.items()}
+        return Course(voltages, run.error[:, 0], by_phase, iterations)
 
 
 def own_floor(exertion: Exertion) -> float:

@@ -11,10 +11,10 @@ from pma_gym.pages.document import TextTable, to_markdown
 from pma_gym.tasks import EVERY_TASK
 
 
-def bound_tables(found: LagBounds) -> list[str]:
+def bound_tables(bounds: LagBounds) -> list[str]:
     """All tables as Markdown."""
-    tables = causal_table(found.causal), swing_table(found.swings)
-    listed = (foreknown_table(found.foreknown), *tables) if found.foreknown else tables
+    tables = causal_table(bounds.causal), swing_table(bounds.swings)
+    listed = (foreknown_table(bounds.foreknown), *tables) if bounds.foreknown else tables
     return [to_markdown([table], {}, "") for table in listed]
 
 

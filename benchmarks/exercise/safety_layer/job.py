@@ -51,17 +51,17 @@ def run_safety(
             *measure(episodes, seed, True, executor, advance),
             *measure(bare, seed, False, executor, advance),
         )
-    found = Safety(seed, tallies)
-    shown = safety_table(found)
+    safety = Safety(seed, tallies)
+    shown = safety_table(safety)
     console.print(terminal_table(shown), "")
-    console.print(safety_words(found), highlight=False)
-    write_text(out / FIGURES, json.dumps(found.to_json(), indent=1) + "\n")
-    write_text(out / "safety.md", f"{to_markdown([shown], {}, '')}\n{safety_words(found)}\n")
+    console.print(safety_words(safety), highlight=False)
+    write_text(out / FIGURES, json.dumps(safety.to_json(), indent=1) + "\n")
+    write_text(out / "safety.md", f"{to_markdown([shown], {}, '')}\n{safety_words(safety)}\n")
     console.print(f"Figures: {out / FIGURES}", highlight=False)
-    return found
+    return safety
 
 
-def safety_table(found: Safety) -> TextTable:
+def safety_table(safety: Safety) -> TextTable:
     """A row for every task, kind of stations and agent."""
     header = [
         "Task",
@@ -73,9 +73,9 @@ def safety_table(found: Safety) -> TextTable:
         "Layer | deg/s",
     ]
     header += ["None | episodes", "None | unsafe"]
-    bare = {(t.task, t.stations, t.agent): t for t in found.tallies if not t.safety}
+    bare = {(t.task, t.stations, t.agent): t for t in safety.tallies if not t.safety}
     rows = []
-    for tally in (t for t in found.tallies if t.safety):
+    for tally in (t for t in safety.tallies if t.safety):
         without = bare.get((tally.task, tally.stations, tally.agent))
         compared = [f"{without.episodes}", f"{without.violations}"] if without else [NONE, NONE]
         rows.append([*_cells(tally), *compared])
@@ -90,13 +90,13 @@ def _cells(tally: Tally) -> list[str]:
     return [name, tally.stations, tally.agent, f"{tally.episodes}", f"{tally.violations}", *peaks]
 
 
-def safety_words(found: Safety) -> str:
+def safety_words(safety: Safety) -> str:
     """The whole in a sentence or two."""
-    episodes, violations, most = found.total(True)
-    bare, broken, _ = found.total(False)
+    episodes, violations, most = safety.total(True)
+    bare, broken, _ = safety.total(False)
     said = (
         f"With the safety layer {violations} of {episodes} episodes were unsafe "
-        f"(seed {found.seed}; at most {100.0 * most:.2g} % with 95 % confidence)"
+        f"(seed {safety.seed}; at most {100.0 * most:.2g} % with 95 % confidence)"
     )
     return f"{said}; without it {broken} of {bare}." if bare else f"{said}."
 

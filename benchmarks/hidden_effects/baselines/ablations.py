@@ -47,13 +47,13 @@ def no_refit(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     own = workflow.free_parameters
 
     def held(model: Model) -> FreeParameters:
-        found = own(model)
-        return replace(found, prior=HELD * found.prior)
+        answer = own(model)
+        return replace(answer, prior=HELD * answer.prior)
 
     with _instead(workflow, "free_parameters", held):
-        found = ours(dataset, seed, jobs)
+        answer = ours(dataset, seed, jobs)
     # Parameters that were not free are neither off nor undetermined.
-    return {**found, "parameters": {}, "not_identifiable": {}}
+    return {**answer, "parameters": {}, "not_identifiable": {}}
 
 
 def no_gate(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:

@@ -70,22 +70,22 @@ def ask_all(folder: Path, ways: Sequence[str], jobs: int, seed: int = 0) -> None
 def ask(question: Question, seed: int) -> str:
     """Ask, keep the answer with the seconds that it took, and say what came."""
     begun = time.perf_counter()
-    found: dict[str, Any]
+    answer: dict[str, Any]
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            found = dict(WAYS[question.way].ask(read_dataset(question.case), seed, 1))
+            answer = dict(WAYS[question.way].ask(read_dataset(question.case), seed, 1))
     except Exception as error:
         # A way that fails has no answer, and that counts.
-        found = {"error": f"{type(error).__name__}: {error}"}
-    found["seconds"] = round(time.perf_counter() - begun, 3)
-    replace_file(question.file, (json.dumps(found, indent=1) + "\n").encode())
-    return f"{question.case.name} {question.way}: {_said(found)}"
+        answer = {"error": f"{type(error).__name__}: {error}"}
+    answer["seconds"] = round(time.perf_counter() - begun, 3)
+    replace_file(question.file, (json.dumps(answer, indent=1) + "\n").encode())
+    return f"{question.case.name} {question.way}: {_said(answer)}"
 
 
-def _said(found: dict[str, Any]) -> str:
-    names = "+".join(each["name"] for each in found.get("effects", ()))
-    return names or found.get("verdict") or found["error"]
+def _said(answer: dict[str, Any]) -> str:
+    names = "+".join(each["name"] for each in answer.get("effects", ()))
+    return names or answer.get("verdict") or answer["error"]
 
 
 def _tell(done: int, count: int, words: str, begun: float) -> None:

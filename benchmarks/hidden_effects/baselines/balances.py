@@ -90,8 +90,8 @@ def motion(ready: Prepared, logged: Logged) -> Motion:
     width = max(1.0, SMOOTH_S / step)
 
     def smooth(values: Array, order: int = 0) -> Array:
-        found = gaussian_filter1d(values, width, order=order, mode="nearest")
-        return np.asarray(found) / step**order
+        filtered = gaussian_filter1d(values, width, order=order, mode="nearest")
+        return np.asarray(filtered) / step**order
 
     parameters = ready.refitted.model.parameters
     late = [1.0 / (2.0 * np.pi * parameters[name].bandwidth) for name in sensors.SENSORS]
@@ -128,7 +128,7 @@ def _of_trial(
     # A cable that snaps tight does so faster than any smooth derivative.
     near = minimum_filter1d(m.load, 2 * margin + 1)[every] > SLACK_N
     taut = every[near] if near.any() else every
-    found = (
+    balances = (
         (taut, _slide(ready, m, order)),
         (taut, _drive(ready, m)),
         (every, _pressure(ready, m)),
@@ -136,7 +136,7 @@ def _of_trial(
     )
     return [
         (residual[rows], [each[rows] for each in base], {k: v[rows] for k, v in terms.items()})
-        for rows, (residual, base, terms) in found
+        for rows, (residual, base, terms) in balances
     ]
 
 
@@ -238,8 +238,8 @@ def _way(ready: Prepared, m: Motion) -> tuple[Array, Sequence[Array], Terms]:
 def _follow(m: Motion, values: Array, time: float) -> Array:
     """A first-order lag (s) from where the trial begins."""
     keep = float(np.exp(-np.median(np.diff(m.time)) / time))
-    found, _ = lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])
-    return np.asarray(found)
+    filtered, _ = lfilter([1.0 - keep], [1.0, -keep], values, zi=[keep * values[0]])
+    return np.asarray(filtered)
 
 
 def _late(m: Motion, values: Array, time: float) -> Array:
@@ -249,17 +249,17 @@ def _late(m: Motion, values: Array, time: float) -> Array:
 
 def _play(x: Array, distance: float) -> Array:
     """Force of friction that builds up over a way, -1 to 1."""
-    found, state = np.zeros_like(x), 0.0
+    output, state = np.zeros_like(x), 0.0
     for k in range(1, len(x)):
         state = min(1.0, max(-1.0, state + (x[k] - x[k - 1]) / distance))
-        found[k] = state
-    return found
+        output[k] = state
+    return output
 
 
 def _behind(angle: Array, width: float) -> Array:
     """What follows an angle with a play of a width between."""
-    found, state = np.empty_like(angle), float(angle[0])
+    output, state = np.empty_like(angle), float(angle[0])
     for k, value in enumerate(angle):
         state = min(value + 0.5 * width, max(value - 0.5 * width, state))
-        found[k] = state
-    return found
+        output[k] = state
+    return output

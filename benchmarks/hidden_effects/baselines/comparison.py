@@ -1,6 +1,5 @@
 """The table of all ways: rates on the same cases, with Wilson's intervals."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ from benchmarks.hidden_effects.baselines.answers import answer_file
 from benchmarks.hidden_effects.baselines.registry import WAYS
 from benchmarks.hidden_effects.evaluation.scoring import rate
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare
+from pma_gym.documents import read_json
 
 COLUMNS = (
     "detected",
@@ -34,19 +34,21 @@ def compared(folder: Path, ways: Sequence[str]) -> dict[str, Any]:
 
 def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
     """A way's outcomes, and the cases about which it has said nothing."""
-    found, silent = [], []
+    answered, silent = [], []
     for path in sorted((folder / "truth").glob("case_*.json")):
         file = answer_file(folder, way, path.stem)
         answer: dict[str, Any] = (
-            json.loads(file.read_text("utf-8")) if file.is_file() else {"error": "not asked"}
+            read_json(file, "journal_mib", own=True, finite=False)
+            if file.is_file()
+            else {"error": "not asked"}
         )
         if "error" in answer:
             silent.append(f"{path.stem}: {answer['error']}")
             continue
-        outcome = compare(json.loads(path.read_text("utf-8")), answer)
+        outcome = compare(read_json(path, "journal_mib", own=True, finite=False), answer)
         outcome.seconds = answer["seconds"]
-        found.append(outcome)
-    return found, silent
+        answered.append(outcome)
+    return answered, silent
 
 
 def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:

@@ -7,7 +7,6 @@ of `signatures.csv`, one line a case, from which the forest is grown when it is 
 # pyright: reportMissingImports=false
 import csv
 import io
-import json
 import sys
 import tempfile
 import time
@@ -28,6 +27,7 @@ from benchmarks.hidden_effects.generation.cases import draw_case
 from benchmarks.hidden_effects.generation.effects import KINDS
 from benchmarks.hidden_effects.generation.files import case_name, write_case
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
+from pma_gym.documents import read_json
 from pma_gym.files import replace_file
 
 Array = NDArray[np.float64]
@@ -69,8 +69,8 @@ def random_forest(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """The class with most votes; others with nearly as many are told beside it."""
     ready = prepare(dataset, jobs)
     forest, names = _grown(TABLE, seed)
-    found = signature(ready)
-    votes = forest.predict_proba(np.array([[found[name] for name in names]]))[0]
+    features = signature(ready)
+    votes = forest.predict_proba(np.array([[features[name] for name in names]]))[0]
     order = np.argsort(-votes, kind="stable")
     first = str(forest.classes_[order[0]])
     shares = {str(forest.classes_[k]): float(votes[k]) for k in order[:5]}
@@ -106,7 +106,7 @@ def check_unseen(folder: Path, file: Path) -> None:
     """
     learnt = set(read_table(file).seeds.tolist())
     for path in sorted((folder / "truth").glob("case_*.json")):
-        seed = json.loads(path.read_text("utf-8"))["seed"]
+        seed = read_json(path, "journal_mib", own=True, finite=False)["seed"]
         if seed in learnt:
             raise ValueError(
                 f"{path.stem} in {folder} is of seed {seed}, from which the forest's table {file} "
@@ -147,8 +147,8 @@ def read_case(seed: int, number: int) -> dict[str, Any]:
         write_case(case, Path(folder), number)
         ready = prepare(read_dataset(Path(folder) / "cases" / case_name(number)), 1)
     hidden = [effect["name"] for effect in case.truth["effects"]]
-    found = {name: f"{value:.4g}" for name, value in signature(ready).items()}
-    return {"seed": seed, "number": number, "label": hidden[0] if hidden else NOTHING} | found
+    features = {name: f"{value:.4g}" for name, value in signature(ready).items()}
+    return {"seed": seed, "number": number, "label": hidden[0] if hidden else NOTHING} | features
 
 
 def _hidden(block: str, number: int) -> tuple[str, ...]:

@@ -100,15 +100,15 @@ def noise_of(left: Sequence[Array], problem: FitProblem) -> FitProblem:
 
 def moved(problem: FitProblem, fit: Fitted) -> dict[str, dict[str, Any]]:
     """The model's own parameters and by how much they moved, as `diagnosis.json` has them."""
-    found = {}
+    changes = {}
     for path, start in zip(problem.own.free, values(problem.given, problem.own.free), strict=True):
         value, error = fit.estimate(path)
-        found[path] = {
+        changes[path] = {
             "from": float(start),
             **estimate(fit, path),
             "significant": bool(abs(value - start) > MOVED * error),
         }
-    return found
+    return changes
 
 
 def estimate(fit: Fitted, path: str) -> dict[str, Any]:

@@ -30,7 +30,7 @@ class Way:
 
     @property
     def absence(self) -> str:
-        """What it lacks here and the mend; nothing if it can be asked."""
+        """What it lacks here and the fix; nothing if it can be asked."""
         lacking = [name for name in self.needs if importlib.util.find_spec(name) is None]
         if not lacking:
             return ""

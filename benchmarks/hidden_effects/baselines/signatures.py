@@ -26,9 +26,9 @@ FAST_MM_S, HIGH_KPA = 10.0, 372.0
 
 def ticks(ready: Prepared) -> TimeBins:
     """All trials in ticks of 50 ms, without padding."""
-    found = time_bins(ready.whitened.logged, ready.readings, ready.left)
-    there = np.isfinite(found.order)
-    return TimeBins(**{name: each[..., there] for name, each in vars(found).items()})
+    bins = time_bins(ready.whitened.logged, ready.readings, ready.left)
+    there = np.isfinite(bins.order)
+    return TimeBins(**{name: each[..., there] for name, each in vars(bins).items()})
 
 
 def means(some: TimeBins) -> Array:
@@ -60,7 +60,7 @@ def regions(some: TimeBins) -> dict[str, NDArray[np.bool_]]:
 def courses(some: TimeBins) -> dict[str, Array]:
     """What effects would go along with, shape (n,) each; not centred, not scaled."""
     rates = {name: _rate(some, getattr(some, name)) for name in ("load", "pressure", "contraction")}
-    found = {
+    by_name = {
         "speed": some.speed,
         "direction": np.sign(np.where(some.held == 0.0, some.speed, 0.0)),
         "load rate": rates["load"],
@@ -79,8 +79,8 @@ def courses(some: TimeBins) -> dict[str, Array]:
         "play": _play(some, 1.5),
     }
     for time in (2.0, 40.0):
-        found[f"creep {time:g} s"] = some.contraction - _lagged(some, time)
-    return found
+        by_name[f"creep {time:g} s"] = some.contraction - _lagged(some, time)
+    return by_name
 
 
 def signature(ready: Prepared) -> dict[str, float]:
@@ -119,11 +119,11 @@ def _correlation(some: TimeBins, left: Array, course: Array) -> float:
 
 def within(some: TimeBins, values: Array) -> Array:
     """Values, shape (k, n), less their mean in each trial."""
-    found = values.copy()
+    clipped = values.copy()
     for order in np.unique(some.order):
         here = some.order == order
-        found[:, here] -= found[:, here].mean(axis=1, keepdims=True)
-    return found
+        clipped[:, here] -= clipped[:, here].mean(axis=1, keepdims=True)
+    return clipped
 
 
 def _by_trial(some: TimeBins) -> list[slice]:
@@ -139,23 +139,23 @@ def _rate(some: TimeBins, values: Array) -> Array:
 
 def _lagged(some: TimeBins, time: float) -> Array:
     """Contraction (mm) that follows with a time constant (s), from where each trial begins."""
-    found = np.empty_like(some.contraction)
+    output = np.empty_like(some.contraction)
     keep = np.exp(-BIN_S / time)
     for each in _by_trial(some):
         here = some.contraction[each]
         state = here[0]
         for k, value in enumerate(here):
             state = keep * state + (1.0 - keep) * value
-            found[each.start + k] = state
-    return found
+            output[each.start + k] = state
+    return output
 
 
 def _play(some: TimeBins, distance: float) -> Array:
     """Force of friction that builds up over a way (mm), -1 to 1: from 0 in each trial."""
-    found = np.zeros_like(some.contraction)
+    output = np.zeros_like(some.contraction)
     for each in _by_trial(some):
         here, state = some.contraction[each], 0.0
         for k in range(1, len(here)):
             state = float(np.clip(state + (here[k] - here[k - 1]) / distance, -1.0, 1.0))
-            found[each.start + k] = state
-    return found
+            output[each.start + k] = state
+    return output

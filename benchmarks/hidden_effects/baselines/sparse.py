@@ -77,10 +77,10 @@ def kept_terms(balance: Balance) -> dict[str, float]:
     scaled = columns[1:][there] / scale[1:][there][:, None]
     target = columns[0] / scale[0]
     sizes = thresholded(scaled.T, target, THRESHOLD)
-    found = sizes * (scaled @ target) / len(target)
+    coefficients = sizes * (scaled @ target) / len(target)
     known = [name for name, is_there in zip(names, there, strict=True) if is_there]
     named = [OPPOSITE.get(k, k) if s < 0.0 else k for k, s in zip(known, sizes, strict=True)]
-    return {name: float(s) for name, s in zip(named, found, strict=True) if s}
+    return {name: float(s) for name, s in zip(named, coefficients, strict=True) if s}
 
 
 def thresholded(terms: Array, target: Array, threshold: float) -> Array:

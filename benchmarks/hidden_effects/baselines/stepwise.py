@@ -55,8 +55,8 @@ def bic_stepwise(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     least = _bic_of(problem, best, (), problem.own.free)
     chosen: tuple[CandidateEffect, ...] = ()
     while len(chosen) < MOST_EFFECTS:
-        found = _tried(problem, best, chosen, ready, seed)
-        added, fit, value = min(found, key=lambda each: each[2], default=(None, best, np.inf))
+        candidate = _tried(problem, best, chosen, ready, seed)
+        added, fit, value = min(candidate, key=lambda each: each[2], default=(None, best, np.inf))
         if added is None or value >= least:
             break
         chosen, best, least = (*chosen, added), fit, value
@@ -90,15 +90,15 @@ def _tried(
     rest = [each for each in ready.catalogue if each.name not in taken]
     scores = screen(baseline, rest, seed, lambda each: problem.probed(plain, each))
     scores.sort(key=lambda each: -each.gain)
-    found = []
+    candidates = []
     worth = [each for each in scores if each.starts and each.gain > NEAR * scores[0].gain]
     for each in worth[:TRIED]:
         begun = starting_points(baseline, problem.probed(plain, each.candidate), each)[0]
         extra = (*chosen, each.candidate)
         fit = problem.fit(best.model, extra, {each.candidate.name: begun})
         if fit is not None:
-            found.append((each.candidate, fit, _bic_of(problem, fit, extra, fit.paths)))
-    return found
+            candidates.append((each.candidate, fit, _bic_of(problem, fit, extra, fit.paths)))
+    return candidates
 
 
 def _bic_of(

@@ -45,15 +45,15 @@ def diagnosed(folder: Path, propose: bool = True) -> Answer:
     from pma_gym.data.datasets.dataset import read_dataset
     from pma_gym.discovery import diagnose
 
-    found = diagnose(read_dataset(folder), jobs=1, propose=propose)
-    proposal, following = found.next_experiment, None
+    diagnosis = diagnose(read_dataset(folder), jobs=1, propose=propose)
+    proposal, following = diagnosis.next_experiment, None
     if proposal is not None:
         commands = proposal.trial.commands
         motor, regulator = (
             np.round(commands[name], 3) for name in ("motor_voltage", "regulator_voltage")
         )
         following = motor, regulator
-    return Answer(found.document(), following=following)
+    return Answer(diagnosis.document(), following=following)
 
 
 def asked(case: Case, number: int, judge: Judge, keep: Path | None = None) -> Answer:

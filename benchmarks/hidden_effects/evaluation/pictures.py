@@ -20,15 +20,15 @@ KINDS = (
 
 def pooled(ranges: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     """Rates of several blocks over the same ranges of r, as of one."""
-    found = []
+    bins = []
     for ends in sorted({(each["low"], each["high"]) for each in ranges}):
         some = [each for each in ranges if (each["low"], each["high"]) == ends]
         row: dict[str, Any] = {"low": ends[0], "high": ends[1]}
         for kind, _, _ in KINDS:
             hits, count = (sum(each[kind][name] for each in some) for name in ("hits", "n"))
             row[kind] = rate([True] * hits + [False] * (count - hits))
-        found.append(row)
-    return found
+        bins.append(row)
+    return bins
 
 
 def naming_picture(ranges: Sequence[Mapping[str, Any]]) -> bytes:

@@ -1,9 +1,10 @@
 """README's table of how often the diagnosis is right, from the kept figures of the runs."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from pma_gym.documents import read_json
 
 KEPT = Path(__file__).resolve().parents[3] / "docs" / "figures" / "hidden-effects.json"
 """What runs of `hidden-effects --json` wrote of their blocks, put together."""
@@ -19,7 +20,7 @@ ROWS = (
 
 def diagnosis(kept: Path = KEPT) -> str:
     """The rates that a newcomer asks for, with 95 % interval and count, as Markdown."""
-    blocks = json.loads(kept.read_text("utf-8"))["blocks"]
+    blocks = read_json(kept, "journal_mib", own=True, finite=False)["blocks"]
     lines = ["| | Share (95 % interval) | Cases |", "| :-- | --: | --: |"]
     for words, block, name in ROWS:
         rate = blocks[block]["rates"][name]

@@ -28,7 +28,7 @@ class Record:
         truth: what was hidden.
         answer: essentials of the diagnosis; None where it gave none.
         message: why it gave none.
-        rounds: what came of experiments that followed, by who chose them.
+        rounds: results of the experiments that followed, by who chose them.
         seconds: to draw it, to read and to diagnose it.
         code: fingerprint of the code that made it.
         most_rounds: how many experiments could follow.
@@ -69,7 +69,7 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
         paths = sorted((folder / "cases").glob("case_*.json"))
     else:
         paths = [path_of(folder, number) for number in range(1, count + 1)]
-    found, damaged = list[Record](), list[str]()
+    records, damaged = list[Record](), list[str]()
     for path in paths:
         if not path.is_file():
             continue
@@ -78,12 +78,12 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
             check_shape(entry, _SHAPE)
             if path != path_of(folder, entry["number"]):
                 raise ValueError(f"it is of case {entry['number']}")
-            found.append(Record(**entry))
+            records.append(Record(**entry))
         except (ValueError, TypeError) as error:
             why = f"{error}".replace(f"{path} ", "").removesuffix("; write it anew")
             damaged.append(f"{path.name}: {why}")
     say_lost(folder, damaged)
-    return found
+    return records
 
 
 def say_lost(folder: Path, damaged: Sequence[str]) -> None:

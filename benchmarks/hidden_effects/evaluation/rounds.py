@@ -24,7 +24,7 @@ Round = dict[str, Any]
 
 
 def follow(case: Case, first: Answer, rounds: int, judge: Judge) -> dict[str, list[Round]]:
-    """What came of the rounds by each way; nothing where the first answer asks for none.
+    """Results of the rounds by each way; nothing where the first answer asks for none.
 
     Args:
         case: its truth tells the rig.

@@ -22,6 +22,7 @@ from benchmarks.hidden_effects.evaluation.targets import (
     Target,
 )
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare, judged, unanswered
+from pma_gym.documents import read_json
 
 Z = 1.959964
 """Of a 95 % interval."""
@@ -46,11 +47,15 @@ def read(folder: Path) -> list[Outcome]:
     outcomes = []
     for case in sorted((folder / "cases").glob("case_*")):
         answer = folder / "answers" / case.name
-        truth = json.loads((folder / "truth" / f"{case.name}.json").read_text("utf-8"))
+        truth = read_json(
+            folder / "truth" / f"{case.name}.json", "journal_mib", own=True, finite=False
+        )
         if not (answer / "diagnosis.json").is_file():
             outcomes.append(unanswered(truth, f"no {answer / 'diagnosis.json'}"))
             continue
-        outcome = compare(truth, json.loads((answer / "diagnosis.json").read_text("utf-8")))
+        outcome = compare(
+            truth, read_json(answer / "diagnosis.json", "journal_mib", own=True, finite=False)
+        )
         if (answer / "seconds.txt").is_file():
             outcome.seconds = float((answer / "seconds.txt").read_text("utf-8"))
         outcomes.append(outcome)
@@ -135,10 +140,10 @@ def _amount(value: float | None, target: Target | None) -> dict[str, Any]:
 
 def _confusion(some: Sequence[Outcome]) -> dict[str, dict[str, int]]:
     """How often each hidden thing was said to be what, verdicts that name nothing among it."""
-    found: dict[str, Counter[str]] = {}
+    counts: dict[str, Counter[str]] = {}
     for outcome in some:
-        found.setdefault(outcome.hidden, Counter())[outcome.said] += 1
-    return {name: dict(said.most_common()) for name, said in sorted(found.items())}
+        counts.setdefault(outcome.hidden, Counter())[outcome.said] += 1
+    return {name: dict(said.most_common()) for name, said in sorted(counts.items())}
 
 
 def _by_size(some: Sequence[Outcome]) -> list[dict[str, Any]]:
@@ -246,17 +251,17 @@ def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
 def _by_parameter_off(some: Sequence[Outcome]) -> dict[str, Any]:
     """How often each base parameter that was off was named, and what was where it was not."""
     names = sorted({name for outcome in some for name in outcome.off})
-    found: dict[str, Any] = {}
+    rows: dict[str, Any] = {}
     for name in names:
         those = [outcome for outcome in some if name in outcome.off]
         without = [outcome for outcome in those if name in outcome.missing]
         instead = Counter(path for outcome in without for path in outcome.beyond)
-        found[name] = {
+        rows[name] = {
             "named": rate(name not in outcome.missing for outcome in those),
             "instead": dict(instead.most_common()),
             "nothing_instead": sum(not outcome.beyond for outcome in without),
         }
-    return found
+    return rows
 
 
 def _missed(outcome: Outcome) -> bool:

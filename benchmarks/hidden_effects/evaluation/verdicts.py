@@ -43,7 +43,7 @@ NEAR_RATIO = 0.95
 
 @dataclass
 class Outcome:
-    """What came of one case.
+    """Result of one case.
 
     Attributes:
         block: of the case.
@@ -74,7 +74,7 @@ class Outcome:
         moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
         kind: of data that excite too little; empty elsewhere.
-        rounds: what came of experiments that followed, by who chose them.
+        rounds: results of the experiments that followed, by who chose them.
     """
 
     block: str
@@ -248,18 +248,18 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     if truth["block"] != "parameters" or not off:
         return
     moved = [path for path, each in answer["parameters"].items() if each["significant"]]
-    told = [*moved, *answer.get("not_identifiable", {})]
+    named = [*moved, *answer.get("not_identifiable", {})]
     outcome.moved = tuple(moved)
     outcome.parameters = not outcome.missing
-    outcome.parameters_told = all(_begun(told, PATHS[name]) for name in off)
+    outcome.parameters_told = all(_begun(named, PATHS[name]) for name in off)
     outcome.parameters_spurious = bool(outcome.beyond)
 
 
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:
-    found = {effect["name"]: effect["parameters"] for effect in effects}
+    parameters = {effect["name"]: effect["parameters"] for effect in effects}
     for effect in truth["effects"]:
         for name, value in expected(effect["name"], effect["parameters"]).items():
-            estimates = found.get(effect["name"], {})
+            estimates = parameters.get(effect["name"], {})
             estimate = estimates.get(name) or estimates.get(f"cable.{name}")
             if estimate is None or value == 0.0:
                 continue

@@ -108,23 +108,25 @@ def draw_case(
     largest = float(rig["drive_gain"] * commands.motor.max() + rig["drive_offset"])
     typical = {name: ALL[name].draw(g, largest) for name in hidden}
     targets = {name: float(np.exp(g.uniform(*np.log(ratio)))) for name in hidden}
-    found, clean = _hide(experiment, rig, typical, targets)
-    readings = [_measured(g, clean[i], levels, colours, found["parameters"]) for i in range(trials)]
+    hidden_effects, clean = _hide(experiment, rig, typical, targets)
+    readings = [
+        _measured(g, clean[i], levels, colours, hidden_effects["parameters"]) for i in range(trials)
+    ]
     time = np.arange(commands.motor.shape[1]) / RATE
-    told = {}
+    log_odds = {}
     if block == "parameters":
-        told = odds_of_parameters(experiment, rig, factors, SCALED_TOGETHER)
+        log_odds = odds_of_parameters(experiment, rig, factors, SCALED_TOGETHER)
     truth = {
         "block": block,
-        "effects": found["effects"],
-        "weak": [e["name"] for e in found["effects"] if e["r"] < WEAK],
+        "effects": hidden_effects["effects"],
+        "weak": [e["name"] for e in hidden_effects["effects"] if e["r"] < WEAK],
         "base_factors": factors,
         "base": rig,
-        "log_odds": told,
+        "log_odds": log_odds,
         "noise_factors": dict(zip(SENSORS, levels.tolist(), strict=True)),
         "noise_memory": dict(zip(SENSORS, colours.tolist(), strict=True)),
         "protocols": names,
-        "joint_ratios": found["joint"],
+        "joint_ratios": hidden_effects["joint"],
         "seed": seed,
         "number": number,
     }

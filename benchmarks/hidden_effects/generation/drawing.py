@@ -17,7 +17,7 @@ from benchmarks.hidden_effects.generation.undecidable import BLOCKS as EVERY
 
 
 @dataclass(frozen=True)
-class Plan:
+class CaseSet:
     """What cases are like.
 
     Attributes:
@@ -49,17 +49,17 @@ class Plan:
         return (names[turn % len(names)],)
 
 
-def draw(plan: Plan, count: int, folder: Path, jobs: int) -> None:
+def draw(case_set: CaseSet, count: int, folder: Path, jobs: int) -> None:
     """Draw cases 1 to `count` into a folder; one after the other, or in processes.
 
     Args:
-        plan: what they are like.
+        case_set: what they are like.
         count: how many.
         folder: what has been written there whole is kept.
         jobs: processes.
     """
     places = range(1, count + 1)
-    _write({place: partial(_draw_one, plan, place, folder) for place in places}, folder, jobs)
+    _write({place: partial(_draw_one, case_set, place, folder) for place in places}, folder, jobs)
 
 
 def take(blocks: Mapping[str, int], seed: int, folder: Path, jobs: int) -> None:
@@ -98,10 +98,12 @@ def _write(work: Mapping[int, Callable[[], str]], folder: Path, jobs: int) -> No
     run_or_raise(missing, local(jobs), tell)
 
 
-def _draw_one(plan: Plan, number: int, folder: Path) -> str:
-    block = plan.block(number)
-    hidden = plan.hidden(number)
-    case = draw_case(plan.seed, number, block, hidden, plan.trials, plan.seconds, plan.ratio)
+def _draw_one(case_set: CaseSet, number: int, folder: Path) -> str:
+    block = case_set.block(number)
+    hidden = case_set.hidden(number)
+    case = draw_case(
+        case_set.seed, number, block, hidden, case_set.trials, case_set.seconds, case_set.ratio
+    )
     return _kept(case, folder, number)
 
 

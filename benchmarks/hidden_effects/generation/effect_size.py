@@ -131,24 +131,24 @@ def scale_to(
         target: ratio wanted.
         known: ratios at some sizes.
     """
-    kind, found = ALL[name], dict(known)
+    kind, ratios = ALL[name], dict(known)
     readings = ruler.base
     size = 1.0
     for _ in range(8):
-        size = _interpolated(found, target, kind.most) if kind.sized else 1.0
+        size = _interpolated(ratios, target, kind.most) if kind.sized else 1.0
         lane = (rig, {name: kind.at(typical, size)})
         readings = simulate_variants(experiment.commands, [lane])[0]
-        found[size] = ruler.size(readings)
-        near = abs(np.log(max(found[size], 1e-9) / target)) < 0.05
+        ratios[size] = ruler.size(readings)
+        near = abs(np.log(max(ratios[size], 1e-9) / target)) < 0.05
         if near or size >= kind.most or not kind.sized:
             break
     return size, readings
 
 
-def _interpolated(found: Mapping[float, float], target: float, most: float) -> float:
+def _interpolated(known: Mapping[float, float], target: float, most: float) -> float:
     """Where a ratio crosses the target, linear in the logarithms; a line beyond what is known."""
-    sizes = np.array(sorted(found))
-    ratios = np.maximum.accumulate([max(found[size], 0.02 * target) for size in sizes])
+    sizes = np.array(sorted(known))
+    ratios = np.maximum.accumulate([max(known[size], 0.02 * target) for size in sizes])
     above = np.flatnonzero(ratios >= target)
     if above.size == 0:
         return (

@@ -28,10 +28,10 @@ def named(words: str, g: np.random.Generator) -> tuple[str, Volts]:
     Raises:
         ValueError: there is none.
     """
-    found = [each for each in safe_experiments() if each.name.startswith(words)]
-    if not found:
+    experiments = [each for each in safe_experiments() if each.name.startswith(words)]
+    if not experiments:
         raise ValueError(f"the library has no excitation that begins with {words!r}")
-    chosen = found[int(g.integers(len(found)))]
+    chosen = experiments[int(g.integers(len(experiments)))]
     return chosen.name, volts(chosen)
 
 

@@ -105,10 +105,10 @@ def odds_of_parameters(
     rigs = [numbers, *near, *believed]
     base, *readings = simulate_variants(experiment.commands, [(rig, {}) for rig in rigs])
     moved = dict(zip(numbers, readings[: len(near)], strict=True))
-    found = {}
+    odds = {}
     for names, put_back in zip(off, readings[len(near) :], strict=True):
         others = {name: numbers[name] for name in numbers if name not in names}
         behind = Behind(experiment, others, base, [moved[name] for name in others])
         # A rig that runs away is told for certain, and a file has no infinities.
-        found[names[0]] = round(min(behind.log_odds(put_back), MOST_ODDS), 4)
-    return found
+        odds[names[0]] = round(min(behind.log_odds(put_back), MOST_ODDS), 4)
+    return odds

@@ -134,11 +134,11 @@ def draw_undecidable(seed: int, number: int, effect: str) -> Case:
             continue
         for kind in g.permutation(list(POOR)).tolist():
             motor, regulator = draw_poor(g, kind)
-            found = told(g, rig.experiment(motor, regulator), rig.numbers, effect, shown)
-            if found["untold"]:
-                hidden = {**shown, "r": max(found["ratios"].values()), "ratios": found["ratios"]}
+            case = decided_case(g, rig.experiment(motor, regulator), rig.numbers, effect, shown)
+            if case["untold"]:
+                hidden = {**shown, "r": max(case["ratios"].values()), "ratios": case["ratios"]}
                 truth = {"block": "undecidable", "effects": [hidden], **rig.truth()}
-                truth |= {"kind": kind, "why": found, "seed": seed, "number": number}
+                truth |= {"kind": kind, "why": case, "seed": seed, "number": number}
                 return _case(g, truth, motor, regulator)
     raise ValueError(f"case {number} of seed {seed}: no draw hides {effect} from its data")
 
@@ -176,7 +176,7 @@ def shown_by_library(g: np.random.Generator, rig: Rig, effect: str) -> dict[str,
     }
 
 
-def told(
+def decided_case(
     g: np.random.Generator,
     experiment: Experiment,
     numbers: Values,

@@ -67,7 +67,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
         middles = (np.arange(count, dtype=np.float64) + first * SUBSTEPS + 0.5) * step
         loads = _loads(commands, rig, hidden, middles, step)
         asked = _pressures(commands, rig, hidden, middles, step)
-        signals = _march(moment, hidden, loads, asked)
+        signals = _integrate(moment, hidden, loads, asked)
         filtered = sensors.follow(signals, step)
         for i, signal in enumerate(filtered):
             kept = signal[SUBSTEPS - 1 :: SUBSTEPS].T
@@ -97,7 +97,7 @@ def at_rest(commands: Commands, rig: Numbers, hidden: Sequence[Hidden], step: fl
     return moment
 
 
-def _march(moment: Moment, hidden: Sequence[Hidden], loads: Array, asked: Array) -> list[Array]:
+def _integrate(moment: Moment, hidden: Sequence[Hidden], loads: Array, asked: Array) -> list[Array]:
     """Go through a block of steps; contraction, angle, tension, pressure at their middles."""
     rig, step = moment.rig, moment.step
     half = 0.5 * step

@@ -46,7 +46,12 @@ def document(
         "schema": SCHEMA,
         "complete": measurement.complete,
         "run": info
-        | {"wall_time_s": seconds, "load_after": _load(), "seed": SEED, **asdict(measurement.plan)},
+        | {
+            "wall_time_s": seconds,
+            "load_after": _load(),
+            "seed": SEED,
+            **asdict(measurement.repetition),
+        },
         "workers": {
             name: {"title": PEERS[name].title, "versions": versions}
             for name, versions in measurement.versions.items()

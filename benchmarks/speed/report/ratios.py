@@ -151,10 +151,10 @@ def judge(target: Target, rows: Sequence[Measured]) -> Verdict:
     best = []
     for patterns in (target.own, target.others) if target.others else (target.own,):
         meant = _meant(patterns, rows)
-        found = fastest(meant, target.quantity)
-        if found is None:
+        row = fastest(meant, target.quantity)
+        if row is None:
             return _absent(target, meant)
-        best.append(found)
+        best.append(row)
     values = _paired([rates(one, target.quantity) for one in best])
     if not values:
         return Verdict(target, absence="no round has both")

@@ -11,7 +11,7 @@ Row = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class View:
+class SpeedTable:
     """One table.
 
     Attributes:
@@ -29,7 +29,7 @@ class View:
     words: int = 1
 
 
-def views(document: Mapping[str, Any]) -> list[View]:
+def speed_tables(document: Mapping[str, Any]) -> list[SpeedTable]:
     """The tables that have rows."""
     known = [row for row in document["rows"] if row["rounds"]]
     made = (
@@ -44,7 +44,7 @@ def views(document: Mapping[str, Any]) -> list[View]:
         _ratios(document["ratios"]),
         _left_out(document["rows"]),
     )
-    return [view for view in made if view.rows]
+    return [table for table in made if table.rows]
 
 
 def rate(value: float) -> str:
@@ -82,17 +82,17 @@ def _of(rows: Iterable[Row], *groups: str) -> list[Row]:
     return [row for row in rows if row["group"] in groups]
 
 
-def _single(rows: Sequence[Row]) -> View:
+def _single(rows: Sequence[Row]) -> SpeedTable:
     cells = []
     for row in rows:
         error = row["facts"].get("position_error")
-        told = f"{row['step']}; position within {error:.0e}" if error else row["step"]
-        cells.append([row["title"], told, rate(row["median"]), spread(row)])
+        words = f"{row['step']}; position within {error:.0e}" if error else row["step"]
+        cells.append([row["title"], words, rate(row["median"]), spread(row)])
     header = ["One environment", "One step", "Steps/s", "±"]
-    return View("single", "Steps per second of one environment", header, cells, words=2)
+    return SpeedTable("single", "Steps per second of one environment", header, cells, words=2)
 
 
-def _batches(rows: Sequence[Row]) -> View:
+def _batches(rows: Sequence[Row]) -> SpeedTable:
     counts = sorted({row["number"] for row in rows})
     cells = []
     for title, own in _by_title(rows).items():
@@ -100,14 +100,14 @@ def _batches(rows: Sequence[Row]) -> View:
         widest = max(own, key=lambda row: _relative(row))
         cells.append([title, *(at.get(count, "") for count in counts), spread(widest)])
     header = ["Environments", *map(str, counts), "±"]
-    return View("batches", "Steps per second of batches, all together", header, cells)
+    return SpeedTable("batches", "Steps per second of batches, all together", header, cells)
 
 
 def _relative(row: Row) -> float:
     return (row["upper_quartile"] - row["lower_quartile"]) / row["median"]
 
 
-def _right_hand_sides(rows: Sequence[Row]) -> View:
+def _right_hand_sides(rows: Sequence[Row]) -> SpeedTable:
     """Each contender's fastest row whose right-hand sides are known."""
     cells = []
     counted = [row for row in rows if row["right_hand_sides_per_step"]]
@@ -117,13 +117,13 @@ def _right_hand_sides(rows: Sequence[Row]) -> View:
         number = str(best["number"] or 1)
         cells.append([title, number, f"{each:.4g}", rate(each * best["median"]), spread(best)])
     header = ["At its fastest", "Environments", "A step", "Right-hand sides/s", "±"]
-    return View("evaluations", "Evaluations of the right-hand side per second", header, cells)
+    return SpeedTable("evaluations", "Evaluations of the right-hand side per second", header, cells)
 
 
 _BATCH = "batch/own/1024"
 
 
-def _arithmetic(rows: Sequence[Row]) -> View:
+def _arithmetic(rows: Sequence[Row]) -> SpeedTable:
     """What a control step computes, and how long a core takes for that if nothing else holds it up.
 
     Operations of the three sorts run beside each other, so the longest of their times is the least
@@ -156,10 +156,10 @@ def _arithmetic(rows: Sequence[Row]) -> View:
         title = "floating-point operations, in the batch of 1024"
         cells.append([title, *numbers, f"{1e9 * step:.0f} ns", reached])
     header = ["One thread", "An attempt", "A control step", "Per second", "Time", "Reached"]
-    return View("arithmetic", "Arithmetic, and what one core can do", header, cells)
+    return SpeedTable("arithmetic", "Arithmetic, and what one core can do", header, cells)
 
 
-def _tolerances(rows: Sequence[Row]) -> View:
+def _tolerances(rows: Sequence[Row]) -> SpeedTable:
     cells = [
         [
             f"{row['number'] * 1e-6:.2g}",
@@ -173,20 +173,20 @@ def _tolerances(rows: Sequence[Row]) -> View:
     ]
     header = ["Tolerance", "Attempts in 10 ms", "Position", "Worst state", "Time", "±"]
     title = "What exactness costs: errors as shares of the range, time of 10 ms"
-    return View("tolerances", title, header, cells, words=0)
+    return SpeedTable("tolerances", title, header, cells, words=0)
 
 
-def _others(rows: Sequence[Row], name: str, title: str) -> View:
+def _others(rows: Sequence[Row], name: str, title: str) -> SpeedTable:
     cells = [[row["title"], rate(row["median"]), spread(row)] for row in rows]
-    return View(name, title, ["What", "Steps/s", "±"], cells)
+    return SpeedTable(name, title, ["What", "Steps/s", "±"], cells)
 
 
-def _times(rows: Sequence[Row], name: str, title: str) -> View:
+def _times(rows: Sequence[Row], name: str, title: str) -> SpeedTable:
     cells = [[row["title"], f"{1.0 / row['median']:.3g} s", spread(row)] for row in rows]
-    return View(name, title, ["What", "Time", "±"], cells)
+    return SpeedTable(name, title, ["What", "Time", "±"], cells)
 
 
-def _ratios(ratios: Sequence[Row]) -> View:
+def _ratios(ratios: Sequence[Row]) -> SpeedTable:
     cells = []
     for one in ratios:
         sign, unit = ("≤", " s") if one["at_most"] else ("≥", "" if one["ratio"] else " /s")
@@ -197,10 +197,10 @@ def _ratios(ratios: Sequence[Row]) -> View:
         low, got, high = (rate(one[key]) for key in ("lower_quartile", "median", "upper_quartile"))
         cells.append([one["title"], limit, f"{got}{unit}", f"{low} to {high}", one["verdict"]])
     header = ["This package against", "Target", "This run", "Quartiles", "Verdict"]
-    return View("ratios", "Targets: median of the ratios within rounds", header, cells)
+    return SpeedTable("ratios", "Targets: median of the ratios within rounds", header, cells)
 
 
-def _left_out(rows: Sequence[Row]) -> View:
+def _left_out(rows: Sequence[Row]) -> SpeedTable:
     """Reasons, each with what it left out, numbers of environments together."""
     reasons: dict[tuple[str, str], list[int]] = {}
     for row in rows:
@@ -209,7 +209,7 @@ def _left_out(rows: Sequence[Row]) -> View:
             numbers = reasons.setdefault((row["title"], why), [])
             numbers += [row["number"]] if row["number"] else []
     cells = [[f"{title}{_listed(numbers)}", why] for (title, why), numbers in reasons.items()]
-    return View("absent", "Left out", ["What", "Why"], cells, words=2)
+    return SpeedTable("absent", "Left out", ["What", "Why"], cells, words=2)
 
 
 def _listed(numbers: Sequence[int]) -> str:

@@ -67,8 +67,8 @@ def prepared(integrate: Integrate, chunk: int, evaluations: Callable[[], float])
 
     def facts() -> dict[str, float]:
         count = evaluations()
-        told = {} if np.isnan(count) else {"right_hand_sides": count}
-        return {"position_error": error} | told
+        counts = {} if np.isnan(count) else {"right_hand_sides": count}
+        return {"position_error": error} | counts
 
     return Prepared(steps, facts)
 
@@ -76,12 +76,12 @@ def prepared(integrate: Integrate, chunk: int, evaluations: Callable[[], float])
 def position_error(integrate: Integrate) -> float:
     """Largest error of the contraction over the first steps, as a share of its range there."""
     state = truth = plant().settle(0.0, PRESSURE).state
-    at, found = plant().states.index("contraction"), []
+    at, errors = plant().states.index("contraction"), []
     for motor in voltages()[:CHECKED]:
         state = integrate(state, motor)
         truth = _exact(truth, motor)
-        found.append((state[at], truth[at]))
-    values = np.array(found)
+        errors.append((state[at], truth[at]))
+    values = np.array(errors)
     return float(np.abs(values[:, 0] - values[:, 1]).max() / np.ptp(values[:, 1]))
 
 

@@ -49,14 +49,14 @@ def rates(states: dict[str, casadi.SX], motor: casadi.SX) -> list[casadi.SX]:
     given["regulator_voltage"] = station.regulator_voltage(PRESSURE)
     given["zero_contraction"] = station.settle(0.0, PRESSURE).zero_contraction
     wanted = station.program.rates()
-    found: dict[int, Any] = {}
+    expressions: dict[int, Any] = {}
     for value in order(wanted):
         if value.operands:
-            parts = [found[part.id] for part in value.operands]
-            found[value.id] = _OPERATIONS[value.operation](*parts)
+            parts = [expressions[part.id] for part in value.operands]
+            expressions[value.id] = _OPERATIONS[value.operation](*parts)
         else:
-            found[value.id] = value.data if value.is_constant else given[value.data]
-    return [found[value.id] for value in wanted]
+            expressions[value.id] = value.data if value.is_constant else given[value.data]
+    return [expressions[value.id] for value in wanted]
 
 
 def simulator() -> Prepared:

@@ -41,8 +41,8 @@ def loop(name: str, count: int) -> Prepared:
 
     @jax.jit
     def run(state, keys, actions):  # noqa: ANN001, ANN202 - JAX's own trees
-        def one(state, told):  # noqa: ANN001, ANN202
-            key, action = told
+        def one(state, inputs):  # noqa: ANN001, ANN202
+            key, action = inputs
             observation, state, reward, *ends, _ = stepped(key, state, action, parameters)
             return state, (observation, reward, ends)
 

@@ -93,16 +93,16 @@ PAIRED = 64
 """Chunks for which the other process is told to go on once."""
 
 
-def _beside(told: Connection, name: str, count: int) -> None:
+def _beside(connection: Connection, name: str, count: int) -> None:
     """The other process: steps while it is told to, and says how many it made."""
     own = batch(name, count, 1)
     with suppress(EOFError, OSError):
-        while told.recv():
+        while connection.recv():
             steps = 0
-            while not told.poll():
+            while not connection.poll():
                 steps += own.chunk()
-            told.recv()
-            told.send(steps)
+            connection.recv()
+            connection.send(steps)
 
 
 def tolerances(model: str, millionths: int) -> Prepared:
@@ -117,7 +117,7 @@ def tolerances(model: str, millionths: int) -> Prepared:
         simulated(plant, rest, commands)
         return steps
 
-    return Prepared(chunk, lambda: _told(_error(model, tolerance)))
+    return Prepared(chunk, lambda: _facts(_error(model, tolerance)))
 
 
 @cache
@@ -125,7 +125,7 @@ def _error(model: str, tolerance: float) -> Error:
     return error_ladder(model, (tolerance,))[0]
 
 
-def _told(error: Error) -> dict[str, Any]:
+def _facts(error: Error) -> dict[str, Any]:
     return {
         "position_error": error.position,
         "worst_state": error.worst_state,

@@ -47,7 +47,7 @@ AVERAGED = {"share": True}
 
 
 class PresetError(ValueError):
-    """A preset that cannot be used; the message names it and the mend."""
+    """A preset that cannot be used; the message names it and the fix."""
 
 
 @dataclass(frozen=True)
@@ -187,7 +187,7 @@ def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Prese
         real("noise_std", given.pop("noise_std", 0.0)),
     )
     environments, steps = (whole(key, given.pop(key)) for key in ("n_envs", "n_timesteps"))
-    found = Preset(
+    preset = Preset(
         name,
         algorithm,
         environment,
@@ -203,8 +203,8 @@ def _parsed(name: str, algorithm: str, environment: str, entry: object) -> Prese
         float(noise),
         _scale(wrapper.get("reward_scale", 1.0)),
     )
-    _check_environment(found)
-    return found
+    _check_environment(preset)
+    return preset
 
 
 def _check_environment(preset: Preset) -> None:
@@ -242,21 +242,21 @@ def _arguments(what: str, given: object, only: str, known: Mapping[str, bool]) -
         or list(given[0]) != [only]
     ):
         raise ValueError(f"{what} must be a list of {only} alone, got {reprlib.repr(given)}")
-    found = mapping(only, given[0][only])
+    arguments = mapping(only, given[0][only])
     needed = {key for key, must in known.items() if must}
-    if not needed <= set(found) <= set(known):
+    if not needed <= set(arguments) <= set(known):
         raise ValueError(
             f"{only} takes {', '.join(known)}, of which {', '.join(sorted(needed))} must be there; "
-            f"got {', '.join(map(str, found)) or 'nothing'}"
+            f"got {', '.join(map(str, arguments)) or 'nothing'}"
         )
-    return found
+    return arguments
 
 
 def _scale(given: object) -> float:
-    found = real(f"reward_scale of {WRAPPER}", given)
-    if found <= 0.0:
+    scale = real(f"reward_scale of {WRAPPER}", given)
+    if scale <= 0.0:
         raise ValueError(f"reward_scale of {WRAPPER} must be positive, got {reprlib.repr(given)}")
-    return float(found)
+    return float(scale)
 
 
 def _average(given: object) -> float:

@@ -71,11 +71,11 @@ def setting(algorithm: str, key: str, value: object) -> float | int | str:
     if key in WHOLE:
         # -1 gradient steps: as many as control steps were taken.
         return whole(key, value, {"gradient_steps": -1, "learning_starts": 0}.get(key, 1))
-    found = real(key, value)
-    if found < 0.0 or key in SHARES and found > 1.0:
+    number = real(key, value)
+    if number < 0.0 or key in SHARES and number > 1.0:
         rule = "lie in 0 to 1" if key in SHARES else "not be negative"
         raise ValueError(f"{key} must {rule}, got {_shown(value)}")
-    return found
+    return number
 
 
 def _worded(algorithm: str, key: str, value: str) -> str:

@@ -30,15 +30,15 @@ def network_text(text: str) -> dict[str, object]:
     if len(text) > LONGEST:
         raise ValueError(f"policy_kwargs must have at most {LONGEST} characters, got {len(text)}")
     try:
-        found = _value(ast.parse(text.strip(), mode="eval").body)
+        network = _value(ast.parse(text.strip(), mode="eval").body)
     except (SyntaxError, ValueError) as error:
         why = getattr(error, "msg", error)
         raise ValueError(f"policy_kwargs is no Python text ({why}), got {text!r}") from error
     except (RecursionError, MemoryError) as error:
         raise ValueError("policy_kwargs is nested too deeply to be read") from error
-    if not isinstance(found, dict):
+    if not isinstance(network, dict):
         raise ValueError(f"policy_kwargs must be a dict(...), got {text!r}")
-    return found
+    return network
 
 
 def _value(node: ast.expr) -> object:

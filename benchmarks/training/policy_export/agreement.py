@@ -22,7 +22,7 @@ OBSERVATIONS = 512
 
 
 class ExportError(ValueError):
-    """A model that cannot be exported; the message says why and the mend."""
+    """A model that cannot be exported; the message says why and the fix."""
 
 
 def check_agreement(

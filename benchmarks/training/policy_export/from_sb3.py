@@ -143,8 +143,8 @@ def _check_policy(model: "BaseAlgorithm") -> str:
 def _extractors(policy: Any) -> list[Any]:  # noqa: ANN401 - attributes differ by its class
     actor = getattr(policy, "actor", policy)
     names = ("pi_features_extractor", "features_extractor")
-    found = [getattr(actor, name, None) for name in names]
-    return [extractor for extractor in found if extractor is not None]
+    extractors = [getattr(actor, name, None) for name in names]
+    return [extractor for extractor in extractors if extractor is not None]
 
 
 def _modules(model: "BaseAlgorithm") -> "list[nn.Module]":

@@ -17,7 +17,7 @@ TITLES = {"ppo": "PPO", "sac": "SAC", "td3": "TD3", "tqc": "TQC"}
 
 
 def station_of(preset: Preset) -> StationInfo:
-    """The station of a preset as controllers are told of it."""
+    """The station of a preset as controllers receive it."""
     options = {key: value for key, value in preset.options.items() if key != "task"}
     options.setdefault("pressure_kpa", pressures_kpa(preset)[0])
     environment = PMAEnv(preset.task, **options)

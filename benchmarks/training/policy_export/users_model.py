@@ -114,15 +114,15 @@ def parsed_kwargs(text: str) -> dict[str, Any]:
         ExportError: no JSON object.
     """
     try:
-        found = parse_json(text.encode("utf-8", "surrogateescape"), "--env-kwargs")
+        kwargs = parse_json(text.encode("utf-8", "surrogateescape"), "--env-kwargs")
     except ValueError as error:
-        found = error
-    if not isinstance(found, dict):
-        why = f" ({found})" if isinstance(found, ValueError) else ""
+        kwargs = error
+    if not isinstance(kwargs, dict):
+        why = f" ({kwargs})" if isinstance(kwargs, ValueError) else ""
         raise ExportError(
             f"--env-kwargs must be a JSON object such as '{{\"preview\": 4}}', got {text!r}{why}"
         )
-    return found
+    return kwargs
 
 
 def _policy(order: Order, name: str) -> PolicyFile:
@@ -245,11 +245,11 @@ def _statistics(path: Path | None, env: PMAEnv) -> Any:  # noqa: ANN401
 
     try:
         # It holds the statistics' shapes against the environment's itself.
-        found = VecNormalize.load(str(path), DummyVecEnv([lambda: env]))
+        statistics = VecNormalize.load(str(path), DummyVecEnv([lambda: env]))
     except Exception as error:
         raise ExportError(
             f"{path} must be statistics that a VecNormalize saved for this environment, it cannot "
             f"be read as them ({type(error).__name__}: {error})"
         ) from error
-    found.training = False
-    return found
+    statistics.training = False
+    return statistics

@@ -97,8 +97,8 @@ def conditions(out: Out = OUT) -> None:
 
     best = {path.stem.rpartition("-")[0]: path for path in best_policies([out / SHIPPED_GROUP])}
     tasks = ("displacement", "rotation")
-    found = {task: robustness(task, {"ppo": best[f"{task}-100hz"]}) for task in tasks}
-    write_text(out / CONDITIONS, json.dumps(found, indent=1) + "\n")
+    by_task = {task: robustness(task, {"ppo": best[f"{task}-100hz"]}) for task in tasks}
+    write_text(out / CONDITIONS, json.dumps(by_task, indent=1) + "\n")
 
 
 @app.command()
@@ -118,19 +118,19 @@ def report(
     from benchmarks.training.study.ship import ship as ship_policies
     from pma_gym.documents import read_json
 
-    found = study_figures(out)
+    figures_ = study_figures(out)
     if figures.exists():
         kept = read_json(figures, "journal_mib", own=True, finite=False)["groups"]
-        merged = kept | found["groups"]
+        merged = kept | figures_["groups"]
         names = dict.fromkeys(cell.group for cell in cells())
-        found["groups"] = {name: merged[name] for name in names if name in merged}
-    found["pid"] = pid_errors(out)
-    found["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
-    found["robustness"] = read_json(out / CONDITIONS, own=True, finite=False)
-    write_text(figures, json.dumps(found, indent=1) + "\n")
-    write_curves(found, figures.parent.parent / "images" / "policies-curves.png")
+        figures_["groups"] = {name: merged[name] for name in names if name in merged}
+    figures_["pid"] = pid_errors(out)
+    figures_["pid_variation_v_per_s"] = variation(out / PID_FOLDER)
+    figures_["robustness"] = read_json(out / CONDITIONS, own=True, finite=False)
+    write_text(figures, json.dumps(figures_, indent=1) + "\n")
+    write_curves(figures_, figures.parent.parent / "images" / "policies-curves.png")
     for names in SHIPPED if ship else ():
-        for path in ship_policies([out / name for name in names], found["groups"]):
+        for path in ship_policies([out / name for name in names], figures_["groups"]):
             print(path)
 
 

@@ -74,24 +74,24 @@ CHANGES: dict[str, Callable[[Preset], Preset]] = {
 
 def cells() -> list[Cell]:
     """All of the study, what others build on first."""
-    found = []
+    every = []
     for preset, title in HEADLINE_PRESETS.items():
         for task in ("displacement", "rotation"):
             group = f"{HEADLINE}-{preset}"
-            found.append(Cell(group, title, HEADLINE, preset, task, HEADLINE_SEEDS))
+            every.append(Cell(group, title, HEADLINE, preset, task, HEADLINE_SEEDS))
     group = f"{HEADLINE}-{EXERCISE_PRESET}"
     title = HEADLINE_PRESETS[EXERCISE_PRESET]
-    found.append(Cell(group, title, HEADLINE, EXERCISE_PRESET, EXERCISE_TASK, HEADLINE_SEEDS))
+    every.append(Cell(group, title, HEADLINE, EXERCISE_PRESET, EXERCISE_TASK, HEADLINE_SEEDS))
     for algorithm in OFF_POLICY:
         title = f"{algorithm.upper()}, residual"
         for task in ("displacement", "rotation", EXERCISE_TASK):
             group = residual_group(algorithm)
-            found.append(Cell(group, title, algorithm, "residual", task, OTHER_SEEDS))
+            every.append(Cell(group, title, algorithm, "residual", task, OTHER_SEEDS))
     for algorithm in OFF_POLICY:
         group, title = f"{algorithm}-increment", algorithm.upper()
-        found.append(Cell(group, title, algorithm, "increment", "displacement", OTHER_SEEDS))
-    found += ablations("displacement")
-    return found
+        every.append(Cell(group, title, algorithm, "increment", "displacement", OTHER_SEEDS))
+    every += ablations("displacement")
+    return every
 
 
 def residual_group(algorithm: str) -> str:

@@ -1,4 +1,4 @@
-"""What came of a study, as one JSON document: pooled errors, seeds, curves, what is left out."""
+"""Results of a study, as one JSON document: pooled errors, seeds, curves, what is left out."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -35,10 +35,9 @@ def study_figures(out: Path) -> dict[str, Any]:
 
 def pid_errors(out: Path) -> dict[str, float]:
     """The PID's interquartile mean in suite `robust` by kind of task (mm, deg)."""
-    found = pools(out / PID_FOLDER, "robust", ["pid"])
+    pid = pools(out / PID_FOLDER, "robust", ["pid"])
     return {
-        kind: float(found[measure_of(kind).name].by_seed[0])
-        for kind in ("displacement", "rotation")
+        kind: float(pid[measure_of(kind).name].by_seed[0]) for kind in ("displacement", "rotation")
     }
 
 

@@ -30,7 +30,7 @@ FIRST, STATIONS = 20_000, 200
 
 
 class Judged(NamedTuple):
-    """What came of operators.
+    """Results of operators.
 
     Attributes:
         errors: RMSE of those whose episode went to its end, shape (n, phases), in the task's unit.
@@ -90,8 +90,8 @@ def figures_of(names: Sequence[str], count: int, task: str) -> dict[str, Any]:
         count: how many operators.
         task: name of an exercise.
     """
-    found = named_task(task)
-    assert found is not None
+    known = named_task(task)
+    assert known is not None
     rows = []
     for stations in ("nominal", "drawn"):
         for name in names:
@@ -100,8 +100,8 @@ def figures_of(names: Sequence[str], count: int, task: str) -> dict[str, Any]:
             means = one.errors.mean(axis=0).round(4).tolist()
             row = {"controller": controller.name, "stations": stations, "rmse": means}
             rows.append(row | {"ended": one.ended})
-    phases = [phase.name for phase in found.protocol.phases]
-    return {"count": count, "unit": found.protocol.unit, "phases": phases, "rows": rows}
+    phases = [phase.name for phase in known.protocol.phases]
+    return {"count": count, "unit": known.protocol.unit, "phases": phases, "rows": rows}
 
 
 def table_of(figures: Mapping[str, Any]) -> list[str]:

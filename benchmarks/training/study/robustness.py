@@ -60,34 +60,34 @@ CONDITIONS = (
 
 def pressures_kpa(task: str, off_grid: bool) -> list[float]:
     """Pressures of the episodes (kPa), of those trained on or halfway between them."""
-    found = named_task(task)
-    assert found is not None
-    low, high = 1e-3 * found.lowest_pressure, 1e-3 * found.highest_pressure
+    known = named_task(task)
+    assert known is not None
+    low, high = 1e-3 * known.lowest_pressure, 1e-3 * known.highest_pressure
     steps = np.arange(low, high - 25.0, 50.0)
     return [float(p) + (12.5 if off_grid else 0.0) for p in steps]
 
 
 def robustness(
-    task: str, policies: Mapping[str, Any], told: Callable[[str], None] = print
+    task: str, policies: Mapping[str, Any], report: Callable[[str], None] = print
 ) -> dict[str, dict[str, float]]:
     """Interquartile mean error (mm or deg) by condition and controller.
 
     Args:
         task: displacement or rotation.
         policies: path of a policy file by what it is called.
-        told: is told of each condition.
+        report: called with a line for each condition.
     """
-    found: dict[str, dict[str, float]] = {}
+    errors: dict[str, dict[str, float]] = {}
     for condition in CONDITIONS:
         makers: dict[str, Callable[[], Controller]] = {n: CONTROLLERS[n] for n in RIVALS}
         for name, path in policies.items():
             makers[name] = lambda path=path: Policy(path, anywhere=True)
-        found[condition.title] = {
+        errors[condition.title] = {
             name: float(interquartile_mean(_errors(task, condition, make)))
             for name, make in makers.items()
         }
-        told(f"{task}, {condition.title}: {found[condition.title]}")
-    return found
+        report(f"{task}, {condition.title}: {errors[condition.title]}")
+    return errors
 
 
 def _errors(task: str, condition: Condition, make: Callable[[], Controller]) -> NDArray[np.float64]:

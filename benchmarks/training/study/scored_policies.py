@@ -8,7 +8,7 @@ from rich.console import Console
 from benchmarks.comparison.job import run_comparison
 from benchmarks.executors.executor import Executor
 from benchmarks.report.errors import Measure, Record, measures
-from benchmarks.runner.controller_spec import parse_contenders
+from benchmarks.runner.controller_spec import parse_controllers
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.suites.frozen import FrozenSuite, frozen_suite, kind_of
 from benchmarks.training.study.cells import OFF_POLICY, residual_group
@@ -33,8 +33,8 @@ SUITES = ("nominal", "robust", "hard", "exercise")
 
 def seed_folders(group: Path) -> list[Path]:
     """Folders of a group's seeds that have a policy, in order."""
-    found = [path for path in group.glob("seed-*") if any(path.glob("*.json"))]
-    return sorted(found, key=lambda path: int(path.name.partition("-")[2]))
+    folders = [path for path in group.glob("seed-*") if any(path.glob("*.json"))]
+    return sorted(folders, key=lambda path: int(path.name.partition("-")[2]))
 
 
 def judge(
@@ -53,10 +53,10 @@ def judge(
     """
     frozen = frozen_suite(suite)
     names = ",".join(f"{folder}:{algorithm}" for folder in seed_folders(group))
-    contenders = parse_contenders(names)
-    if not contenders[0].kinds & {kind_of(task) for task in frozen.tasks}:
+    specs = parse_controllers(names)
+    if not specs[0].kinds & {kind_of(task) for task in frozen.tasks}:
         return None
-    entries = [frozen.entry(one) for one in contenders]
+    entries = [frozen.entry(one) for one in specs]
     able = _able(frozen, entries[0].only, group, algorithm)
     if not able:
         return None
@@ -69,7 +69,7 @@ def judge(
 def judge_pid(out: Path, executor: Executor, console: Console) -> None:
     """Run the PID through suite `robust`, what curves are compared with."""
     frozen = frozen_suite("robust")
-    entries = [frozen.entry(one) for one in parse_contenders("pid")]
+    entries = [frozen.entry(one) for one in parse_controllers("pid")]
     run_comparison(frozen, entries, out / PID_FOLDER, executor, console)
 
 
@@ -109,13 +109,13 @@ def pools(results: Path, suite: str, seeds: Sequence[str]) -> dict[str, Pool]:
     frozen = frozen_suite(suite)
     rows = case_rows(results / JOURNAL)
     record = Record.of(frozen, [row for row in rows if row["controller"] in seeds])
-    found: dict[str, Pool] = {}
+    by_measure: dict[str, Pool] = {}
     for measure in measures(frozen.tasks):
         if _complete(record, measure, seeds):
-            found[measure.name] = Pool(record.errors(measure))
-    return found
+            by_measure[measure.name] = Pool(record.errors(measure))
+    return by_measure
 
 
 def _complete(record: Record, measure: Measure, seeds: Sequence[str]) -> bool:
-    whole = {entry.contender.name for entry in record.whole(measure.tasks)}
+    whole = {entry.spec.name for entry in record.whole(measure.tasks)}
     return set(seeds) <= whole

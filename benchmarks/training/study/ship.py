@@ -23,14 +23,14 @@ def best_policies(groups: Sequence[Path]) -> list[Path]:
     Args:
         groups: folders of seeds; of several the best of all.
     """
-    found: dict[str, list[Path]] = {}
+    candidates: dict[str, list[Path]] = {}
     for group in groups:
         for folder in seed_folders(group):
             for path in folder.glob("*.json"):
-                found.setdefault(path.stem.rpartition("-")[0], []).append(path)
+                candidates.setdefault(path.stem.rpartition("-")[0], []).append(path)
     return [
         _best({path: load_policy_file(path) for path in sorted(paths)})
-        for _, paths in sorted(found.items())
+        for _, paths in sorted(candidates.items())
     ]
 
 
@@ -53,7 +53,7 @@ def ship(
     folder.mkdir(exist_ok=True)
     algorithms = {group.name.partition("-")[0] for group in groups}
     there = [group for group in groups if group.is_dir()]
-    found = []
+    paths = []
     for best in best_policies(there):
         policy, own = load_policy_file(best), figures[best.parent.parent.name]
         kept = _by_operators(best, folder / best.name)
@@ -66,8 +66,8 @@ def ship(
             for old in folder.glob(f"{stem}-{algorithm}.*"):
                 old.unlink()
         path.with_suffix(".md").write_text(card(shipped, own["seeds"]), encoding="utf-8")
-        found.append(path)
-    return found
+        paths.append(path)
+    return paths
 
 
 def _by_operators(best: Path, shipped: Path) -> dict[str, Any]:
@@ -89,18 +89,18 @@ def _scores(policy: PolicyFile, figures: dict[str, Any]) -> dict[str, Any]:
     """Interquartile means of the shipped seed, and of all seeds with their interval."""
     seed = policy.training["seed"]
     loop = policy.name.partition("-")[2].rpartition("-")[0]
-    found: dict[str, Any] = {}
+    by_suite: dict[str, Any] = {}
     for suite, measures in figures["judged"].items():
         if (suite == "hard") != ("delay" in loop):
             continue
         for measure, pooled in measures.items():
             if policy.task in measure:
-                found[f"{suite}: {measure}"] = {
+                by_suite[f"{suite}: {measure}"] = {
                     "this": pooled["by_seed"][seed],
                     "all_seeds": pooled["mean"],
                     "unit": pooled["unit"],
                 }
-    return found
+    return by_suite
 
 
 def card(policy: PolicyFile, seeds: int) -> str:

@@ -92,11 +92,11 @@ def ablation_table(figures: Mapping[str, Any]) -> TextTable:
 
 def robustness_table(figures: Mapping[str, Any], task: str) -> TextTable:
     """Errors under conditions that were not trained with, beside classical controllers."""
-    found = figures["robustness"][task]
-    names = list(next(iter(found.values())))
+    conditions = figures["robustness"][task]
+    names = list(next(iter(conditions.values())))
     rows = [
         [condition, *(f"{errors[name]:.3g}" for name in names)]
-        for condition, errors in found.items()
+        for condition, errors in conditions.items()
     ]
     unit = "deg" if task == "rotation" else "mm"
     return TextTable(f"{task} ({unit})", ["Condition", *names], rows)

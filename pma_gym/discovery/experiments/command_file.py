@@ -91,21 +91,21 @@ def from_rest(trial: Trial, model: Model) -> Trial:
 def _as_commanded(trial: Trial, dataset: Dataset, model: Model) -> Mapping[str, Array]:
     """Commands (SI) of the kinds that the lab commands."""
     asked = {name for each in dataset.trials for name in each.trial.commands}
-    found = dict(trial.commands)
+    commands = dict(trial.commands)
     lines = {
         "motor_voltage": ("load_command", model.parameters.get("drive")),
         "regulator_voltage": ("pressure_command", model.parameters.get("regulator_line")),
     }
     for voltage, (wish, line) in lines.items():
-        if voltage in found and voltage not in asked and wish in asked and line is not None:
-            found[wish] = line.gain * found.pop(voltage) + line.offset
-    return found
+        if voltage in commands and voltage not in asked and wish in asked and line is not None:
+            commands[wish] = line.gain * commands.pop(voltage) + line.offset
+    return commands
 
 
 def _names(dataset: Dataset) -> dict[str, Source]:
     """By quantity, how the lab's files call and scale it; the first file that has it counts."""
-    found: dict[str, Source] = {}
+    columns: dict[str, Source] = {}
     for each in dataset.trials if dataset.folder is not None else ():
         for source in file_sources(dataset, each.name):
-            found.setdefault(source.column.quantity, source)
-    return found
+            columns.setdefault(source.column.quantity, source)
+    return columns

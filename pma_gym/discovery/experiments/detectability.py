@@ -98,7 +98,7 @@ def _shown(
     for candidate, usual in hidden:
         model, tried = candidate.beside(fit.model), np.stack([candidate.absent, usual])
         grown.append(columns(problem, model, candidate.paths, trials, tried))
-    found = np.zeros((len(excitations), len(hidden)))
+    distances = np.zeros((len(excitations), len(hidden)))
     for k, by in enumerate(derivatives(problem, fit.model, fit, trials)):
         if by is None:
             continue
@@ -107,18 +107,18 @@ def _shown(
             one = each[k]
             if one is not None:
                 row[:] = one[1].ravel()
-        found[k] = unabsorbed(changes, by, fit)
-    return found
+        distances[k] = unabsorbed(changes, by, fit)
+    return distances
 
 
 def _usual(candidate: CandidateEffect) -> Array:
     """Values of a candidate's parameters at its usual size, in file units."""
-    found = []
+    usual_values = []
     for path in candidate.paths:
         effect, _, door = path.partition(".")
         law = CATALOGUE[effect]
-        found.append(law.quantities[law.names_at_the_door()[door]].usual)
-    absent = zip(found, candidate.absent, strict=True)
+        usual_values.append(law.quantities[law.names_at_the_door()[door]].usual)
+    absent = zip(usual_values, candidate.absent, strict=True)
     usual = np.array([other if value is None else value for value, other in absent], float)
     if np.array_equal(usual, candidate.absent):
         # A sensor whose usual bandwidth is what the model says: a slower one.

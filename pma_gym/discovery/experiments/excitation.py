@@ -123,9 +123,9 @@ def library(models: Sequence[Model], seed: int = 0) -> Iterator[Excitation]:
         return
     plants = [Plant(model) for model in models]
     for recipe in _recipes(models[0], seed):
-        found = _largest(plants, recipe)
-        if found is not None:
-            yield found
+        largest = _largest(plants, recipe)
+        if largest is not None:
+            yield largest
 
 
 def _largest(plants: Sequence[Plant], recipe: Recipe) -> Excitation | None:

@@ -115,7 +115,7 @@ class Discrimination:
             pairs: true and wrong rivals.
             refitted: take out what the wrong one's parameters absorb, which costs its derivatives.
         """
-        found = np.zeros((len(excitations), len(pairs)))
+        each_odds = np.zeros((len(excitations), len(pairs)))
         changes = {true: self._changes(true, excitations) for true, _ in pairs}
         first = {wrong: true for true, wrong in reversed(pairs) if refitted}
         absorbing = {
@@ -134,8 +134,8 @@ class Discrimination:
                     gains = np.zeros(1) if by is None else unabsorbed(apart, by, fit)
                 else:
                     gains = np.sum(apart**2, axis=1)
-                found[k, at] = 0.5 * float(np.quantile(gains, 0.25))
-        return found
+                each_odds[k, at] = 0.5 * float(np.quantile(gains, 0.25))
+        return each_odds
 
     def _changes(self, true: int, excitations: Sequence[Excitation]) -> list[Array]:
         """What draws of a rival change of its simulations, whitened, shape (1 + k, n) each.
@@ -215,9 +215,11 @@ def fastest(
         if best is not None and expected.rank <= best.rank:
             break
         (odds,) = discrimination.odds([expected.excitation], chosen)
-        found = ExpectedOdds(expected.excitation, float(np.min(odds)), chosen[int(np.argmin(odds))])
-        if best is None or found.rank > best.rank:
-            best = found
+        fastest_pair = ExpectedOdds(
+            expected.excitation, float(np.min(odds)), chosen[int(np.argmin(odds))]
+        )
+        if best is None or fastest_pair.rank > best.rank:
+            best = fastest_pair
     return best
 
 

@@ -43,7 +43,7 @@ def columns(
     if together is not None:
         return list(together)
     apart = [predicted(problem, model, free, trial).columns(tried) for trial in simulated]
-    return [None if found is None else found[0] for found in apart]
+    return [None if each is None else each[0] for each in apart]
 
 
 def derivatives(
@@ -65,12 +65,12 @@ def derivatives(
     chosen = np.arange(len(fit.values)) if which is None else np.asarray(which)
     steps = fit.steps[chosen]
     moved = np.concatenate([fit.values[None], fit.values + np.diag(fit.steps)[chosen]])
-    found = columns(problem, model, fit.paths, simulated, moved)
-    return [None if each is None else _per_step(each, steps) for each in found]
+    parts = columns(problem, model, fit.paths, simulated, moved)
+    return [None if each is None else _per_step(each, steps) for each in parts]
 
 
-def _per_step(found: Columns, steps: Array) -> Array:
-    changes = found[1:].astype(np.float64)
+def _per_step(trial_columns: Columns, steps: Array) -> Array:
+    changes = trial_columns[1:].astype(np.float64)
     return changes.reshape(len(steps), -1) / steps[:, None]
 
 

@@ -28,6 +28,7 @@ class CandidateEffect:
         amplitudes: which of them scale with the size of the effect, shape (p,).
         signs: for each probe, whether the opposite makes sense too.
         own: values (SI) that a parameter has in each trial, by path.
+        left: paths that left the law because the trials do not determine them (`nested_laws`).
     """
 
     name: str
@@ -40,11 +41,13 @@ class CandidateEffect:
     amplitudes: NDArray[np.bool_]
     signs: NDArray[np.bool_]
     own: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
 
     @property
     def fitted_paths(self) -> list[str]:
         """Paths of the parameters that are fitted."""
-        return [path for path, free in zip(self.paths, self.fitted, strict=True) if free]
+        pairs = zip(self.paths, self.fitted, strict=True)
+        return [path for path, free in pairs if free and path not in self.left]
 
     def beside(self, model: Model) -> Model:
         """Another model with this effect where it does nothing."""

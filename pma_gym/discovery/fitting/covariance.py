@@ -47,10 +47,10 @@ def clusters(pieces: Pieces) -> list[NDArray[np.int64]]:
     """Of every piece, its stretch of time; and its trial, where there are trials enough."""
     order = np.arange(len(pieces.trial)) - np.searchsorted(pieces.trial, pieces.trial)
     stretch = order // round(STRETCH_S / PIECE_S)
-    found = [pieces.trial * (stretch.max() + 1) + stretch]
+    groups = [pieces.trial * (stretch.max() + 1) + stretch]
     if len(np.unique(pieces.trial)) >= LEAST_TRIALS:
-        found.append(pieces.trial)
-    return found
+        groups.append(pieces.trial)
+    return groups
 
 
 def widened(

@@ -1,7 +1,7 @@
 """Fit a model, with or without candidate effects, to whitened trials."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
+from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.estimation.fitting import LevenbergMarquardt
@@ -46,6 +47,8 @@ class Fitted:
         chi_square: of the whitened readings, with what the prior adds.
         steps: moves of the parameters that their derivatives were taken with.
         converged: whether a further step would gain nothing worth while.
+        reach: how many times as wide as assumed beforehand the range of a parameter became, by
+            path, for those that went beyond.
     """
 
     model: Model
@@ -56,6 +59,7 @@ class Fitted:
     chi_square: float
     steps: Array
     converged: bool
+    reach: Mapping[str, float] = field(default_factory=dict)
 
     def estimate(self, path: str) -> tuple[float, float]:
         """A parameter's value and its standard error, in file units."""
@@ -94,13 +98,19 @@ class FitProblem:
         model: Model,
         extra: Sequence[CandidateEffect] = (),
         trials: Sequence[int] | None = None,
+        reach: Mapping[str, float] | None = None,
     ) -> WhitenedResiduals:
-        """Trials beside a model with candidates in it; its own parameters and theirs are free."""
+        """Trials beside a model with candidates in it; its own parameters and theirs are free.
+
+        Args:
+            model: the model.
+            extra: the candidates.
+            trials: which trials; all if not given.
+            reach: how many times as wide as assumed beforehand ranges are, by path.
+        """
         paths, own = list(self.own.free), {}
         for candidate in extra:
-            paths += [
-                path for path, free in zip(candidate.paths, candidate.fitted, strict=True) if free
-            ]
+            paths += candidate.fitted_paths
             own |= candidate.own
         prior = np.full(len(paths), np.inf)
         prior[: len(self.own.prior)] = self.own.prior
@@ -116,6 +126,7 @@ class FitProblem:
             centre,
             {path: [each[i] for i in chosen] for path, each in own.items()},
             threads=self.threads,
+            reach=reach,
         )
 
     def probed(self, model: Model, candidate: CandidateEffect) -> WhitenedResiduals:
@@ -183,8 +194,8 @@ class FitProblem:
             return fit
         left = self.left(fit)
         ever_less = [left / EASIER**k for k in range(int(np.log(left) / np.log(EASIER)) + 1)]
-        found = self.fit(self._eased(fit.model, extra, ever_less), extra)
-        return min(filter(None, (fit, found)), key=_chi_square)
+        refit = self.fit(self._eased(fit.model, extra, ever_less), extra)
+        return min(filter(None, (fit, refit)), key=_chi_square)
 
     def _eased(
         self, model: Model, extra: Sequence[CandidateEffect], larger: Sequence[float]
@@ -195,9 +206,13 @@ class FitProblem:
                 Whitening(n.coefficients, factor * n.innovation, factor * n.level)
                 for n in self.noise
             )
-            found = replace(self, noise=noise).fit(model, extra)
-            model = model if found is None else found.model
+            fitted = replace(self, noise=noise).fit(model, extra)
+            model = model if fitted is None else fitted.model
         return model
+
+    def whitened_at(self, fit: Fitted, extra: Sequence[CandidateEffect] = ()) -> WhitenedResiduals:
+        """Trials beside a fit with candidates in it, within the ranges that it ended with."""
+        return self.whitened_residuals(fit.model, extra, reach=fit.reach)
 
     def fit(
         self,
@@ -207,6 +222,9 @@ class FitProblem:
         trials: Sequence[int] | None = None,
     ) -> Fitted | None:
         """Fit a model with candidates in it.
+
+        A parameter goes beyond what is assumed beforehand where the fit gains by it
+        (`assumed_range`).
 
         Args:
             model: where its own parameters begin.
@@ -222,19 +240,39 @@ class FitProblem:
                 begun = dict(zip(candidate.paths, map(float, starts[candidate.name]), strict=True))
                 model = model.replace(begun)
         whitened = self.whitened_residuals(model, extra, trials)
+        # A fit of some of the trials begins where that of all ended.
+        reach = whitened.needed_reach(whitened.start)
+        if reach:
+            whitened = self.whitened_residuals(model, extra, trials, reach)
         try:
             search = LevenbergMarquardt(whitened, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
-        found = dict(zip(search.named(search.values), search.values, strict=True))
+        for _ in range(MOST_DOUBLINGS):
+            edges = whitened.at_assumed_edge(search.values)
+            if not edges:
+                break
+            wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
+            whitened = self.whitened_residuals(_at(model, search), extra, trials, wider)
+            further = LevenbergMarquardt(whitened, False, 1.0)
+            ended = further.run(None, ROUNDS)
+            if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
+                break
+            search, converged, reach = further, ended, wider
         return Fitted(
-            model.replace({path: float(value) for path, value in found.items()}),
+            _at(model, search),
             tuple(candidate.name for candidate in extra),
-            tuple(found),
+            tuple(search.named(search.values)),
             search.values,
             inverse(search.best.curvature),
             search.best.chi_square,
             search.moves,
             converged,
+            whitened.needed_reach(search.values),
         )
+
+
+def _at(model: Model, search: LevenbergMarquardt) -> Model:
+    """A model with the parameters that a search is at."""
+    return model.replace(search.named(search.values))

@@ -79,11 +79,11 @@ def prior(model: Model, path: str) -> float:
 
 def values(model: Model, paths: Sequence[str]) -> Array:
     """Values of parameters in file units."""
-    found = []
+    numbers = []
     for path in paths:
         effect, _, door = path.partition(".")
-        found.append(model.at_the_door(effect)[door])
-    return np.array(found, float)
+        numbers.append(model.at_the_door(effect)[door])
+    return np.array(numbers, float)
 
 
 def unit(path: str) -> str:

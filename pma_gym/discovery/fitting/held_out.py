@@ -65,12 +65,12 @@ def held_out_misfit(
         if progress is not None:
             progress(number, len(parts))
         seen = [i for i in range(count) if i not in left_out]
-        found = problem.fit(begun, chosen, trials=seen) if fit.paths else fit
-        held = None if found is None else _held_out_of(problem, found, chosen, left_out)
-        if found is None or held is None:
+        refit = problem.fit(begun, chosen, trials=seen) if fit.paths else fit
+        held = None if refit is None else _held_out_of(problem, refit, chosen, left_out)
+        if refit is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(problem.whitened_residuals(begun, chosen, seen), found))
+            surprised.append(whole.surprise(problem.whitened_residuals(begun, chosen, seen), refit))
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
     return HeldOutMisfit(readings, chi_square, np.array(surprised))
@@ -97,16 +97,16 @@ def _unseen_stretches(
         if not all(_measures(part) for part in (seen, rest)):
             return None
         part = replace(problem, trials=[seen])
-        found = part.fit(begun, chosen) if fit.paths else fit
+        refit = part.fit(begun, chosen) if fit.paths else fit
         held = (
             None
-            if found is None
-            else _held_out_of(replace(problem, trials=[rest]), found, chosen, [0])
+            if refit is None
+            else _held_out_of(replace(problem, trials=[rest]), refit, chosen, [0])
         )
-        if found is None or held is None:
+        if refit is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(part.whitened_residuals(begun, chosen), found))
+            surprised.append(whole.surprise(part.whitened_residuals(begun, chosen), refit))
         readings[:, left_out] = held.readings[0][:, left_out]
         chi_square += float(held.chi_square[0])
     return HeldOutMisfit([readings], np.array([chi_square]), np.array(surprised))
@@ -121,12 +121,12 @@ class _Held:
 
 
 def _held_out_of(
-    problem: FitProblem, found: Fitted, chosen: Sequence[CandidateEffect], left_out: Sequence[int]
+    problem: FitProblem, refit: Fitted, chosen: Sequence[CandidateEffect], left_out: Sequence[int]
 ) -> _Held | None:
     """Trials beside a fit; None where it cannot be simulated on them."""
-    whitened = problem.whitened_residuals(found.model, chosen, left_out)
-    pieces = whitened.pieces(found.values, np.empty(0))
-    held = whitened.readings(found.values)
+    whitened = problem.whitened_residuals(refit.model, chosen, left_out)
+    pieces = whitened.pieces(refit.values, np.empty(0))
+    held = whitened.readings(refit.values)
     if pieces is None or held is None:
         return None
     count = range(len(left_out))

@@ -39,7 +39,7 @@ class Journal:
         self._warned = False
         self._digest = "" if folder is None else digest(trials, model, question)
 
-    def found(self, name: str) -> dict[str, Any] | None:
+    def entry(self, name: str) -> dict[str, Any] | None:
         """What was kept by a name, or None; a damaged entry is none."""
         return self.restored(name, dict)
 
@@ -88,14 +88,14 @@ class Journal:
 
 def digest(trials: Sequence[Trial], model: Model, question: str) -> str:
     """What trials, a model and a question are, in a few characters."""
-    found = hashlib.sha256(question.encode())
-    found.update(dump_model(model).encode())
+    checksum = hashlib.sha256(question.encode())
+    checksum.update(dump_model(model).encode())
     for trial in trials:
         for name, values in (
             ("time", trial.time),
             *sorted(trial.commands.items()),
             *sorted(trial.measurements.items()),
         ):
-            found.update(name.encode())
-            found.update(np.ascontiguousarray(values, float).tobytes())
-    return found.hexdigest()
+            checksum.update(name.encode())
+            checksum.update(np.ascontiguousarray(values, float).tobytes())
+    return checksum.hexdigest()

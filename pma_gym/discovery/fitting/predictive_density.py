@@ -68,11 +68,11 @@ class PredictiveDensity:
         cls, problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
     ) -> "PredictiveDensity":
         """Of a model with candidates in it, from where a fit is."""
-        found = (problem.fit(fit.model, chosen) if fit.paths else None) or fit
-        whitened = problem.whitened_residuals(found.model, chosen)
-        if not found.paths:
-            found = replace(found, chi_square=_chi_square(whitened, found))
-        return cls(found, freedom(whitened, found))
+        refit = (problem.fit(fit.model, chosen) if fit.paths else None) or fit
+        whitened = problem.whitened_residuals(refit.model, chosen)
+        if not refit.paths:
+            refit = replace(refit, chi_square=_chi_square(whitened, refit))
+        return cls(refit, freedom(whitened, refit))
 
     def surprise(self, seen: WhitenedResiduals, apart: Fitted) -> float:
         """How little some trials expect the others: twice the negative log-likelihood.
@@ -92,8 +92,8 @@ class PredictiveDensity:
             apart: the fit of them alone.
         """
         alone = apart.chi_square if apart.paths else _chi_square(seen, apart)
-        found = self.fit.chi_square - alone + self.freedom - freedom(seen, self.fit)
-        return found if np.isfinite(found) else np.inf
+        increase = self.fit.chi_square - alone + self.freedom - freedom(seen, self.fit)
+        return increase if np.isfinite(increase) else np.inf
 
 
 def freedom(whitened: WhitenedResiduals, fit: Fitted) -> float:

@@ -48,7 +48,7 @@ def trial_states(
     whitened = problem.whitened_residuals(fit.model, chosen)
     starts = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
     begun = whitened.first_states(fit.values) if starts else None
-    found = {}
+    by_trial = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
@@ -59,8 +59,8 @@ def trial_states(
         if _begins_freely(fit.model):
             parameters = _started(fit.model, problem.trials[i], parameters)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
-        found[name] = TrialState(_zeros(problem.trials[i], held), parameters)
-    return found
+        by_trial[name] = TrialState(_zeros(problem.trials[i], held), parameters)
+    return by_trial
 
 
 def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dict[str, float]:
@@ -145,11 +145,11 @@ def read_states(path: Path) -> dict[str, TrialState]:
     tables = read_toml(path, finite=False).get("trials", {})
     if not isinstance(tables, dict):
         raise TrialError(f"trials in {path} must be a table, [trials], got {tables!r:.80}")
-    found = {}
+    states = {}
     for name, table in tables.items():
         parts = {part: _numbers(path, name, table, part) for part in ("zeros", "parameters")}
-        found[name] = TrialState(**parts)
-    return found
+        states[name] = TrialState(**parts)
+    return states
 
 
 def _numbers(path: Path, name: str, table: object, part: str) -> dict[str, float]:

@@ -49,7 +49,7 @@ def initial_floors(
     model: Model, logged: Sequence[Logged], named: Sequence[NamedTrial]
 ) -> list[Level]:
     """Levels of the four outputs."""
-    assumed, found = sensors.noise_levels(model), []
+    assumed, floors = sensors.noise_levels(model), []
     for channel, (_, line) in enumerate(sensors.SENSORS.values()):
         step = step_between(logged, channel)
         rounding = (step or line.resolution) / np.sqrt(12.0)
@@ -66,8 +66,8 @@ def initial_floors(
             source = "repeats"
         level = max(sources[source], float(rounding))
         distinct = len(distinct_readings(logged, channel))
-        found.append(Level(level, source, sources, step, line.resolution, distinct))
-    return found
+        floors.append(Level(level, source, sources, step, line.resolution, distinct))
+    return floors
 
 
 def _readings(logged: Logged, channel: int) -> Array:

@@ -55,18 +55,18 @@ class Whitening:
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""
-        found = series / self.innovation
+        white = series / self.innovation
         # Lag by lag: SciPy's filter without feedback goes through the series one by one.
         for lag, share in enumerate(self.coefficients, 1):
-            found[..., lag:] -= (share / self.innovation) * series[..., :-lag]
+            white[..., lag:] -= (share / self.innovation) * series[..., :-lag]
         order = len(self.coefficients)
         if order:
             # The first readings have no past: by the level alone.
-            found[..., :order] = series[..., :order] / self.level
+            white[..., :order] = series[..., :order] / self.level
         for lag in range(order + 1):
             later = missing + lag
-            found[..., later[later < series.shape[-1]]] = 0.0
-        return found
+            white[..., later[later < series.shape[-1]]] = 0.0
+        return white
 
 
 def white_noise(level: float) -> Whitening:
@@ -92,7 +92,7 @@ def at_rest(trials: Sequence[Logged], channel: int) -> list[Array]:
 
     A line, for what still creeps does so slowly.
     """
-    found = []
+    stretches = []
     for logged in trials:
         if not logged.measures[channel]:
             continue
@@ -103,8 +103,8 @@ def at_rest(trials: Sequence[Logged], channel: int) -> list[Array]:
             if known.sum() >= LEAST_REST:
                 at = np.arange(len(values), dtype=float)
                 line = np.polyfit(at[known], values[known], 1)
-                found.append(values - np.polyval(line, at))
-    return found
+                stretches.append(values - np.polyval(line, at))
+    return stretches
 
 
 def level_at_rest(segments: Sequence[Array]) -> float | None:
@@ -137,15 +137,15 @@ def autoregression(parts: Sequence[Array], level: float) -> Whitening:
         return white_noise(max(level, float(np.sqrt(lags[0] / count))))
     best, least = white_noise(max(level, float(np.sqrt(lags[0] / count)))), count * np.log(lags[0])
     for order in range(1, MOST_ORDER + 1):
-        found = solve_toeplitz(lags[:order], lags[1 : order + 1])
-        left = lags[0] - found @ lags[1 : order + 1]
+        coefficients = solve_toeplitz(lags[:order], lags[1 : order + 1])
+        left = lags[0] - coefficients @ lags[1 : order + 1]
         if left <= 0.0:
             break
         criterion = count * np.log(left) + order * np.log(count)
         if criterion < least:
             least = criterion
             share = np.sqrt(left / lags[0])
-            best = Whitening(tuple(map(float, found)), float(share * best.level), best.level)
+            best = Whitening(tuple(map(float, coefficients)), float(share * best.level), best.level)
     return best
 
 

@@ -57,7 +57,7 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
 
 def _unused(trials: Sequence[Trial], model: Model) -> list[str]:
     """Words on what was measured that a slide does not have."""
-    found = [
+    names = [
         BY_QUANTITY[name].name
         for name in model.rig.absent_outputs
         if any(name in trial.measurements for trial in trials)
@@ -66,7 +66,7 @@ def _unused(trials: Sequence[Trial], model: Model) -> list[str]:
         "not used: a slide has neither pulley nor pressure, and its load is its command; a "
         "measured load that drives it is read by [columns] as load_command_n"
     )
-    return [f"{', '.join(found)}: {said}"] if found else []
+    return [f"{', '.join(names)}: {said}"] if names else []
 
 
 def _pieces(named: NamedTrial) -> list[NamedTrial]:
@@ -77,7 +77,7 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
         return [named]
     edges = np.searchsorted(trial.time, np.linspace(trial.time[0], trial.time[-1], count + 1))
     edges[-1] = len(trial)
-    found = []
+    pieces = []
     for start, stop in zip(edges, edges[1:], strict=False):
         rows = slice(int(start), int(stop))
         piece = Trial(
@@ -91,12 +91,12 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
         repeats = named.repeat_of and f"{named.repeat_of} {since}"
         if any(np.isfinite(values).any() for values in piece.measurements.values()):
             name = f"{named.name} {since}"
-            found.append(
+            pieces.append(
                 replace(
                     named, name=name, trial=piece, repeat_of=repeats, file=named.file or named.name
                 )
             )
-    return found
+    return pieces
 
 
 def _in_volts(trial: Trial, model: Model) -> Trial:

@@ -15,6 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.assumed_range import (
+    assumed_range,
+    at_assumed_edge,
+    needed_reach,
+)
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
@@ -29,9 +34,6 @@ FREE_ZEROS = ("contraction", "rotation")
 
 ROWS = 256
 """Rows in one product of matrices: few enough that no BLAS shares it between threads."""
-
-FARTHEST = 6.0
-"""Standard deviations of what is assumed beforehand that a parameter may go away from it."""
 
 PIECE_S = 0.25
 """How long a piece is (s): longer than what whitening leaves of the noise's memory, and so short
@@ -78,6 +80,7 @@ class WhitenedResiduals(Residuals):
         centre: what they are expected to be; the model's own values if not given.
         own: values (SI) that a parameter has in each trial, by path.
         tolerance, interpolation, threads: as `Residuals`.
+        reach: how many times as wide as assumed beforehand the range of a parameter is, by path.
 
     Attributes:
         noise, prior, centre: as given.
@@ -95,13 +98,15 @@ class WhitenedResiduals(Residuals):
         tolerance: float = DEFAULT_TOLERANCE,
         interpolation: Interpolation = "foh",
         threads: int = 1,
+        reach: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(model, trials, free, tolerance, interpolation, threads)
         self.noise, self.prior = tuple(noise), np.asarray(prior, float)
         self.centre = self.start.copy() if centre is None else np.asarray(centre, float)
+        self._possible = self.lower, self.upper
+        wider = np.array([(reach or {}).get(path, 1.0) for path in free])
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
-        self.lower = np.maximum(self.lower, self.centre - FARTHEST * self.prior)
-        self.upper = np.minimum(self.upper, self.centre + FARTHEST * self.prior)
+        self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
         self._own = self._places(own or {})
 
     @property
@@ -109,10 +114,21 @@ class WhitenedResiduals(Residuals):
         """The trials as they are read."""
         return self._trials
 
+    def at_assumed_edge(self, values: Array) -> list[str]:
+        """Paths of parameters that are at an edge of what was assumed of them beforehand."""
+        at = at_assumed_edge(values, self.lower, self.upper, *self._possible)
+        return [free.path for free, edge in zip(self.free, at, strict=True) if edge]
+
+    def needed_reach(self, values: Array) -> dict[str, float]:
+        """How many times as wide as assumed the ranges that do not hold values must be, by path."""
+        wider = needed_reach(values, self.centre, self.prior, *self._possible)
+        pairs = zip(self.free, wider.tolist(), strict=True)
+        return {free.path: reach for free, reach in pairs if reach > 1.0}
+
     def sums(self, values: Array, steps: Array, central: bool = False) -> Sums:
         """Sums over whitened residuals, with what the prior adds."""
-        found = self._moved_products(values, steps, central, self._product)
-        total = np.sum(found, axis=0) if found else np.full((1, 1), np.nan)
+        moved_products = self._moved_products(values, steps, central, self._product)
+        total = np.sum(moved_products, axis=0) if moved_products else np.full((1, 1), np.nan)
         if not np.isfinite(total).all():
             size = len(steps)
             return Sums(math.inf, np.full(size, np.nan), np.full((size, size), np.nan))
@@ -143,10 +159,10 @@ class WhitenedResiduals(Residuals):
         widths = np.concatenate([[1.0], steps])
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
-            found = self._differences(logged, states, zeros, vectors, central)
+            differences = self._differences(logged, states, zeros, vectors, central)
             # A rig that cannot be simulated has no finite products; who asks for them looks.
             with np.errstate(invalid="ignore", over="ignore"):
-                white = self.whitened(logged, found[:, :, : len(logged.time)])
+                white = self.whitened(logged, differences[:, :, : len(logged.time)])
                 return products(logged, white / widths[:, None, None])
 
         return self._each(tried, work)
@@ -158,13 +174,13 @@ class WhitenedResiduals(Residuals):
         """
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
-            found = self._differences(logged, states, zeros, vectors, central=False)
-            return self.whitened(logged, found[:, :, : len(logged.time)]).astype(np.float32)
+            differences = self._differences(logged, states, zeros, vectors, central=False)
+            return self.whitened(logged, differences[:, :, : len(logged.time)]).astype(np.float32)
 
-        found = self._each(tried, work)
-        if not self._settled or not all(np.isfinite(part).all() for part in found):
+        columns = self._each(tried, work)
+        if not self._settled or not all(np.isfinite(part).all() for part in columns):
             return None
-        return found
+        return columns
 
     def readings(self, values: Array) -> list[Array] | None:
         """What the sensors hold at parameters (SI), shape (4, rows) for each trial."""
@@ -172,8 +188,8 @@ class WhitenedResiduals(Residuals):
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             return np.stack([signal[0] for signal in self._held(states, zeros, vectors)])
 
-        found = self._each(values[None], work)
-        return found if self._settled else None
+        readings = self._each(values[None], work)
+        return readings if self._settled else None
 
     def first_states(self, values: Array) -> list[Array]:
         """States (SI) in which each trial begins at parameters, shape (states,) for each trial."""
@@ -196,32 +212,32 @@ class WhitenedResiduals(Residuals):
             if not logged.measures[channel]:
                 continue
             missing = logged.missing[channel]
-            found = noise.white(differences[:, channel], missing)
+            filtered = noise.white(differences[:, channel], missing)
             if name in FREE_ZEROS:
                 one = np.ones(len(logged.time))
                 one[missing] = 0.0
                 along = noise.white(one[None], missing)[0]
-                found -= np.outer(found @ along / (along @ along), along)
-            white[:, channel] = found
+                filtered -= np.outer(filtered @ along / (along @ along), along)
+            white[:, channel] = filtered
         return white
 
     def products(self, columns: Sequence[Array]) -> Pieces:
         """Products of whitened columns, as `columns` gives them."""
-        found = [
+        by_trial = [
             self._products(logged, part.astype(np.float64))
             for logged, part in zip(self._trials, columns, strict=True)
         ]
-        gathered = self.gathered(found)
+        gathered = self.gathered(by_trial)
         assert gathered is not None
         return gathered
 
-    def gathered(self, found: Sequence[Array]) -> Pieces | None:
+    def gathered(self, by_trial: Sequence[Array]) -> Pieces | None:
         """Products of all trials, put together; None where there are none, or no numbers."""
-        if not found or not all(np.isfinite(part).all() for part in found):
+        if not by_trial or not all(np.isfinite(part).all() for part in by_trial):
             return None
-        trial = np.repeat(np.arange(len(found)), [len(part) for part in found])
+        trial = np.repeat(np.arange(len(by_trial)), [len(part) for part in by_trial])
         counts = np.concatenate([self._counts(logged) for logged in self._trials])
-        return Pieces(np.concatenate(found), trial, counts)
+        return Pieces(np.concatenate(by_trial), trial, counts)
 
     def edges(self, logged: Logged) -> list[int]:
         """Where the pieces of a trial begin, and its end."""
@@ -232,11 +248,11 @@ class WhitenedResiduals(Residuals):
     def _products(self, logged: Logged, white: Array) -> Array:
         """Products over the pieces of one trial, shape (pieces, columns, columns)."""
         edges = self.edges(logged)
-        found = np.empty((len(edges) - 1, len(white), len(white)))
+        products = np.empty((len(edges) - 1, len(white), len(white)))
         for k, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
             part = white[:, :, start:stop].reshape(len(white), -1)
-            found[k] = part @ part.T
-        return found
+            products[k] = part @ part.T
+        return products
 
     def _product(self, logged: Logged, white: Array) -> Array:
         """The sum of `_products`, shape (columns, columns), in fewer and larger steps."""

@@ -133,13 +133,13 @@ def after_name(diagnosis: Diagnosis) -> str:
     return "effect added" if diagnosis.effects else "model proposed"
 
 
-def map_picture(found: Sequence[Map]) -> bytes:
+def map_picture(maps: Sequence[Map]) -> bytes:
     """Mean residuals over two conditions each; empty where there are no data."""
-    columns = min(len(found), 2)
-    rows = -(-len(found) // columns)
+    columns = min(len(maps), 2)
+    rows = -(-len(maps) // columns)
     with picture(4.6 * columns, 3.4 * rows) as drawn:
         panels = np.array(drawn.subplots(rows, columns, squeeze=False)).ravel()
-        for panel, each in zip(panels, found, strict=False):
+        for panel, each in zip(panels, maps, strict=False):
             largest = max(2.0, float(np.nanmax(np.abs(each.residual), initial=0.0)))
             panel.patch.set(facecolor="#e3e6ea", hatch="////", edgecolor="#ffffff")
             mesh = panel.pcolormesh(
@@ -150,7 +150,7 @@ def map_picture(found: Sequence[Map]) -> bytes:
             panel.set_xlabel(each.x_name)
             panel.set_ylabel(each.y_name)
             drawn.colorbar(mesh, ax=panel, label="mean residual / noise")
-        for panel in panels[len(found) :]:
+        for panel in panels[len(maps) :]:
             panel.set_visible(False)
         return png(drawn)
 
@@ -169,10 +169,10 @@ def law_picture(law: ResidualLaw) -> bytes:
 
 def commands_picture(trial: Trial) -> bytes:
     """The commands of an experiment."""
-    found = [column for column in COLUMNS if column.quantity in trial.commands]
-    with picture(8.2, 0.5 + 1.5 * len(found)) as drawn:
-        panels = np.atleast_1d(np.array(drawn.subplots(len(found), 1, sharex=True), dtype=object))
-        for panel, column in zip(panels, found, strict=True):
+    columns = [column for column in COLUMNS if column.quantity in trial.commands]
+    with picture(8.2, 0.5 + 1.5 * len(columns)) as drawn:
+        panels = np.atleast_1d(np.array(drawn.subplots(len(columns), 1, sharex=True), dtype=object))
+        for panel, column in zip(panels, columns, strict=True):
             panel.plot(trial.time, column.from_si(trial.commands[column.quantity]), color="#000000")
             words = column.name.rpartition("_")[0].replace("_", " ")
             panel.set_ylabel(f"{words}\n({column.unit})")

@@ -70,7 +70,7 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
 
 def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
     """Gaps over all trials, by column name."""
-    found: dict[str, Gap] = {}
+    by_signal: dict[str, Gap] = {}
     for column in (BY_QUANTITY[name] for name in OUTPUTS):
         parts = [
             (record.gaps[column.name], len(record.time))
@@ -82,10 +82,10 @@ def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
         weights = np.array([rows for _, rows in parts], float)
         squares = np.array([[g.before, g.parameters, g.after] for g, _ in parts]) ** 2
         before, parameters, after = np.sqrt(weights @ squares / weights.sum())
-        found[column.name] = Gap(
+        by_signal[column.name] = Gap(
             float(before), float(parameters), float(after), parts[0][0].floor, parts[0][0].held_out
         )
-    return found
+    return by_signal
 
 
 def floors_in_file_units(findings: Findings) -> dict[str, Floor]:

@@ -22,6 +22,7 @@ from pma_gym.discovery.report.text import (
     readable,
     signal_name,
     signal_unit,
+    undetermined_words,
     unit_cell,
     what_to_do,
 )
@@ -34,7 +35,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
     """What was found: verdict, where, which effect, how large, how much it closes, what next."""
     lines = [f"{VERDICTS[diagnosis.verdict]}.", readable(diagnosis.sentence, diagnosis), ""]
     lines += [f"Note: {warning}" for warning in diagnosis.warnings]
-    for name, found in (
+    for name, entry in (
         ("Where", _places(diagnosis)),
         ("Effect", _effects(diagnosis)),
         ("Parameters", _parameters(diagnosis)),
@@ -44,7 +45,7 @@ def diagnosis_summary(diagnosis: Diagnosis) -> str:
         ("Now", (_plain(step) for step in what_to_do(diagnosis))),
     ):
         labels = itertools.chain([f"{name}:"], itertools.repeat(""))
-        lines += [f"{label:<12}{text}" for label, text in zip(labels, found, strict=False)]
+        lines += [f"{label:<12}{text}" for label, text in zip(labels, entry, strict=False)]
     return "\n".join(lines)
 
 
@@ -62,7 +63,10 @@ def _places(diagnosis: Diagnosis) -> Iterator[str]:
 def _effects(diagnosis: Diagnosis) -> Iterator[str]:
     for effect in diagnosis.effects:
         sizes = ", ".join(
-            f"{name} {estimate_words(known)}" for name, known in effect.parameters.items()
+            [
+                *(f"{name} {estimate_words(known)}" for name, known in effect.parameters.items()),
+                *(f"{name} {undetermined_words(e)}" for name, e in effect.undetermined.items()),
+            ]
         )
         yield f"{effect_name(effect.name)}: {sizes}"
         if effect.confused_with:

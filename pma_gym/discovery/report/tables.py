@@ -24,6 +24,7 @@ from pma_gym.discovery.report.text import (
     readable,
     signal_name,
     signal_unit,
+    undetermined_words,
     unit_cell,
 )
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
@@ -104,6 +105,10 @@ def effect_table(effect: NamedEffect) -> TextTable:
             unit_cell(known.unit),
         ]
         for name, known in effect.parameters.items()
+    ]
+    rows += [
+        [f"`{name}`", "–", undetermined_words(left), unit_cell(left.unit)]
+        for name, left in effect.undetermined.items()
     ]
     title = f"Size of the effect: {effect_name(effect.name)}"
     return TextTable(title, ["Parameter", "Value", "95 % interval", "Unit"], rows)

@@ -6,7 +6,7 @@ import re
 import sys
 
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
-from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap
+from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Undetermined
 from pma_gym.effects import CATALOGUE
 from pma_gym.units import with_unit
 
@@ -48,8 +48,8 @@ def effect_name(name: str) -> str:
 def readable(text: str, diagnosis: Diagnosis) -> str:
     """A text with the names of effects as people write them; parameters keep theirs."""
     named = {*CATALOGUE, *(each.name for each in diagnosis.candidates)}
-    found = "|".join(sorted((name for name in named if "_" in name), key=len, reverse=True))
-    return re.sub(rf"(?<![\w.`])({found})(?![\w.`])", lambda hit: effect_name(hit[1]), text)
+    alternatives = "|".join(sorted((name for name in named if "_" in name), key=len, reverse=True))
+    return re.sub(rf"(?<![\w.`])({alternatives})(?![\w.`])", lambda hit: effect_name(hit[1]), text)
 
 
 def effect_names(names: tuple[str, ...] | list[str], joint: str = "and") -> str:
@@ -81,18 +81,18 @@ def effect_equation(name: str) -> str:
     """The indented lines of the law's docstring, as they stand there; empty if it has none."""
     effect = CATALOGUE.get(name)
     text = (effect.law.__doc__ or "") if effect and effect.law else ""
-    found = re.search(r"\n\n((?: {8}\S[^\n]*\n)+)", text)
-    return "\n".join(line.strip() for line in found[1].splitlines()) if found else ""
+    match = re.search(r"\n\n((?: {8}\S[^\n]*\n)+)", text)
+    return "\n".join(line.strip() for line in match[1].splitlines()) if match else ""
 
 
 def effect_symbols(name: str) -> str:
     """What stands in the law's equation: the arguments of its docstring, a line each."""
     effect = CATALOGUE.get(name)
     text = (inspect.getdoc(effect.law) or "") if effect and effect.law else ""
-    found = re.search(r"\nArgs:\n(.*?)(?=\n\S|\Z)", text, re.DOTALL)
-    if not found:
+    match = re.search(r"\nArgs:\n(.*?)(?=\n\S|\Z)", text, re.DOTALL)
+    if not match:
         return ""
-    joined = re.sub(r"\n {5,}", " ", found[1])
+    joined = re.sub(r"\n {5,}", " ", match[1])
     return "\n".join(line.strip() for line in joined.splitlines() if line.strip())
 
 
@@ -158,6 +158,15 @@ def estimate_words(known: Estimate) -> str:
     """`14.2 N (95 %: 13.1 to 15.4)`."""
     value = with_unit(estimate(known.value, known.low, known.high), known.unit)
     return f"{value}{at_its_limit(known)} (95 %: {interval(known)})"
+
+
+def undetermined_words(known: Undetermined) -> str:
+    """`not determined, above 20 mm/s`."""
+    if known.above is None and known.below is None:
+        return "not determined"
+    side = "below" if known.above is None else "above"
+    bound = known.below if known.above is None else known.above
+    return f"not determined, {side} {with_unit(figure(bound, 2), known.unit)}"
 
 
 def at_its_limit(known: Estimate) -> str:

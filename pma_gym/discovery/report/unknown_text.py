@@ -1,6 +1,8 @@
 """The verdict `unknown` in words: what the best effects leave, and the figure beyond its limit."""
 
 from pma_gym.discovery.diagnosis import Diagnosis
+from pma_gym.discovery.report.approximate_text import left_words
+from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.text import effect_name, effect_names, figure, percent, signal_name
 from pma_gym.discovery.verdict.residual_laws import LAWS
 from pma_gym.discovery.verdict.unknown import Reason
@@ -34,7 +36,19 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
     return (
         f"Something is missing in model {diagnosis.given.name} that no effect of the catalogue "
         f"carries: {_best(reason, residual)}, {beyond(reason, residual)}."
-    ) + _tones(diagnosis)
+    ) + f"{_candidate(diagnosis)}{_tones(diagnosis)}"
+
+
+def _candidate(diagnosis: Diagnosis) -> str:
+    """One more sentence: the best candidates with their sizes, where they carry most."""
+    known = diagnosis.approximate
+    if known is None:
+        return ""
+    closed = percent(1.0 - max(known.left, 0.0))
+    return (
+        f" The best candidate is {sized_effects(known.effects)}: it closes {closed} of the misfit "
+        f"beyond noise; {left_words(known)}."
+    )
 
 
 def _best(reason: Reason, residual: str) -> str:

@@ -6,6 +6,8 @@ from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
+from pma_gym.discovery.report.approximate_text import left_words
+from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.text import (
     at_its_limit,
     chance,
@@ -24,7 +26,7 @@ from pma_gym.discovery.verdict.decision import MOST_RIVALS, MOVED_CHANGE, UNDETE
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import ResidualFraction
 from pma_gym.discovery.verdict.unknown import Reason
-from pma_gym.units import suffix, with_unit
+from pma_gym.units import with_unit
 
 ALIKE = 0.9
 """Correlation from which on two parameters do the same to the signals."""
@@ -41,8 +43,8 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
         return (
-            f"In {trials} model {name} misses {_effects(diagnosis)}{_closed(diagnosis)}"
-            f"{_unsure(diagnosis)}."
+            f"In {trials} model {name} misses {sized_effects(diagnosis.effects)}"
+            f"{_approximately(diagnosis)}{_closed(diagnosis)}{_unsure(diagnosis)}."
         )
     if diagnosis.verdict == "parameters":
         off = [path for path, moved in diagnosis.parameters.items() if moved.significant]
@@ -107,18 +109,9 @@ def _propose(diagnosis: Diagnosis) -> str:
     return f"; measure next: {following.excitation}." if following else "."
 
 
-def _effects(diagnosis: Diagnosis) -> str:
-    named = []
-    for effect in diagnosis.effects:
-        sizes = ", ".join(
-            f"{_stem(parameter, each.unit)} {with_unit(figure(each.value), each.unit)}"
-            f"{at_its_limit(each)}"
-            for parameter, each in effect.parameters.items()
-        )
-        others = effect_names(list(effect.confused_with), "or")
-        doubt = f", or {others}" if others else ""
-        named.append(f"{effect_name(effect.name)} ({sizes}){doubt}")
-    return " and ".join(named)
+def _approximately(diagnosis: Diagnosis) -> str:
+    known = diagnosis.approximate
+    return "" if known is None else f" ({left_words(known)})"
 
 
 def _unsure(diagnosis: Diagnosis) -> str:
@@ -137,13 +130,6 @@ def _unsure(diagnosis: Diagnosis) -> str:
     return words + (f"; but it fits {listed(worse)} worse than the model as given" if worse else "")
 
 
-def _stem(parameter: str, unit_: str) -> str:
-    """A parameter's name without its unit: `force` of `force_n`."""
-    ending = suffix(unit_)
-    stem = parameter.removesuffix(f"_{ending}") if ending else parameter
-    return stem.replace("_", " ")
-
-
 def _closed(diagnosis: Diagnosis) -> str:
     gaps = {
         signal: gap.closed
@@ -152,14 +138,15 @@ def _closed(diagnosis: Diagnosis) -> str:
     }
     if not gaps:
         return ""
-    effect, found = diagnosis.verdict == "effect", diagnosis.gap
+    effect, by_signal = diagnosis.verdict == "effect", diagnosis.gap
     widest = max(
         gaps,
         key=lambda signal: (
-            (found[signal].parameters if effect else found[signal].before) / found[signal].floor
+            (by_signal[signal].parameters if effect else by_signal[signal].before)
+            / by_signal[signal].floor
         ),
     )
-    gap = found[widest]
+    gap = by_signal[widest]
     refitted = f" ({figure(gap.parameters)} with its parameters refitted)" if effect else ""
     unseen = " of trials that it was not fitted to" if gap.held_out else ""
     return (

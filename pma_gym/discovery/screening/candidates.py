@@ -57,12 +57,12 @@ def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> li
         model: the model, a station.
         orders: which repeat each trial is, 0 for the first; None where that is not known.
     """
-    found = [
+    candidates = [
         *(_lacking(model, effect, orders) for effect in CATALOGUE.values()),
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
-    return [candidate for candidate in found if candidate is not None]
+    return [candidate for candidate in candidates if candidate is not None]
 
 
 def _lacking(

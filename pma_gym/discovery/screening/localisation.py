@@ -100,15 +100,15 @@ def _places(bins: TimeBins, seen: Sequence[int], seed: int) -> tuple[Place, ...]
     member = inside.astype(np.float32).T
     p_values = np.stack([_p_values(bins.excess[channel], member, deals) for channel in seen])
     p_values = adjusted(p_values.ravel()).reshape(p_values.shape)
-    found = []
+    places = []
     for channel, p_value in zip(seen, p_values, strict=True):
         share, readings = _shares(bins, channel, member)
         for k in _told(bins.excess[channel], inside, names, share, readings, p_value):
             words = ", ".join(singles[i].words for i in names[k])
             signal = BY_QUANTITY[OUTPUTS[channel]].name
-            found.append(Place(signal, words, float(share[k]), float(p_value[k])))
-    found.sort(key=lambda place: -place.share_of_gap)
-    return tuple(found[:MOST])
+            places.append(Place(signal, words, float(share[k]), float(p_value[k])))
+    places.sort(key=lambda place: -place.share_of_gap)
+    return tuple(places[:MOST])
 
 
 def _shares(bins: TimeBins, channel: int, member: Single) -> tuple[Array, Array]:
@@ -143,9 +143,9 @@ def adjusted(p_values: Array) -> Array:
     """
     order = np.argsort(p_values, kind="stable")
     ratio = p_values[order] * len(p_values) / np.arange(1, len(p_values) + 1)
-    found = np.empty_like(p_values)
-    found[order] = np.minimum(np.minimum.accumulate(ratio[::-1])[::-1], 1.0)
-    return found
+    raised = np.empty_like(p_values)
+    raised[order] = np.minimum(np.minimum.accumulate(ratio[::-1])[::-1], 1.0)
+    return raised
 
 
 def _told(

@@ -34,40 +34,40 @@ def single_regions(bins: TimeBins) -> list[Region]:
     """Regions of one condition, those of motion first, as a person says them."""
     there = np.isfinite(bins.order)
     held, speed = bins.held, bins.speed
-    found: list[tuple[str, str, Mask]] = []
+    named: list[tuple[str, str, Mask]] = []
     for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
         since = np.where(there, getattr(bins, kind), np.nan)
-        found += [(kind, f"0-{t:g} s after {words}", since <= t) for t in (0.1, 0.2, 0.5)]
-        found.append((kind, f"more than 1 s after {words}", (since > 1.0) & np.isfinite(since)))
-    found.append(("motion", "while held", held > 0.0))
-    found.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
+        named += [(kind, f"0-{t:g} s after {words}", since <= t) for t in (0.1, 0.2, 0.5)]
+        named.append((kind, f"more than 1 s after {words}", (since > 1.0) & np.isfinite(since)))
+    named.append(("motion", "while held", held > 0.0))
+    named.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
     moving = held == 0.0
     for sign, words in ((1.0, "shortening"), (-1.0, "pulling out")):
         along = np.where(moving, sign * speed, np.nan)
-        found.append(("motion", f"while {words}", along > 0.0))
-        found += [
+        named.append(("motion", f"while {words}", along > 0.0))
+        named += [
             ("motion", f"{words} faster than {v:g} mm/s", along > v)
             for v in _round_cuts(along[along > 0.0], (0.5, 0.8))
         ]
-    found.append(("motion", "while moving", moving))
+    named.append(("motion", "while moving", moving))
     crawl = _round_cuts(np.abs(speed[moving]), (0.3,))
-    found += [
+    named += [
         ("motion", f"moving slower than {v:g} mm/s", moving & (abs(speed) < v)) for v in crawl
     ]
     phases = ("before the first command", "between the first command and the last", "")
     for number, words in enumerate(phases[:2]):
-        found.append(("phase", words, bins.phase == number))
-    found.append(("phase", "in the final hold", bins.phase == 2.0))
+        named.append(("phase", words, bins.phase == number))
+    named.append(("phase", "in the final hold", bins.phase == 2.0))
     for kind, name, unit in _LEVELS:
         values = getattr(bins, kind)
         for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
-            found.append((kind, f"{name}above {cut:g} {unit}", values > cut))
-            found.append((kind, f"{name}under {cut:g} {unit}", values < cut))
-    found.append(("order", "in the first half of the trials", bins.order < 0.5))
-    found.append(("order", "in the second half of the trials", bins.order > 0.5))
+            named.append((kind, f"{name}above {cut:g} {unit}", values > cut))
+            named.append((kind, f"{name}under {cut:g} {unit}", values < cut))
+    named.append(("order", "in the first half of the trials", bins.order < 0.5))
+    named.append(("order", "in the second half of the trials", bins.order > 0.5))
     count = int(there.sum())
     kept = {}
-    for kind, words, inside in found:
+    for kind, words, inside in named:
         if SMALLEST * count <= inside.sum() <= LARGEST * count:
             # Of two ways to say the same, the first.
             kept.setdefault(inside.tobytes(), Region((kind,), words, inside))

@@ -26,12 +26,12 @@ def reestimated_noise(
     """Whitening of what a fit leaves, never of less than is seen at rest."""
     whitened = problem.whitened_residuals(fit.model, chosen)
     left = residuals(whitened, fit)
-    found = []
+    filters = []
     for channel, before in enumerate(problem.noise):
         parts = [part[channel] for part in left]
         known = [part for part in parts if np.isfinite(part).any()]
-        found.append(autoregression(known, before.level) if known else before)
-    return tuple(found)
+        filters.append(autoregression(known, before.level) if known else before)
+    return tuple(filters)
 
 
 def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
@@ -43,7 +43,7 @@ def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
 
 def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Array]) -> list[Array]:
     """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
-    found = []
+    differences = []
     for logged, held in zip(whitened.logged, readings, strict=True):
         left = held - logged.measured
         for channel, name in enumerate(OUTPUTS):
@@ -53,8 +53,8 @@ def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Arra
             left[channel, logged.missing[channel]] = np.nan
             if name in ("contraction", "rotation"):
                 left[channel] -= np.nanmean(left[channel])
-        found.append(left)
-    return found
+        differences.append(left)
+    return differences
 
 
 def is_autocorrelated(
@@ -103,14 +103,14 @@ def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
     whitened = problem.whitened_residuals(fit.model)
     left, logged = residuals(whitened, fit), whitened.logged
     edges = [whitened.edges(each) for each in logged]
-    found = [
+    scans = [
         scan_statistic(
             [part[c] for part in left], edges, problem.noise[c].level, step_between(logged, c)
         )
         for c in range(len(OUTPUTS))
     ]
-    chance = min(1.0, len(found) * min(each.chance for each in found))
-    return ScanStatistic(chance, sum(each.excess for each in found))
+    chance = min(1.0, len(scans) * min(each.chance for each in scans))
+    return ScanStatistic(chance, sum(each.excess for each in scans))
 
 
 def _tells(problem: FitProblem) -> bool:

@@ -90,9 +90,9 @@ def scan_statistic(
             weights[size] = eigvalsh(toeplitz(colour[:size]))
         # Less the largest: one wild reading is no structure.
         power = float(beyond[k] @ beyond[k] - np.max(beyond[k]) ** 2)
-        found = tail(power, weights[size]) * len(pieces)
-        least = min(least, found)
-        if found <= CHANCE:
+        chance = tail(power, weights[size]) * len(pieces)
+        least = min(least, chance)
+        if chance <= CHANCE:
             excess += float(pieces[k] @ pieces[k] - size * noise.level**2) / level**2
     return ScanStatistic(least, excess)
 
@@ -105,12 +105,12 @@ def noise_of(parts: Sequence[Array], level: float) -> Whitening:
         level: standard deviation as it is known otherwise (SI): the noise is taken to be at least
             that.
     """
-    found = white_noise(level)
+    noise = white_noise(level)
     for _ in range(2):
         # Wild readings are cut: of noise that costs a thousandth of its level.
-        most = WILD * found.level
-        found = autoregression([np.clip(part, -most, most) for part in parts], found.level)
-    return found
+        most = WILD * noise.level
+        noise = autoregression([np.clip(part, -most, most) for part in parts], noise.level)
+    return noise
 
 
 def _together(beyond: Sequence[Array]) -> NDArray[np.bool_]:
@@ -128,8 +128,8 @@ def autocorrelation(noise: Whitening, count: int) -> Array:
     [1.0, 0.5, 0.25, 0.125]
     """
     order = len(noise.coefficients)
-    found = np.zeros(max(count, order + 1))
-    found[0] = 1.0
+    sums = np.zeros(max(count, order + 1))
+    sums[0] = 1.0
     # Yule and Walker's equations, for the lags up to the order.
     across, along = np.eye(order), np.zeros(order)
     for row in range(order):
@@ -139,10 +139,10 @@ def autocorrelation(noise: Whitening, count: int) -> Array:
                 across[row, apart - 1] -= weight
             else:
                 along[row] += weight
-    found[1 : order + 1] = np.linalg.solve(across, along)
+    sums[1 : order + 1] = np.linalg.solve(across, along)
     for lag in range(order + 1, count):
-        found[lag] = np.dot(noise.coefficients, found[lag - order : lag][::-1])
-    return found[:count]
+        sums[lag] = np.dot(noise.coefficients, sums[lag - order : lag][::-1])
+    return sums[:count]
 
 
 def tail(power: float, weights: Array) -> float:

@@ -127,12 +127,12 @@ def screen(
         progress: called with the number of candidates that are done.
     """
     size = len(baseline.columns[0])
-    found = []
+    probed = []
     for number, candidate in enumerate(candidates):
-        found.append(_probe(baseline, whitened_of(candidate), candidate, size))
+        probed.append(_probe(baseline, whitened_of(candidate), candidate, size))
         if progress is not None:
             progress(number + 1)
-    return _judged(found, candidates, seed)
+    return _judged(probed, candidates, seed)
 
 
 @dataclass(frozen=True)
@@ -164,9 +164,9 @@ def _probe(
         across += ours[1:].reshape(size - 1, -1) @ flat.T
         whole += np.einsum("ij,ij->i", flat, flat, dtype=np.float64)
         edges = baseline.whitened.edges(logged)[:-1]
-        for found, part in ((along, theirs), (own, ours[1:])):
+        for slopes_by_trial, part in ((along, theirs), (own, ours[1:])):
             slopes = np.einsum("kcr,cr->kr", part, ours[0], dtype=np.float64)
-            found.append(np.add.reduceat(slopes, edges, axis=1))
+            slopes_by_trial.append(np.add.reduceat(slopes, edges, axis=1))
     weights = baseline.inverse @ across
     strengths = whole - np.sum(across * weights, axis=0)
     seen = (strengths > LEAST_PART * whole) & (whole > LEAST_CHANGE**2 * readings)
@@ -218,17 +218,17 @@ def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Arra
 
 
 def _judged(
-    found: Sequence[_Probed], candidates: Sequence[CandidateEffect], seed: int
+    probed: Sequence[_Probed], candidates: Sequence[CandidateEffect], seed: int
 ) -> list[ScreeningScore]:
     generator = np.random.Generator(np.random.Philox(seed))
-    pieces = found[0].slopes.shape[1]
+    pieces = probed[0].slopes.shape[1]
     flips = generator.choice([-1.0, 1.0], size=(RESAMPLES, pieces))
     largest = np.zeros(RESAMPLES)
-    for each, candidate in zip(found, candidates, strict=True):
+    for each, candidate in zip(probed, candidates, strict=True):
         drawn = _gains(flips @ each.slopes.T, each.strengths, candidate.signs)
         largest = np.maximum(largest, drawn.max(axis=1, initial=0.0))
     scores = []
-    for each, candidate in zip(found, candidates, strict=True):
+    for each, candidate in zip(probed, candidates, strict=True):
         if not each.strengths.any():
             scores.append(ScreeningScore(candidate, 0.0, 1.0, -1, 0.0, 0.0, None, ()))
             continue
@@ -272,7 +272,7 @@ def _starts(gains: Array, factors: Array) -> tuple[tuple[int, float], ...]:
 
 
 def refined_score(
-    baseline: Baseline, whitened: WhitenedResiduals, found: ScreeningScore
+    baseline: Baseline, whitened: WhitenedResiduals, score: ScreeningScore
 ) -> ScreeningScore:
     """A look at a candidate whose probes are simulated at many sizes.
 
@@ -282,14 +282,14 @@ def refined_score(
     Args:
         baseline: the refitted model.
         whitened: the trials beside it with the candidate in it.
-        found: the look so far.
+        score: the look so far.
     Returns:
         The same look with the gain that is the larger of the two, and starts from all sizes.
     """
-    candidate = found.candidate
+    candidate = score.candidate
     if not len(candidate.probes):
-        return found
-    starts = list(found.starts)
+        return score
+    starts = list(score.starts)
     for probe in range(0, len(candidate.probes), -(-len(candidate.probes) // CLOSER)):
         starts += [(probe, size) for size in SIZES]
         starts += [(probe, -size) for size in SIZES if candidate.signs[probe]]
@@ -301,8 +301,8 @@ def refined_score(
         ]
     )
     order = [k for k in np.argsort(-gains, kind="stable")[:PROBES] if gains[k] > 0.0]
-    best = max(found.gain, float(gains.max()))
-    return replace(found, gain=best, starts=tuple(starts[k] for k in order) or found.starts)
+    best = max(score.gain, float(gains.max()))
+    return replace(score, gain=best, starts=tuple(starts[k] for k in order) or score.starts)
 
 
 def _simulated_gains(
@@ -314,15 +314,15 @@ def _simulated_gains(
 
 
 def starting_points(
-    baseline: Baseline, whitened: WhitenedResiduals, found: ScreeningScore
+    baseline: Baseline, whitened: WhitenedResiduals, score: ScreeningScore
 ) -> list[Array]:
     """Where to begin fits of a candidate: values that explain most as they are, the best first.
 
     A look takes what a probe changes times a factor; here each is simulated, for a dead zone twice
     as wide does not change twice as much.
     """
-    candidate, tried = found.candidate, []
-    for probe, factor in found.starts:
+    candidate, tried = score.candidate, []
+    for probe, factor in score.starts:
         for each in (factor, np.sign(factor) * np.sqrt(abs(factor)), 1.0, 0.4 * factor):
             values = candidate.grown(probe, float(each))
             if not any(np.array_equal(values, other) for other in tried):

@@ -92,13 +92,13 @@ def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dic
         "total": filled,
         "counts": known.astype(float),
     }
-    found = {name: np.add.reduceat(each, starts, axis=1) for name, each in sums.items()}
+    bins = {name: np.add.reduceat(each, starts, axis=1) for name, each in sums.items()}
     # A tick's conditions are those of its middle row.
     middle = (starts + np.append(starts[1:], len(time)) - 1) // 2
     conditions = _conditions(logged, held) | {"order": np.full(len(time), order)}
-    found |= {name: each[middle] for name, each in conditions.items()}
+    bins |= {name: each[middle] for name, each in conditions.items()}
     spare = -len(starts) % PIECE_BINS
-    return {name: _padded(each, spare) for name, each in found.items()}
+    return {name: _padded(each, spare) for name, each in bins.items()}
 
 
 def _padded(values: Array, spare: int) -> Array:
@@ -154,8 +154,8 @@ def _since(time: Array, event: Mask) -> Array:
 
 
 def _stepped(logged: Logged) -> Mask:
-    found = np.zeros(len(logged.time), bool)
+    stepped = np.zeros(len(logged.time), bool)
     for volts in (logged.motor, logged.regulator):
         change = np.abs(np.diff(volts))
-        found[1:] |= (change > STEP_V) & (change > STEP_V_PER_S * np.diff(logged.time))
-    return found
+        stepped[1:] |= (change > STEP_V) & (change > STEP_V_PER_S * np.diff(logged.time))
+    return stepped

@@ -78,10 +78,10 @@ def backward_elimination(problem: FitProblem, fit: Fitted) -> Elimination | None
         given = as_given(problem)
         return given if given.fit.chi_square <= most else None
     begun = np.clip(whitened.centre[kept] + moves, whitened.lower[kept], whitened.upper[kept])
-    found = narrow.fit(problem.given.replace(dict(zip(paths, map(float, begun), strict=True))))
-    if found is None or not found.chi_square <= most:
+    fewest = narrow.fit(problem.given.replace(dict(zip(paths, map(float, begun), strict=True))))
+    if fewest is None or not fewest.chi_square <= most:
         return None
-    return Elimination(narrow, replace(found, covariance=covariance(narrow, found, ())))
+    return Elimination(narrow, replace(fewest, covariance=covariance(narrow, fewest, ())))
 
 
 def as_given(problem: FitProblem) -> Elimination:

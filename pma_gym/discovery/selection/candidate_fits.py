@@ -9,7 +9,7 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, starting_points
-from pma_gym.document_shape import ListOf, Real, check_shape
+from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
@@ -49,11 +49,11 @@ def fitted(
     best: Fitted | None = None
     whitened = problem.probed(stripped(problem, before), each.candidate)
     for begun in starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]:
-        found = problem.fit(before.model, extra, {each.candidate.name: begun})
-        if found is not None and caught:
-            found = problem.continuation(found, extra)
-        if found is not None and (best is None or found.chi_square < best.chi_square):
-            best = found
+        fit = problem.fit(before.model, extra, {each.candidate.name: begun})
+        if fit is not None and caught:
+            fit = problem.continuation(fit, extra)
+        if fit is not None and (best is None or fit.chi_square < best.chi_square):
+            best = fit
         # As much as the look promised, or near at last: no other beginning is needed.
         if best is not None and (
             not problem.far(best) if caught else before.chi_square - best.chi_square >= each.gain
@@ -83,9 +83,9 @@ def restarted(
         return better
     for number, name in enumerate(sorted(fits, key=lambda each: cost(fits[each]))):
         progress(f"fitting effect {len(chosen) + 1} from more beginnings", number, len(fits))
-        found = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
-        if found is not None and found.chi_square < fits[name].chi_square:
-            better[name] = found
+        restart = fitted(problem, baseline, before, chosen, known[name], journal, caught=True)
+        if restart is not None and restart.chi_square < fits[name].chi_square:
+            better[name] = restart
         if name in better and not problem.far(better[name]):
             break
     return better
@@ -100,8 +100,8 @@ def better(
         given = dict(
             zip(problem.own.free, values(problem.given, problem.own.free).tolist(), strict=True)
         )
-        found = problem.careful_fit(fit.model.replace(given), chosen)
-        best = fit if found is None or found.chi_square >= fit.chi_square else found
+        refit = problem.careful_fit(fit.model.replace(given), chosen)
+        best = fit if refit is None or refit.chi_square >= fit.chi_square else refit
         return problem.continuation(best, chosen)
 
     return _once("better", problem, fit, chosen, journal, search)
@@ -129,9 +129,9 @@ def _once(
     kept = journal.restored(key, lambda entry: restored(entry, problem, fit, chosen))
     if kept is not None:
         return kept
-    found = search()
-    journal.keep(key, kept_form(found))
-    return found
+    searched = search()
+    journal.keep(key, kept_form(searched))
+    return searched
 
 
 def without_idle(
@@ -153,12 +153,12 @@ def without_idle(
             )
             for each in others
         }
-        found = problem.fit(begun, others, starts)
-        if found is None:
+        without = problem.fit(begun, others, starts)
+        if without is None:
             continue
-        missed = found.chi_square - best.chi_square
+        missed = without.chi_square - best.chi_square
         if missed < max(30.0, 0.02 * max(worst - best.chi_square, 0.0)):
-            return others, refit(problem, found, others, journal)
+            return others, refit(problem, without, others, journal)
     return chosen, best
 
 
@@ -169,6 +169,7 @@ _KEPT = {
     "chi_square": Real(),
     "steps": ListOf(Real(finite=False)),
     "converged": bool,
+    "reach": {ANY: Real(1.0)},
 }
 """Shape of a fit in a journal."""
 
@@ -182,6 +183,7 @@ def kept_form(fit: Fitted) -> dict:
         "chi_square": fit.chi_square,
         "steps": fit.steps.tolist(),
         "converged": bool(fit.converged),
+        "reach": dict(fit.reach),
     }
 
 
@@ -210,9 +212,9 @@ def restored(
             if not free
         }
         model = model.replace(switched) if switched else model
-    found = dict(zip(kept["paths"], kept["values"], strict=True))
+    by_path = dict(zip(kept["paths"], kept["values"], strict=True))
     return Fitted(
-        model.replace(found),
+        model.replace(by_path),
         tuple(candidate.name for candidate in extra),
         tuple(kept["paths"]),
         np.array(kept["values"]),
@@ -220,4 +222,5 @@ def restored(
         kept["chi_square"],
         np.array(kept["steps"]),
         kept["converged"],
+        kept["reach"],
     )

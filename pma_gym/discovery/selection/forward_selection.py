@@ -10,9 +10,10 @@ again only when all effects are selected: before, an autoregression would take t
 noise.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
+from pma_gym.discovery.diagnosis import Undetermined
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
@@ -103,6 +104,7 @@ class Selection:
         problem: with the noise that it leaves.
         refitted: the model with its own parameters refitted alone; better than what the selection
             began with, where it had been caught.
+        undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
     """
 
     stages: tuple[Stage, ...]
@@ -110,6 +112,7 @@ class Selection:
     fit: Fitted
     problem: FitProblem
     refitted: Fitted
+    undetermined: Mapping[str, Undetermined] = field(default_factory=dict)
 
 
 def select(
@@ -197,9 +200,9 @@ def _stage(
         worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
             progress(f"fitting effect {len(chosen) + 1}", number, len(worth[:TRIED]))
-            found = fitted(problem, baseline, before, chosen, each, journal)
-            if found is not None:
-                fits[each.candidate.name] = found
+            refit = fitted(problem, baseline, before, chosen, each, journal)
+            if refit is not None:
+                fits[each.candidate.name] = refit
         fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
@@ -224,14 +227,14 @@ def _refined_scores(
         chance: that noise bursts so.
         least: chi-square that explains bursts.
     """
-    found = [
+    refined = [
         refined_score(baseline, problem.probed(plain, each.candidate), each) for each in scores
     ]
-    found = [
+    refined = [
         replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each
-        for each in found
+        for each in refined
     ]
-    return sorted(found, key=lambda each: -each.gain)
+    return sorted(refined, key=lambda each: -each.gain)
 
 
 def passes(problem: FitProblem, each: ScreeningScore, missing: bool = False) -> bool:

@@ -68,7 +68,7 @@ def rivals(
         (name for name, fit in stage.fits.items() if cost(fit) - cost(own) < CLOSE * gain),
         key=lambda name: cost(stage.fits[name]),
     )
-    found = []
+    ranked = []
     for name in [name for name in near if name not in taken][:MOST]:
         candidate = next(each for each in candidates if each.name == name)
         others = [*chosen]
@@ -81,8 +81,8 @@ def rivals(
         if fit is None:
             continue
         behind = cost(fit) - cost(best)
-        found.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
-    return sorted(found, key=lambda rival: rival.behind)
+        ranked.append(Rival(candidate, fit, behind, behind < max(NEAREST, NEAREST_SHARE * gain)))
+    return sorted(ranked, key=lambda rival: rival.behind)
 
 
 def _start(candidate: CandidateEffect, *fits: Fitted) -> np.ndarray:

@@ -240,11 +240,11 @@ def _white(noise: Whitening, residual: Array, missing: NDArray[np.int64]) -> Arr
 
 def _blocks(logged: Sequence[Logged]) -> list[NDArray[np.int64]]:
     """Number of each row's block; no two trials share one."""
-    found, first = [], 0
+    blocks, first = [], 0
     for each in logged:
         duration = float(each.time[-1] - each.time[0])
         count = max(1, round(duration / BLOCK_S))
         places = (each.time - each.time[0]) * (count / max(duration, 1e-300) * (1.0 - 1e-12))
-        found.append(first + places.astype(np.int64))
+        blocks.append(first + places.astype(np.int64))
         first += count
-    return found
+    return blocks

@@ -43,7 +43,7 @@ def homogeneity_test(
         as simulated, by name; 0 where fewer than three groups show the effect, or where chance
         would scatter as much. Empty where the model cannot be simulated.
     """
-    whitened = problem.whitened_residuals(fit.model, chosen)
+    whitened = problem.whitened_at(fit, chosen)
     pieces = whitened.pieces(fit.values, fit.steps)
     if pieces is None:
         return {}
@@ -94,10 +94,9 @@ def newton_step(gradient: Array, curvature: Array, free: NDArray[np.bool_]) -> A
 def _direction(fit: Fitted, candidate: CandidateEffect) -> Array:
     """How a fit's parameters move where the effect as a whole grows."""
     direction = np.zeros(len(fit.paths))
-    for path, absent, scales, fitted in zip(
-        candidate.paths, candidate.absent, candidate.amplitudes, candidate.fitted, strict=True
-    ):
-        if fitted and (scales or len(candidate.paths) == 1):
+    rows = zip(candidate.paths, candidate.absent, candidate.amplitudes, strict=True)
+    for path, absent, scales in rows:
+        if path in candidate.fitted_paths and (scales or len(candidate.paths) == 1):
             at = fit.paths.index(path)
             size = fit.values[at] - (absent if candidate.fitted.all() and scales else 0.0)
             direction[at] = size
@@ -108,10 +107,10 @@ def _groups(
     whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces
 ) -> dict[str, NDArray[np.int64]]:
     """Group of every piece, by trial and by conditions."""
-    found: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
+    groups: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
     readings = whitened.readings(fit.values)
     if readings is None:
-        return found
+        return groups
     for channel, name in enumerate(OUTPUTS):
         if name == "rotation":
             continue
@@ -120,8 +119,8 @@ def _groups(
             edges = whitened.edges(logged)
             means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
         ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
-        found[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
-    return found
+        groups[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
+    return groups
 
 
 def _scatter(

@@ -63,13 +63,13 @@ def estimated_laws(problem: FitProblem, refitted: Fitted) -> list[EstimatedLaw]:
         problem.whitened_residuals(refitted.model).sums(refitted.values, np.empty(0)).chi_square
     )
     ranges = _ranges(problem, refitted)
-    found = []
+    laws = []
     for name in LAWS:
         candidate = _candidate(problem, name, ranges[name])
         fit = problem.fit(refitted.model, (candidate,), {name: candidate.absent})
         if fit is not None:
-            found.append(EstimatedLaw(name, candidate, fit, before - fit.chi_square))
-    return sorted(found, key=lambda law: -law.gain)
+            laws.append(EstimatedLaw(name, candidate, fit, before - fit.chi_square))
+    return sorted(laws, key=lambda law: -law.gain)
 
 
 def residual_law(drawn: EstimatedLaw) -> ResidualLaw:

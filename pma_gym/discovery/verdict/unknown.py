@@ -34,6 +34,11 @@ MOST_AUTOCORRELATED = 0.1
 MOST_SPREAD = 0.12
 """Most that an effect's size may scatter by trial or condition, beyond chance, as a share of it."""
 
+EXTRAPOLATED = 1.0
+"""Scatter from which on it is extrapolated: sizes of groups come from slopes, which hold for small
+changes. Sizes that really scattered by more than themselves would leave a residual; where none is
+left, the slopes are wrong, not the law."""
+
 Why = Literal["unexplained", "misfit", "explained", "slow", "autocorrelated", "scatters", "outdone"]
 """`unexplained`: the residual is no noise, and no effect was added. `misfit`: nor is it, it exceeds
 the signal's floor (`adequacy`). `explained`: nor is it, a flexible regression explains it. `slow`:
@@ -109,7 +114,7 @@ def _beyond(
         return Reason("slow", left.slow, MOST_LEFT)
     if left.autocorrelated > MOST_AUTOCORRELATED:
         return Reason("autocorrelated", left.autocorrelated, MOST_AUTOCORRELATED)
-    return _scatters(findings) or _outdone(findings, laws)
+    return _scatters(findings, left) or _outdone(findings, laws)
 
 
 def gate(findings: Findings) -> bool:
@@ -163,17 +168,17 @@ def shapeless_laws(findings: Findings, left: ResidualFraction) -> list[Estimated
     """Laws without a shape of their own, where the effects leave room for one."""
     if not (gate(findings) or _missing(findings)):
         return []
-    if left.most < DOUBTFUL and _scatters(findings) is None:
+    if left.most < DOUBTFUL and _scatters(findings, left) is None:
         return []
     return estimated_laws(findings.selection.problem, findings.refitted)
 
 
-def _scatters(findings: Findings) -> Reason | None:
+def _scatters(findings: Findings, left: ResidualFraction) -> Reason | None:
     """The first effect that was selected whose size differs by trial or by condition, and how."""
-    selection = findings.selection
+    selection, most = findings.selection, np.inf if left.most >= DOUBTFUL else EXTRAPOLATED
     for place, candidate in enumerate(selection.chosen):
         by = homogeneity_test(selection.problem, selection.fit, selection.chosen, place)
-        wide = {name: scatter for name, scatter in by.items() if scatter > MOST_SPREAD}
+        wide = {name: scatter for name, scatter in by.items() if MOST_SPREAD < scatter <= most}
         if wide:
             most = max(wide, key=lambda name: wide[name])
             return Reason("scatters", wide[most], MOST_SPREAD, of=candidate.name, by=most)

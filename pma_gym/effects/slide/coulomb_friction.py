@@ -112,6 +112,7 @@ COULOMB_FRICTION = Effect(
     port="slide_force",
     parameters=CoulombFriction,
     held=("presliding",),
+    ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,
     path_breakpoint=friction_bend,

@@ -74,12 +74,12 @@ def test_without_timing_the_first_voltage_passes_the_dead_zone_at_once(plant):
 def test_the_memory_of_the_ideal_motion_saturates_at_the_hysteresis(plant):
     own, parameters = open_loop(plant, "displacement"), plant.model.parameters["hysteresis"]
     nodes, force = own._memories["hysteresis"]
-    # Bouc-Wen on one way out: z = exp(-way / distance) - 1 of the contraction.
-    way = 5e-3 * nodes
-    expected = hysteresis_force(np.expm1(-way / parameters.distance), parameters)
+    # Bouc-Wen on one way out, from the branch of filling: z - z0 = (1 + z0) (exp(-way / d) - 1).
+    way, whole = 5e-3 * nodes, 1.0 + parameters.memory_at_start
+    expected = hysteresis_force(whole * np.expm1(-way / parameters.distance), parameters)
     moving = (nodes > 0.01) & (nodes < 5.0)
     assert force[moving] == pytest.approx(expected[moving], abs=0.02 * parameters.force)
-    assert force[2400] == pytest.approx(parameters.force, rel=1e-3)
+    assert force[2400] == pytest.approx(whole * parameters.force, rel=1e-3)
 
 
 def test_what_is_left_out_of_a_station_is_neutral():
@@ -104,7 +104,7 @@ def test_the_unrounded_fit_rounds_to_table_18():
 
 
 def test_the_stations_curve_is_where_it_settles(plant):
-    statics = Statics(Plant(without(plant.model, "hysteresis", "dry friction")), 300e3)
+    statics = Statics(plant, 300e3)
     for volts in (1.0, 4.0):
         rest = plant.settle(volts, pressure=300e3)
         truth = plant.observe(rest.state[None, :], rest.zero_contraction)
@@ -127,7 +127,7 @@ def test_it_begins_with_the_replay_on_the_station(budgets):
     assert budgets["displacement"].printed["all"] == pytest.approx(1e3 * rmse(error), rel=1e-3)
 
 
-@pytest.mark.parametrize(("task", "near"), [("displacement", 0.01), ("rotation", 0.3)])
+@pytest.mark.parametrize(("task", "near"), [("displacement", 0.02), ("rotation", 0.4)])
 def test_it_ends_near_the_improved_feedforward(budgets, task, near):
     budget = budgets[task]
     for phase in budget.phases:

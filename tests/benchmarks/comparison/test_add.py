@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.comparison.scores import print_clipping
 from benchmarks.runner.case import Case, run_case
-from benchmarks.runner.controller_spec import Contender, ControllerError
+from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.journal import Journal
 from benchmarks.runner.rollout import rollout
 from benchmarks.runner.user_controller import Guarded, LateError
@@ -52,11 +52,11 @@ class Mine:
 def own(folder, body):
     path = folder / "mine.py"
     path.write_text(MINE.format(body=body))
-    return Contender("Mine", path=str(path))
+    return ControllerSpec("Mine", path=str(path))
 
 
-def guarded(contender):
-    return run_case(Case("nominal", contender, Episode(NOMINAL, "displacement", 300, 0)))
+def guarded(spec):
+    return run_case(Case("nominal", spec, Episode(NOMINAL, "displacement", 300, 0)))
 
 
 @pytest.mark.parametrize(
@@ -91,12 +91,12 @@ def test_one_late_answer_is_forgiven(tmp_path):
 
 
 def test_a_guard_lets_everything_through(tmp_path):
-    contender = own(tmp_path, "pass")
+    spec = own(tmp_path, "pass")
     environment = PMAEnv("displacement", pressure_kpa=300)
-    watched = rollout(environment, Guarded(contender, 0.01), seed=3)
-    free = rollout(environment, contender.make(), seed=3)
+    watched = rollout(environment, Guarded(spec, 0.01), seed=3)
+    free = rollout(environment, spec.make(), seed=3)
     assert np.array_equal(watched.position, free.position)
-    controller = Guarded(contender, 0.01)
+    controller = Guarded(spec, 0.01)
     assert controller.name == "My own"
     assert not hasattr(controller, "repetitions")
 
@@ -110,8 +110,8 @@ def test_it_stands_beside_the_others(tmp_path):
     (tmp_path / "small.toml").write_text(SUITE)
     out = str(tmp_path / "results" / "small")
     assert invoke(tmp_path, "run", "--out", out).exit_code == 0
-    contender = own(tmp_path, "pass")
-    add = ("add", contender.source, "--results", str(tmp_path / "results"))
+    spec = own(tmp_path, "pass")
+    add = ("add", spec.source, "--results", str(tmp_path / "results"))
     done = invoke(tmp_path, *add)
     assert done.exit_code == 0, done.output
     assert "small version 1: 6 cases of My own, 0 of them done before" in done.stdout
@@ -122,8 +122,8 @@ def test_it_stands_beside_the_others(tmp_path):
 
 def test_after_three_failures_the_rest_is_left(tmp_path):
     (tmp_path / "small.toml").write_text(SUITE)
-    contender = own(tmp_path, "return 1 / 0")
-    done = invoke(tmp_path, "add", contender.source, "--results", str(tmp_path / "results"))
+    spec = own(tmp_path, "return 1 / 0")
+    done = invoke(tmp_path, "add", spec.source, "--results", str(tmp_path / "results"))
     assert done.exit_code == 1
     assert "3 cases failed: the other 3 are not run" in done.stdout
     assert "and 2 more: act raised ZeroDivisionError: division by zero (line 9" in done.stdout
@@ -168,7 +168,7 @@ class Spy:
 def test_a_controller_from_a_file_finds_no_environment_and_its_clipping_is_counted(tmp_path):
     path = tmp_path / "spy.py"
     path.write_text(SPY)
-    row = guarded(Contender("Spy", path=str(path)))
+    row = guarded(ControllerSpec("Spy", path=str(path)))
     kinds = json.loads(path.with_suffix(".json").read_text())
     assert "StationInfo" in kinds and not {"PMAEnv", "PMAVectorEnv", "Engine"} & set(kinds)
     assert row["clipped_share"] == pytest.approx(150 / 501) and row["clipped_v"] == 1.0
@@ -195,7 +195,7 @@ def test_a_file_that_raises_before_any_trial_names_its_line(text, message, tmp_p
     (tmp_path / "deep.py").write_text("def fail():\n    raise OSError('no')\n")
     (tmp_path / "mine.py").write_text(text)
     with pytest.raises(ControllerError, match=message):
-        Contender("Mine", path=str(tmp_path / "mine.py")).make()
+        ControllerSpec("Mine", path=str(tmp_path / "mine.py")).make()
 
 
 def test_a_controller_is_taken_out_of_a_journal_and_the_others_keep_their_bytes(tmp_path):

@@ -22,7 +22,7 @@ from benchmarks.executors.executor import ThisProcess
 from benchmarks.executors.failures import ProcessDied
 from benchmarks.runner import fingerprint, provenance
 from benchmarks.runner.case import cases, failed_row
-from benchmarks.runner.execution import execute, plan
+from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.runner.journal import JOURNAL, Journal, read_rows
 from benchmarks.runner.provenance import finished_rows, read_run
 from benchmarks.suites.frozen import frozen_suite
@@ -156,14 +156,14 @@ def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeyp
     mine, out = own(tmp_path, "Mine"), tmp_path / "out"
     assert run(suite, f"pid,{mine}", out)[0] == 0
     entries = chosen(suite, f"pid,{mine}")
-    assert not plan(suite, entries, out).missing
+    assert not pending_cases(suite, entries, out).missing
     (tmp_path / "Mine.py").write_text(MINE.format(name="Mine", sleep=0.0) + "# another\n")
-    changed = plan(suite, entries, out)
-    assert {case.contender.name for case in changed.missing} == {"Mine"}
+    changed = pending_cases(suite, entries, out)
+    assert {case.spec.name for case in changed.missing} == {"Mine"}
     assert (len(changed.known), changed.outdated) == (6, 6)
     for module in (fingerprint, provenance):
         monkeypatch.setattr(module, "code_digest", lambda: "another")
-    assert len(plan(suite, entries, out).missing) == 12
+    assert len(pending_cases(suite, entries, out).missing) == 12
     _, words = run(suite, "pid", out)
     assert "6 rows there were made with other code" in words
     # What was made with other code is not compared with what is made now.
@@ -216,13 +216,13 @@ def test_what_fails_is_a_row_with_its_reason(suite, tmp_path):
 
 def test_a_case_whose_process_died_is_run_again(suite, tmp_path):
     entries = chosen(suite, "pid")
-    todo = plan(suite, entries, tmp_path)
+    todo = pending_cases(suite, entries, tmp_path)
     with Journal(tmp_path / JOURNAL) as journal:
         for case in todo.cases[:2]:
             row = failed_row(case, ProcessDied(-9, again=True))
             journal.append(row | {"key": todo.keys["pid"]})
         journal.append(failed_row(todo.cases[2], ValueError("no")) | {"key": todo.keys["pid"]})
-    assert len(plan(suite, entries, tmp_path).missing) == 5
+    assert len(pending_cases(suite, entries, tmp_path).missing) == 5
 
 
 def test_a_line_that_was_changed_is_no_row(tmp_path, capsys):
@@ -259,12 +259,15 @@ def test_a_full_disk_ends_the_run_with_what_is_there(suite, tmp_path, monkeypatc
     monkeypatch.setattr(os, "write", lambda file, line: len(line) // 2)
     with pytest.raises(OSError, match="bytes of a row could be written"):
         execute(
-            plan(suite, chosen(suite, "pid"), tmp_path), ThisProcess(), tmp_path, lambda row: None
+            pending_cases(suite, chosen(suite, "pid"), tmp_path),
+            ThisProcess(),
+            tmp_path,
+            lambda row: None,
         )
 
 
 def test_all_means_the_controllers_of_the_suite(suite):
-    assert [entry.contender.title for entry in chosen(suite, "all")] == ["PID"]
+    assert [entry.spec.title for entry in chosen(suite, "all")] == ["PID"]
     assert len(cases(suite, suite.entries)) == 6
 
 

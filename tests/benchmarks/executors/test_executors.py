@@ -17,7 +17,7 @@ from benchmarks.executors.executor import ThisProcess, run_all, run_or_raise
 from benchmarks.executors.failures import ProcessDied, TookTooLong
 from benchmarks.executors.local import LocalProcesses
 from benchmarks.reproduction.execution import execute
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.reproduction import load_suite
 from tests.benchmarks.executors.pieces import (
     awkward,
@@ -101,9 +101,9 @@ def test_what_cannot_travel_costs_its_own_piece_alone():
 def test_a_case_whose_process_dies_fails_alone(tmp_path):
     path = tmp_path / "deadly.py"
     path.write_text(DEADLY)
-    contender = Contender("Deadly", path=str(path))
+    spec = ControllerSpec("Deadly", path=str(path))
     pressures = (200, 250, 300, 350, 400)
-    suite = load_suite().select(["serres2008"], [contender], ["displacement"], pressures)
+    suite = load_suite().select(["serres2008"], [spec], ["displacement"], pressures)
     done = execute(suite, local(2))
     assert done.complete
     failures = {o.score.case.pressure_kpa: o.score.failure for o in done.outcomes}

@@ -271,7 +271,7 @@ def test_the_ideal_test_is_that_of_neyman_and_pearson():
     nothing, there = g.standard_normal(n), g.standard_normal(n) + distance
     gate = np.quantile(nothing, 1.0 - bound.ALARM)
     assert bound.detected(distance) == pytest.approx(np.mean(there > gate), abs=0.02)
-    assert bound.told(distance) == pytest.approx(np.mean(there > 0.5 * distance), abs=0.005)
+    assert bound.identified(distance) == pytest.approx(np.mean(there > 0.5 * distance), abs=0.005)
 
 
 def test_curves_scale_with_the_size():

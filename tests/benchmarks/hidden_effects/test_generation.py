@@ -194,8 +194,8 @@ def test_the_simulation_imports_nothing_of_the_package():
 def drawn(tmp_path_factory):
     """Three tiny cases, the second of which a kill interrupted."""
     folder = tmp_path_factory.mktemp("drawn")
-    plan = drawing.Plan(3, ("single", "nothing"), ("drive_dead_zone",), **TINY)
-    drawing.draw(plan, 1, folder, 1)
+    case_set = drawing.CaseSet(3, ("single", "nothing"), ("drive_dead_zone",), **TINY)
+    drawing.draw(case_set, 1, folder, 1)
     written, real = [], files._csv
 
     def killed(case, i):
@@ -207,14 +207,14 @@ def drawn(tmp_path_factory):
     files._csv = killed
     try:
         with pytest.raises(KeyboardInterrupt):
-            drawing.draw(plan, 2, folder, 1)
+            drawing.draw(case_set, 2, folder, 1)
     finally:
         files._csv = real
     assert not files.is_written(folder, 2)
     kept = (folder / "cases" / "case_0001").stat().st_mtime_ns
-    drawing.draw(plan, 3, folder, 1)
+    drawing.draw(case_set, 3, folder, 1)
     assert (folder / "cases" / "case_0001").stat().st_mtime_ns == kept
-    return folder, plan
+    return folder, case_set
 
 
 def test_goes_on_after_a_kill(drawn):
@@ -227,8 +227,8 @@ def test_goes_on_after_a_kill(drawn):
 
 
 def test_the_same_seed_gives_the_same_bits(drawn, tmp_path):
-    folder, plan = drawn
-    drawing.draw(plan, 2, tmp_path, 1)
+    folder, case_set = drawn
+    drawing.draw(case_set, 2, tmp_path, 1)
     for path in (tmp_path / "cases").rglob("*.*"):
         assert path.read_bytes() == (folder / path.relative_to(tmp_path)).read_bytes()
 

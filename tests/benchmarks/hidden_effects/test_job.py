@@ -112,7 +112,7 @@ def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, 
     found = run_block(order(tmp_path, count=1))
     assert found is not None and found["code"] == {"older": 1}
     assert "1 of them by other code" in capsys.readouterr().err
-    found = run_block(order(tmp_path, count=1, again=True))
+    found = run_block(order(tmp_path, count=1, recompute=True))
     assert found is not None and found["code"] == {"newer": 1}
 
 

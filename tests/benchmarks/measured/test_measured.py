@@ -152,14 +152,14 @@ def asked(monkeypatch):
     return models
 
 
-def diagnose_small(folder, code="this", again=False):
+def diagnose_small(folder, code="this", recompute=False):
     """Rounds of a few trials, by some code; and what it took."""
 
     def silent(*_):
         """No progress."""
 
     data = measured_dataset((150.0,), (75.0,), steps=0)
-    stages = Stages(folder, again, code)
+    stages = Stages(folder, recompute, code)
     told = stages.others()
     return *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent), stages, told
 
@@ -181,12 +181,13 @@ def test_rounds_of_other_code_are_told_and_used_unless_made_anew(tmp_path, asked
     *_, stages, told = diagnose_small(tmp_path, "newer")
     assert len(asked) == 2 and stages.codes == {"older": 2}
     assert told == (
-        f"2 of 2 stages kept in {tmp_path} are by other code than this (--again makes those anew)"
+        f"2 of 2 stages kept in {tmp_path} are by other code than this "
+        "(--recompute makes those anew)"
     )
-    *_, stages, told = diagnose_small(tmp_path, "newer", again=True)
+    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
     assert len(asked) == 4 and stages.codes == {"newer": 2} and not told
-    *_, stages, told = diagnose_small(tmp_path, "newer", again=True)
-    assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --again goes on"
+    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
+    assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --recompute goes on"
 
 
 def test_a_stage_answers_its_own_question_and_has_what_it_needs(tmp_path):
@@ -230,11 +231,12 @@ def test_fits_of_other_code_do_not_go_into_a_diagnosis(tmp_path):
 
 def test_the_command_says_what_is_to_be_made_anew(tmp_path, monkeypatch):
     orders = []
-    monkeypatch.setattr(job, "run_measured", lambda *_, again: orders.append(again))
-    for options in ([], ["--again"]):
+    monkeypatch.setattr(job, "run_measured", lambda *_, recompute: orders.append(recompute))
+    for options in ([], ["--recompute"], ["--again"]):
         done = CliRunner().invoke(app, ["measured", "--out", str(tmp_path), *options])
         assert done.exit_code == 0, done.output
-    assert orders == [False, True]
+        assert ("warning: --again is now --recompute" in done.stderr) == ("--again" in options)
+    assert orders == [False, True, True]
 
 
 def test_a_worked_muscle_has_no_warmth_left():

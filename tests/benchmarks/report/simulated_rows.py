@@ -18,7 +18,7 @@ LEVELS = {
 
 def simulated_suite(stations=16, controllers=tuple(LEVELS), targets=(), delay=0.0, tasks=()):
     """A small suite of drawn stations."""
-    deals = [
+    episode_plans = [
         {"tasks": ["displacement"], "pressures_kpa": [150, 350, 550], "per_station": 2},
         {"tasks": ["rotation"], "pressures_kpa": [275, 400, 575], "per_station": 2},
         *({"tasks": [task], "pressures_kpa": [300], "per_station": 1} for task in tasks),
@@ -46,7 +46,7 @@ def simulated_suite(stations=16, controllers=tuple(LEVELS), targets=(), delay=0.
                 "reach_v": 9.5,
                 "trials": {},
             },
-            "episodes": deals,
+            "episodes": episode_plans,
             "controllers": [{"name": name, "title": name.upper()} for name in controllers],
             "targets": list(targets),
         },
@@ -86,7 +86,7 @@ def simulated_row(suite, name, episode, percent, failure=""):
 def simulated_rows(suite, seed=0, levels=LEVELS):
     """A row for every case: a station's own difficulty times a controller's level and luck."""
     generator = np.random.default_rng(seed)
-    names = [entry.contender.name for entry in suite.entries]
+    names = [entry.spec.name for entry in suite.entries]
     hard = {station: np.exp(0.4 * generator.normal()) for station in suite.stations}
     return [
         simulated_row(

@@ -138,9 +138,9 @@ def test_missing_and_incomplete_controllers_are_named_and_not_ranked():
     half = [row for row in rows if row["controller"] == "pid"][::2]
     kept = [row for row in rows if row["controller"] != "pid"] + half
     found = board(suite, kept)
-    assert [entry.contender.name for entry in found.missing] == ["mpc"]
+    assert [entry.spec.name for entry in found.missing] == ["mpc"]
     ((entry, done, wanted),) = found.incomplete
-    assert (entry.contender.name, done, wanted) == ("pid", len(half), len(suite.episodes))
+    assert (entry.spec.name, done, wanted) == ("pid", len(half), len(suite.episodes))
     names = found.standings["displacement"].errors.names
     assert names == ("oracle", "feedforward_pid", "improved_feedforward")
     text = to_markdown(page_blocks(found), {}, "plots")

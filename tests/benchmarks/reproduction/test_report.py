@@ -16,7 +16,7 @@ from benchmarks.reproduction.replay import ReplayError
 from benchmarks.reproduction.replay_page import displacement_verdict
 from benchmarks.reproduction.results import CSV_COLUMNS, FIGURES, Results
 from benchmarks.reproduction.tables import columns
-from benchmarks.runner.controller_spec import Contender, parse_contenders
+from benchmarks.runner.controller_spec import ControllerSpec, parse_controllers
 from benchmarks.runner.environment_info import git_state
 from benchmarks.suites.reproduction import load_suite
 from pma_gym.pages.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
@@ -42,7 +42,7 @@ def run(tmp_path_factory):
     path = folder / "half.py"
     path.write_text(CONTROLLER)
     suite = load_suite()
-    controllers = [suite.controllers[0], Contender("Half", path=str(path))]
+    controllers = [suite.controllers[0], ControllerSpec("Half", path=str(path))]
     suite = suite.select(["serres2008"], controllers, ["displacement"], [350, 550])
     with (folder / "terminal.txt").open("w") as terminal:
         code = run_job(suite, folder / "out", ThisProcess(), Console(file=terminal, width=120))
@@ -72,7 +72,7 @@ def test_a_failed_case_is_told_and_costs_the_exit_code(run, rows):
 def test_columns_are_headed_by_the_controllers_own_names(tmp_path):
     path = tmp_path / "half.py"
     path.write_text(CONTROLLER)
-    (half,) = parse_contenders(f"{path}:Half")
+    (half,) = parse_controllers(f"{path}:Half")
     suite = load_suite().select(["serres2008"], [half], ["displacement"], [350])
     results = Results(suite, Execution((), {}, True), {})
     assert list(columns(results, "serres2008", "displacement", "displacement")) == [

@@ -14,7 +14,7 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess, run_all
 from benchmarks.reproduction.execution import execute
 from benchmarks.reproduction.results import Results, csv_text
-from benchmarks.runner.controller_spec import Contender, ControllerError
+from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.reproduction import load_suite
 from pma_gym.plant.model import load_model
@@ -47,11 +47,11 @@ def controller_file(folder, body):
         "        self.pressure = round(station.pressure / 1e3)\n"
         f"    def act(self, observation, now):\n        {body}\n"
     )
-    return Contender("Written", path=str(path))
+    return ControllerSpec("Written", path=str(path))
 
 
-def small_suite(contender, pressures=(300, 350)):
-    return load_suite().select([MODEL], [contender], ["displacement"], pressures)
+def small_suite(spec, pressures=(300, 350)):
+    return load_suite().select([MODEL], [spec], ["displacement"], pressures)
 
 
 def test_the_truth_is_the_plant_under_the_same_voltage():
@@ -116,8 +116,8 @@ def test_an_array_of_one_volt_is_a_voltage():
 
 
 def test_any_number_of_processes_gives_the_same_bits(tmp_path):
-    contender = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
-    suite = small_suite(contender)
+    spec = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
+    suite = small_suite(spec)
     one, two = (execute(suite, local(jobs)) for jobs in (1, 2))
     assert one.complete and two.complete
     texts = [csv_text(Results(suite, run, {}).scores) for run in (one, two)]
@@ -134,7 +134,7 @@ def test_a_case_that_fails_loses_only_itself(tmp_path):
 
 
 def test_a_limit_of_the_rig_is_the_failure_of_its_case():
-    suite = small_suite(Contender("Full", path=__file__), (150,))
+    suite = small_suite(ControllerSpec("Full", path=__file__), (150,))
     (outcome,) = execute(suite, ThisProcess()).outcomes
     assert "by a physical limit: muscle stretched over 12 mm" in outcome.score.failure
 
@@ -163,11 +163,9 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     out.mkdir()
     (out / "scores.csv").write_text("earlier\n")
     body = f"self.pressure < 300 or open({str(marker)!r}, 'w').close(); return 1.0"
-    contender = controller_file(
-        tmp_path, body.replace("; ", "\n        time.sleep(0.002)\n        ")
-    )
+    spec = controller_file(tmp_path, body.replace("; ", "\n        time.sleep(0.002)\n        "))
     command = [sys.executable, "-m", "benchmarks", "--out", str(out), "--model", MODEL]
-    command += ["--controllers", contender.source, "--task", "displacement"]
+    command += ["--controllers", spec.source, "--task", "displacement"]
     with subprocess.Popen(
         command,
         cwd=ROOT,

@@ -4,7 +4,7 @@ import gymnasium as gym
 import pytest
 
 from benchmarks.speed.core import CHAINS, OPERATIONS, REPEATS, core, counted
-from benchmarks.speed.report.tables import views
+from benchmarks.speed.report.tables import speed_tables
 from benchmarks.speed.rows import CORE, EVALUATIONS
 from pma_gym.codegen.graph import CHANGING
 from pma_gym.codegen.machine.native import simd_lanes
@@ -67,13 +67,13 @@ def test_the_longest_time_of_the_three_is_the_limit():
         row("core/multiply_add", 4e10, {"in_attempt": 700, "flops": 1000}),
         row("core/divide", 2e9, {"in_attempt": 10, "flops": 1000}),
     ]
-    (view,) = (v for v in views({"rows": rows, "ratios": []}) if v.name == "arithmetic")
-    times = [cells[4] for cells in view.rows]
+    (table,) = (v for v in speed_tables({"rows": rows, "ratios": []}) if v.name == "arithmetic")
+    times = [cells[4] for cells in table.rows]
     assert times == ["350 ns", "100 ns", "1000 ns"]
-    assert view.rows[-1][-1] == "35 % of the limit"
-    assert view.rows[-1][1:4] == ["1000", "20.0 k", "20.0 G"]
+    assert table.rows[-1][-1] == "35 % of the limit"
+    assert table.rows[-1][1:4] == ["1000", "20.0 k", "20.0 G"]
 
 
 def test_there_is_no_such_table_without_the_batch():
     rows = [row("core/divide", 2e9, {"in_attempt": 10, "flops": 1000})]
-    assert all(view.name != "arithmetic" for view in views({"rows": rows, "ratios": []}))
+    assert all(table.name != "arithmetic" for table in speed_tables({"rows": rows, "ratios": []}))

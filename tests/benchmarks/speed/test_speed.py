@@ -16,8 +16,8 @@ from typer.testing import CliRunner
 import benchmarks.__main__
 from benchmarks.speed import measure, page, run
 from benchmarks.speed.loops import Missing
-from benchmarks.speed.measure import Measurement, Plan
-from benchmarks.speed.report.tables import views
+from benchmarks.speed.measure import Measurement, Repetition
+from benchmarks.speed.report.tables import speed_tables
 from benchmarks.speed.rows import Row, all_rows, select
 
 ROOT = Path(__file__).parents[3]
@@ -57,7 +57,7 @@ def test_every_round_measures_every_row_once_in_another_order():
     orders = []
     for _ in range(2):
         made = CpuDevice({row.key: 1.0 for row in rows})
-        measurement = Measurement(rows, Plan(3, 0.0), lambda peer, made=made: made)
+        measurement = Measurement(rows, Repetition(3, 0.0), lambda peer, made=made: made)
         done = []
         measurement.run(done.append)
         rounds = [tuple(made.calls[i : i + 6]) for i in (0, 6, 12)]
@@ -73,7 +73,7 @@ def test_rows_that_belong_together_are_measured_one_after_the_other():
     keys = [row.key for row in rows]
     groups = [keys[1:3], keys[4:7]]
     made = CpuDevice(dict.fromkeys(keys, 1.0))
-    Measurement(rows, Plan(20, 0.0), lambda peer: made, groups).run()
+    Measurement(rows, Repetition(20, 0.0), lambda peer: made, groups).run()
     rounds = [made.calls[i : i + 8] for i in range(0, 160, 8)]
     found = set()
     for calls in rounds:
@@ -96,7 +96,7 @@ def test_single_environments_are_measured_in_a_new_process_each_round():
         return workers[-1]
 
     rows = [row for row in all_rows() if row.key in keys]
-    measurement = Measurement(rows, Plan(3, 0.0), client)
+    measurement = Measurement(rows, Repetition(3, 0.0), client)
     measurement.run()
     assert measurement.complete
     by_keys = {tuple(set(worker.calls)): worker.ended for worker in workers}
@@ -106,10 +106,10 @@ def test_single_environments_are_measured_in_a_new_process_each_round():
 def test_missing_peers_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.speed.peers.FOLDER", tmp_path)
     rows = select("single/pcgym,plant/dompc,batch/gymnax_CartPole", all_rows())
-    measurement = Measurement(rows, Plan(1, 0.0), lambda peer: None)
+    measurement = Measurement(rows, Repetition(1, 0.0), lambda peer: None)
     measurement.run()
     found = run.document(measurement, [], {"git": {}}, 0.0)
-    (absent,) = (view for view in views(found) if view.name == "absent")
+    (absent,) = (table for table in speed_tables(found) if table.name == "absent")
     what, why = zip(*absent.rows, strict=True)
     assert set(why) == {"not installed; `make peers` installs it"}
     assert "PC-gym reactor" in what and "do-mpc simulator (CVODES)" in what

@@ -9,7 +9,7 @@ import typer
 from benchmarks.speed import client, install, starts
 from benchmarks.speed.client import Client, StartError, WorkerError
 from benchmarks.speed.loops import Missing, single, vector
-from benchmarks.speed.measure import Measurement, Plan
+from benchmarks.speed.measure import Measurement, Repetition
 from benchmarks.speed.peers import PEERS
 from benchmarks.speed.rows import Row
 from benchmarks.speed.workers import serve_own
@@ -111,7 +111,7 @@ def test_a_worker_that_cannot_load_takes_only_its_own_rows(fake):
     rows = [Row(f"single/{name}", name, "classic", "counts", {"by": 1}) for name in "ab"]
     rows.append(Row("single/c", "c", "own", "counts", {"by": 1}))
     clients = {"classic": made, "own": fake}
-    measurement = Measurement(rows, Plan(2, 0.0), lambda peer: clients[peer.name])
+    measurement = Measurement(rows, Repetition(2, 0.0), lambda peer: clients[peer.name])
     measurement.run()
     one, other, fine = measurement.rows.values()
     assert one.broke and other.broke

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from benchmarks.runner.case import Case, cases, run_case
-from benchmarks.runner.controller_spec import Contender
+from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.feasibility import inability
-from benchmarks.suites.frozen import NOMINAL, Deal, Episode, frozen_suite, suite_names
+from benchmarks.suites.frozen import NOMINAL, Episode, EpisodePlan, frozen_suite, suite_names
 from benchmarks.suites.reproduction import SuiteError
 from benchmarks.suites.stations import draw_station
 from controllers import CONTROLLERS
@@ -92,15 +92,15 @@ def test_every_case_is_there_once_and_every_trial_as_often_as_the_others(name):
 
 @pytest.mark.parametrize("name", suite_names())
 def test_every_controller_of_a_suite_is_there(name):
-    assert {entry.contender.name for entry in frozen_suite(name).entries} <= set(CONTROLLERS)
+    assert {entry.spec.name for entry in frozen_suite(name).entries} <= set(CONTROLLERS)
 
 
 def test_dealing_spreads_what_a_station_gets():
-    deal = Deal(("rotation",), (275, 300, 350, 400, 450, 500, 550, 575), per_station=2)
-    assert [pressure for _, pressure in deal.trials(0)] == [275, 450]
-    dealt = Counter(trial for number in range(8) for trial in deal.trials(number))
+    plan = EpisodePlan(("rotation",), (275, 300, 350, 400, 450, 500, 550, 575), per_station=2)
+    assert [pressure for _, pressure in plan.trials(0)] == [275, 450]
+    dealt = Counter(trial for number in range(8) for trial in plan.trials(number))
     assert set(dealt.values()) == {2}
-    assert len(Deal(("rotation",), (275, 300)).trials(5)) == 2
+    assert len(EpisodePlan(("rotation",), (275, 300)).trials(5)) == 2
 
 
 def test_who_cannot_do_a_task_is_left_out_by_rule():
@@ -111,14 +111,14 @@ def test_who_cannot_do_a_task_is_left_out_by_rule():
 
 @pytest.mark.parametrize("name", ["ppo", "ppo_ilc"])
 def test_figures_of_a_shipped_policy_depend_on_its_files(name):
-    files = {path.name for path in Contender(name).files}
+    files = {path.name for path in ControllerSpec(name).files}
     assert {"displacement-100hz-ppo.json", "displacement-100hz-ppo.safetensors"} <= files
-    assert not any("tqc" in file for file in files) and not Contender("pid").files
+    assert not any("tqc" in file for file in files) and not ControllerSpec("pid").files
 
 
 def test_a_controller_that_can_do_none_of_a_suites_tasks_is_refused():
     with pytest.raises(SuiteError, match="ppo_ilc does displacement, rotation alone, and suite ex"):
-        frozen_suite("exercise").entry(Contender("ppo_ilc"))
+        frozen_suite("exercise").entry(ControllerSpec("ppo_ilc"))
 
 
 def test_hard_has_the_stations_of_robust():
@@ -177,9 +177,9 @@ def test_a_station_that_cannot_do_the_tasks_is_told_why():
 def test_controllers_are_told_the_nominal_model_whatever_the_station(tmp_path):
     path = tmp_path / "spy.py"
     path.write_text(SPY)
-    contender = Contender("Spy", path=str(path))
+    spec = ControllerSpec("Spy", path=str(path))
     rows = [
-        run_case(Case("robust", contender, Episode(number, "displacement", 300, 0)))
+        run_case(Case("robust", spec, Episode(number, "displacement", 300, 0)))
         for number in (NOMINAL, 1)
     ]
     assert rows[0]["failure"] == rows[1]["failure"] == ""
@@ -188,7 +188,7 @@ def test_controllers_are_told_the_nominal_model_whatever_the_station(tmp_path):
 
 def test_all_controllers_meet_the_same_noise():
     suite = frozen_suite("robust")
-    rows = [run_case(Case("robust", Contender(n), suite.episodes[0])) for n in ("pid", "pid")]
+    rows = [run_case(Case("robust", ControllerSpec(n), suite.episodes[0])) for n in ("pid", "pid")]
     assert rows[0]["seed"] == rows[1]["seed"] == suite.seed_of(suite.episodes[0])
     assert rows[0]["phases"] == rows[1]["phases"]
 
@@ -207,14 +207,14 @@ def test_all_controllers_meet_the_same_noise():
 def test_a_suite_that_cannot_be_read_says_why(name, message, tmp_path):
     head = 'schema = 2\nname = "x"\ntitle = "x"\nversion = 1\nseed = 1\nmodel = "station"\n'
     head += "controllers = []\n[environment]\ncontrol_rate_hz = 100.0\n"
-    deal = '[[episodes]]\ntasks = ["{0}"]\npressures_kpa = [300]\n'
-    drawn = deal.format("displacement") + (
+    plan = '[[episodes]]\ntasks = ["{0}"]\npressures_kpa = [300]\n'
+    drawn = plan.format("displacement") + (
         "[stations]\ncount = 1\nseed = 1\ntraining_seed = 2\nwidening = 1.0\nvariation = 0.1\n"
         "reach_v = 9.0\ntrials = {}\n[[stations.effects]]\nshare = 0.5\n"
     )
     for file, text in {
         "broken": "schema = = 2",
-        "unknown": head + deal.format("juggling"),
+        "unknown": head + plan.format("juggling"),
         "effect": head + drawn + 'name = "sarosi"\nranges = {}\n',
         "range": head + drawn + 'name = "creep"\nranges = { stiffness_n_per_mm = [0.1, 1.0] }\n',
     }.items():

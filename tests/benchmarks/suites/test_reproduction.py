@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.runner.controller_spec import Contender, ControllerError, parse_contenders
+from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, parse_controllers
 from benchmarks.suites.reproduction import Case, SuiteError, load_suite
 from pma_gym.data.serres2008 import pressures
 
@@ -72,8 +72,8 @@ def test_seeds_are_frozen_and_differ():
 
 def test_seeds_do_not_depend_on_folders_or_on_other_cases():
     suite = load_suite()
-    here = Case("model.toml", Contender("Mine", path="mine.py"), "rotation", 300)
-    there = Case("/far/model.toml", Contender("Mine", path="/far/mine.py"), "rotation", 300.0)
+    here = Case("model.toml", ControllerSpec("Mine", path="mine.py"), "rotation", 300)
+    there = Case("/far/model.toml", ControllerSpec("Mine", path="/far/mine.py"), "rotation", 300.0)
     assert suite.seed_of(here) == suite.seed_of(there)
     fewer = suite.select(tasks=["rotation"])
     for case in fewer.cases():
@@ -99,12 +99,14 @@ def test_a_selection_that_does_not_exist_is_refused():
     with pytest.raises(SuiteError, match="task must be displacement or rotation, got 'lift'"):
         suite.select(tasks=["lift"])
     with pytest.raises(SuiteError, match="two controllers are called Mine"):
-        suite.select(controllers=[Contender("Mine", path="a.py"), Contender("Mine", path="b.py")])
+        suite.select(
+            controllers=[ControllerSpec("Mine", path="a.py"), ControllerSpec("Mine", path="b.py")]
+        )
 
 
 def test_a_file_of_ones_own_is_scored_beside_the_shipped(mine):
     suite = load_suite()
-    replay, own = parse_contenders(f"serres_replay, {mine}:Mine", suite.controllers)
+    replay, own = parse_controllers(f"serres_replay, {mine}:Mine", suite.controllers)
     assert replay == suite.controllers[0]
     # Its column is headed by what it calls itself.
     assert (own.name, own.label, own.source) == ("Mine", "mine", f"{mine}:Mine")
@@ -117,7 +119,7 @@ def test_columns_that_would_have_one_name_are_told_apart(mine):
         "\n\nclass Nameless(Mine):\n    name = None\n"
     )
     text = ",".join(f"{mine}:{name}" for name in ("Mine", "Heir", "Bold", "Nameless"))
-    suite = load_suite().select(controllers=parse_contenders(text))
+    suite = load_suite().select(controllers=parse_controllers(text))
     labels = [controller.label for controller in suite.controllers]
     assert labels == ["mine (Mine)", "mine (Heir)", "Measured (Bold)", "Nameless"]
 
@@ -138,11 +140,11 @@ def test_columns_that_would_have_one_name_are_told_apart(mine):
 )
 def test_a_controller_that_does_not_fit_is_refused(mine, text, message):
     with pytest.raises(ControllerError, match=message):
-        parse_contenders(text.format(mine=mine))
+        parse_controllers(text.format(mine=mine))
 
 
 def test_a_file_that_cannot_be_imported_is_refused(tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("import nothing_of_that_name\n")
     with pytest.raises(ControllerError, match="cannot import .*ModuleNotFoundError"):
-        parse_contenders(f"{broken}:Mine")
+        parse_controllers(f"{broken}:Mine")

@@ -134,8 +134,8 @@ def test_drawn_stations_carry_the_leg_that_controllers_are_told_of():
     envs.reset(seed=1)
     models = envs.engine.models
     assert {model.name for model in models} == {"station-0", "station-1"}
-    told = envs.engine.told.parameters["leg"]
-    assert told.inertia > 0.0 and all(model.parameters["leg"] == told for model in models)
+    nominal = envs.engine.nominal.parameters["leg"]
+    assert nominal.inertia > 0.0 and all(model.parameters["leg"] == nominal for model in models)
     assert "operator" in models[0].parameters
     # One that is asked for neither has neither, as for the other tasks.
     plain = drawn(load_model("station"), np.random.default_rng(0))

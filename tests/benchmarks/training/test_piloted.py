@@ -34,8 +34,8 @@ CASES = {
 
 
 def batch(view, form, options, task="displacement", **more):
-    told = options.get("model", "station")
-    return PilotedVecEnv(COUNT, task, view, form, told, **more, **options)
+    nominal = options.get("model", "station")
+    return PilotedVecEnv(COUNT, task, view, form, nominal, **more, **options)
 
 
 def alone(view, form, options, name=DISPLACEMENT):

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.report.errors import Errors, measures
 from benchmarks.report.statistics import interquartile_mean
-from benchmarks.runner.controller_spec import ControllerError, parse_contenders
+from benchmarks.runner.controller_spec import ControllerError, parse_controllers
 from benchmarks.suites.frozen import Episode, frozen_suite
 from benchmarks.training.study.cells import CHANGES, cells
 from benchmarks.training.study.figures import reached
@@ -29,8 +29,8 @@ def station():
 def trained(station, seed=0, error=0.03):
     policy = drawn_policy(station)
     scores = {"validation": {"error": error, "unit": "mm", "broken": 0, "reward": -1.0}}
-    told = {"preset": "increment", "seed": seed, "scores": scores}
-    return replace(policy, training=dict(policy.training) | told)
+    training = {"preset": "increment", "seed": seed, "scores": scores}
+    return replace(policy, training=dict(policy.training) | training)
 
 
 def pool(values):
@@ -142,14 +142,14 @@ def test_of_several_algorithms_the_best_ships_and_replaces_the_other(station, tm
 def test_a_policy_file_and_a_folder_are_contenders(station, tmp_path):
     policy = trained(station)
     save_policy_file(policy, tmp_path / policy.name)
-    file, folder = parse_contenders(f"{tmp_path / policy.name}.json,{tmp_path}:ppo")
+    file, folder = parse_controllers(f"{tmp_path / policy.name}.json,{tmp_path}:ppo")
     suite = frozen_suite("robust")
-    for contender in (file, folder):
-        assert contender.make().name
-        only = suite.entry(contender).only
+    for spec in (file, folder):
+        assert spec.make().name
+        only = suite.entry(spec).only
         assert "displacement" in only and not any("rotation" in task for task in only)
     with pytest.raises(ControllerError, match="has no policy of 'sac'; it has displacement-100hz"):
-        parse_contenders(f"{tmp_path}:sac")
+        parse_controllers(f"{tmp_path}:sac")
 
 
 def test_a_contender_that_was_cut_off_is_refused(station, tmp_path):
@@ -158,7 +158,7 @@ def test_a_contender_that_was_cut_off_is_refused(station, tmp_path):
     weights = tmp_path / f"{policy.name}.safetensors"
     weights.write_bytes(weights.read_bytes()[:-100])
     with pytest.raises(ControllerError, match="was cut off, changed or mixed up"):
-        parse_contenders(f"{tmp_path / policy.name}.json")
+        parse_controllers(f"{tmp_path / policy.name}.json")
 
 
 def test_what_ships_is_small():

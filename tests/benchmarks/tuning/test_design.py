@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.tuning import design as designing
-from benchmarks.tuning.design import DesignError, Found, run_design, searches_of
+from benchmarks.tuning.design import DesignError, DesignResult, problems_of, run_design
 from controllers.design.designs import DESIGNS_FILE
 
 TABLES = {
@@ -25,9 +25,9 @@ def searched(monkeypatch):
     """Names of the searches that ran, none of which takes time."""
     names = []
 
-    def cheap(search):
-        names.append(search.name)
-        return Found({"controller_bandwidth": 9.0}, 0.5, 1.0, f"loop of {search.suite}")
+    def cheap(problem):
+        names.append(problem.name)
+        return DesignResult({"controller_bandwidth": 9.0}, 0.5, 1.0, f"loop of {problem.suite}")
 
     monkeypatch.setattr(designing, "design", cheap)
     return names
@@ -42,20 +42,22 @@ def shipped(tmp_path):
 
 
 def test_every_controller_with_settings_is_designed_for_every_loop():
-    found = searches_of(["lqg", "mpc", "lqg"], 0)
+    found = problems_of(["lqg", "mpc", "lqg"], 0)
     assert len(found) == 2 * len(TABLES)
-    assert {search.name for search in found} == {f"{c}/{t}" for c in ("lqg", "mpc") for t in TABLES}
+    assert {problem.name for problem in found} == {
+        f"{c}/{t}" for c in ("lqg", "mpc") for t in TABLES
+    }
 
 
 def test_what_the_file_has_is_left(searched, shipped, capsys):
-    assert run_design(["adrc"], shipped, 0, 1, again=False)
+    assert run_design(["adrc"], shipped, 0, 1, recompute=False)
     assert searched == []
-    assert "has 5 of 5 designs asked for; --again makes them anew" in capsys.readouterr().out
+    assert "has 5 of 5 designs asked for; --recompute makes them anew" in capsys.readouterr().out
     assert shipped.read_bytes() == DESIGNS_FILE.read_bytes()
 
 
 def test_single_designs_are_made_anew_and_no_other_changes(searched, shipped):
-    assert run_design(["adrc"], shipped, 7, 1, again=True, only="hard/rotation, pressure/*")
+    assert run_design(["adrc"], shipped, 7, 1, recompute=True, only="hard/rotation, pressure/*")
     assert searched == ["adrc/hard/rotation", "adrc/pressure/contraction"]
     before, after = (json.loads(path.read_text()) for path in (DESIGNS_FILE, shipped))
     changed = {k for k, v in after["provenance"].items() if v != before["provenance"].get(k)}
@@ -79,7 +81,7 @@ def test_single_designs_are_made_anew_and_no_other_changes(searched, shipped):
     ],
 )
 def test_slips_are_named_with_their_mend_and_nothing_runs(options, words, searched, shipped):
-    done = CliRunner().invoke(app, ["design", "--again", "--out", str(shipped), *options])
+    done = CliRunner().invoke(app, ["design", "--recompute", "--out", str(shipped), *options])
     assert done.exit_code == 2
     assert done.stdout == "" and searched == []
     assert done.stderr.startswith(f"error: {options[0][2:]} must ")
@@ -91,5 +93,5 @@ def test_a_broken_file_is_named(searched, tmp_path):
     broken = tmp_path / "designs.json"
     broken.write_text("{")
     with pytest.raises(DesignError, match=r"designs.json is no file of settings .*name another"):
-        run_design(["adrc"], broken, 0, 1, again=True)
+        run_design(["adrc"], broken, 0, 1, recompute=True)
     assert searched == []

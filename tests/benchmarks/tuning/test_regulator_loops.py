@@ -99,7 +99,7 @@ def test_regulator_takes_a_load_away():
 
 def test_report_of_suite_pressure_has_every_loop_at_low_middle_and_high_pressure():
     suite = frozen_suite("pressure")
-    two = tuple(e for e in suite.entries if e.contender.name in ("pid", "improved_feedforward"))
+    two = tuple(e for e in suite.entries if e.spec.name in ("pid", "improved_feedforward"))
     leaderboard = Leaderboard(Record.of(replace(suite, entries=two), []), {})
     found = leaderboard.loops
     pressures = {task: [each.pressure_kpa for each in row] for task, row in found.items()}

@@ -109,6 +109,8 @@ def test_regulator_has_two_lags(station):
     observer = ExtendedStateObserver(nominal_motion(task.protocol.at, given), 0.5)
     assert observer.order == 2
     regulator, muscle = observer.places[0].lags.constants
-    # tau_P 0.0554 s, its mean with venting 0.0586 s; B / K of the muscle about 0.05 s.
-    assert regulator == pytest.approx(0.0585, abs=0.002)
-    assert muscle == pytest.approx(0.046, abs=0.005)
+    # The regulator's lag and its mean with venting; B / K of the muscle about 0.05 s.
+    part = given.model.parameters
+    lag, vented = part["regulator_lag"].time_constant, part["regulator_asymmetry"].vent_ratio
+    assert regulator == pytest.approx(lag * 0.5 * (1.0 + vented), abs=0.003)
+    assert muscle == pytest.approx(0.05, abs=0.006)

@@ -104,11 +104,13 @@ def linear(sizes, sharpness, away):
         upper=np.full(2, np.inf),
     )
     none, one = np.zeros(1), np.ones(1, bool)
-    law = SimpleNamespace(paths=("law.size",), absent=none, amplitudes=one, fitted=one)
+    law = SimpleNamespace(
+        paths=("law.size",), fitted_paths=["law.size"], absent=none, amplitudes=one, fitted=one
+    )
     fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
-    return homogeneity_test(
-        SimpleNamespace(whitened_residuals=lambda *_: whitened), fit, (law,), 0
-    )["trial"]
+    return homogeneity_test(SimpleNamespace(whitened_at=lambda *_: whitened), fit, (law,), 0)[
+        "trial"
+    ]
 
 
 def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():

@@ -67,10 +67,10 @@ def test_broken_files_are_passed_over(trials, tmp_path, broken):
         path.write_bytes(broken)
     journal.keep("other", {"chi_square": 2.0})
     with pytest.warns(JournalWarning, match="broken holds a damaged fit .* computed anew") as said:
-        assert journal.found("fit") is None
-        assert journal.found("fit") is None
+        assert journal.entry("fit") is None
+        assert journal.entry("fit") is None
     assert len(said) == 1
-    assert journal.found("other") == {"chi_square": 2.0}
+    assert journal.entry("other") == {"chi_square": 2.0}
 
 
 def test_a_diagnosis_passes_over_broken_files(trials, written, tmp_path):
@@ -116,7 +116,7 @@ def test_entries_of_other_forms_are_computed_anew(trials, written, tmp_path):
 def test_another_question_finds_nothing(trials, tmp_path):
     Journal(tmp_path, trials, STATION, "seed 0").keep("fit", {"chi_square": 1.0})
     copies = [Trial(each.time, each.commands, each.measurements) for each in trials]
-    assert Journal(tmp_path, copies, STATION, "seed 0").found("fit") == {"chi_square": 1.0}
+    assert Journal(tmp_path, copies, STATION, "seed 0").entry("fit") == {"chi_square": 1.0}
     other = trials[0].measurements["load"].copy()
     other[7] = np.nextafter(other[7], np.inf)
     touched = Trial(trials[0].time, trials[0].commands, {**trials[0].measurements, "load": other})
@@ -127,7 +127,7 @@ def test_another_question_finds_nothing(trials, tmp_path):
         ([*trials[1:], trials[0]], STATION, "seed 0"),
         ([touched, *trials[1:]], STATION, "seed 0"),
     ):
-        assert Journal(tmp_path, asked, model, question).found("fit") is None
+        assert Journal(tmp_path, asked, model, question).entry("fit") is None
 
 
 def test_a_missing_reading_is_not_a_missing_signal(trials):
@@ -140,7 +140,7 @@ def test_a_missing_reading_is_not_a_missing_signal(trials):
 def test_no_folder_keeps_nothing(trials):
     journal = Journal(None, trials, STATION, "")
     journal.keep("fit", {"chi_square": 1.0})
-    assert journal.found("fit") is None
+    assert journal.entry("fit") is None
 
 
 def test_a_folder_is_made_when_something_is_kept(trials, tmp_path):
@@ -149,5 +149,5 @@ def test_a_folder_is_made_when_something_is_kept(trials, tmp_path):
     assert not folder.exists()
     journal.keep("fit", {"chi_square": 1.0})
     assert [path.suffix for path in folder.iterdir()] == [".json"]
-    assert journal.found("fit") == {"chi_square": 1.0}
-    assert journal.found("other") is None
+    assert journal.entry("fit") == {"chi_square": 1.0}
+    assert journal.entry("other") is None

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.assumed_range import FARTHEST
 from pma_gym.discovery.preparation.noise import Whitening, white_noise
-from pma_gym.discovery.preparation.whitened_residuals import FARTHEST, WhitenedResiduals
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from tests.discovery.laboratory import LEVELS, OFF, STATION, measured
 
 FREE = tuple(OFF)

@@ -388,6 +388,15 @@ def _given(path):
     return STATION.at_the_door(effect)[door]
 
 
+def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(same_size):
+    # A dead zone with a smooth edge: its size scatters with the pressure by 586 %, to first order.
+    same_size[0].update(pressure=5.86)
+    assert unknown.why_unknown(made_up(), ResidualFraction(0.004, 0.0), []) is None
+    left = ResidualFraction(2.0 * unknown.DOUBTFUL, 0.0)
+    reason = unknown.why_unknown(made_up(), left, [])
+    assert (reason.why, reason.by, reason.figure) == ("scatters", "pressure", 5.86)
+
+
 def test_old_names_of_the_answer_are_read_with_a_warning():
     diagnosis = diagnosed("hysteresis")
     with pytest.warns(DeprecationWarning, match=r"Diagnosis\.blind is now not_detectable") as said:

@@ -54,12 +54,12 @@ def _may_be(trial: Trial) -> bool:
     return float(np.nanmin(wished)) >= LEAST and bool(np.isfinite(contraction).any())
 
 
-def _misfit(found: Sequence[Pair], wanted: int) -> float:
+def _misfit(pairs: Sequence[Pair], wanted: int) -> float:
     """Rms of measured less simulated contraction (m), one zero for all trials."""
-    if len(found) < wanted:
+    if len(pairs) < wanted:
         return np.inf
     away = [
-        measured - simulated for _, simulated, measured in (p.signal("contraction") for p in found)
+        measured - simulated for _, simulated, measured in (p.signal("contraction") for p in pairs)
     ]
     joined = np.concatenate([each[:: max(1, each.size // 500)] for each in away])
     # A lab's zero of contraction is its own: one number for all trials.

@@ -68,15 +68,15 @@ def _refuse(proposals: Sequence[str], stop: bool, words: list[str]) -> None:
 
 def _without_copies(named: Sequence[NamedTrial], words: list[str]) -> list[NamedTrial]:
     """Trials less those with the content of another; a repeat of a copy is one of the original."""
-    found = copies([each.trial for each in named])
-    firsts = {named[copy].name: named[first].name for copy, first in found.items()}
+    copied = copies([each.trial for each in named])
+    firsts = {named[copy].name: named[first].name for copy, first in copied.items()}
     for first in dict.fromkeys(firsts.values()):
         same = [name for name, other in firsts.items() if other == first]
         words.append(
             f"{_listed(same)} {'have' if len(same) > 1 else 'has'} the same content as {first}: a "
             "copy is no second measurement, it is used once"
         )
-    kept = [each for number, each in enumerate(named) if number not in found]
+    kept = [each for number, each in enumerate(named) if number not in copied]
     renamed = [
         replace(each, repeat_of=firsts.get(each.repeat_of or "", each.repeat_of)) for each in kept
     ]
@@ -114,12 +114,12 @@ def _cut(
     wholes: dict[str, Trial] = {}
     messages: Said = []
     for each in named:
-        found = gaps.gaps(each.trial)
-        if not found:
+        trial_gaps = gaps.gaps(each.trial)
+        if not trial_gaps:
             kept.append(each)
             continue
-        pieces = gaps.pieces(each.trial, found)
-        said = "; ".join(gap.words() for gap in found)
+        pieces = gaps.pieces(each.trial, trial_gaps)
+        said = "; ".join(gap.words() for gap in trial_gaps)
         left = {0: "nothing long enough is left", 1: "one piece is used"}.get(
             len(pieces), f"{len(pieces)} pieces are used"
         )

@@ -90,9 +90,9 @@ def _likely_rate(dense: Sequence[NamedTrial], model: Model) -> float | None:
     misfits = {}
     for rate in RATES_HZ:
         timed = [replace(each.trial, time=each.trial.time / rate) for each in few]
-        found = pairs(model, timed)
-        if len(found) == len(few):
-            misfits[rate] = float(np.mean([_misfit(pair) for pair in found]))
+        timed_pairs = pairs(model, timed)
+        if len(timed_pairs) == len(few):
+            misfits[rate] = float(np.mean([_misfit(pair) for pair in timed_pairs]))
     if len(misfits) < 2:
         return None
     best = min(misfits, key=lambda rate: misfits[rate])
@@ -107,8 +107,8 @@ def _misfit(pair: Pair) -> float:
         _, simulated, measured = pair.signal(quantity)
         if measured.size > 8 and np.ptp(simulated) > 1e-9:
             columns = np.stack([simulated, np.ones(simulated.size)], axis=1)
-            found, *_ = np.linalg.lstsq(columns, measured, rcond=None)
-            left.append(np.var(measured - columns @ found) / max(np.var(measured), 1e-300))
+            coefficients, *_ = np.linalg.lstsq(columns, measured, rcond=None)
+            left.append(np.var(measured - columns @ coefficients) / max(np.var(measured), 1e-300))
     return float(np.mean(left)) if left else np.inf
 
 

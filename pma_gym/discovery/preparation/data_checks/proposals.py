@@ -37,15 +37,15 @@ def lines(
     Returns:
         By each name that the files give the column, its line, which replaces an older one.
     """
-    found: dict[str, str] = {}
+    by_key: dict[str, str] = {}
     for file in files:
         for source in file_sources(dataset, file):
             if source.column.quantity == quantity:
-                found[source.name] = _line(source, factor, offset)
-    if not found:
+                by_key[source.name] = _line(source, factor, offset)
+    if not by_key:
         column = BY_QUANTITY[quantity]
-        found[column.name] = _line(Source(0, column.name, column), factor, offset)
-    return found
+        by_key[column.name] = _line(Source(0, column.name, column), factor, offset)
+    return by_key
 
 
 def instruction(written: Mapping[str, str], columns: ColumnMap) -> str:

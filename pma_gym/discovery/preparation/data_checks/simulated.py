@@ -48,7 +48,7 @@ def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[
         pressure: what is added to commanded pressures (Pa).
     """
     plant = Plant(model)
-    found = []
+    every = []
     for number, trial in enumerate(trials):
         try:
             simulated = plant.simulate(_with_pressure(trial, pressure), noise=False)
@@ -56,8 +56,8 @@ def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[
         except ValueError:
             continue
         if all(np.isfinite(values).all() for values in simulated.measurements.values()):
-            found.append(Pair(number, trial, simulated))
-    return found
+            every.append(Pair(number, trial, simulated))
+    return every
 
 
 def _with_pressure(trial: Trial, pressure: float) -> Trial:

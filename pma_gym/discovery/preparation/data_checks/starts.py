@@ -97,7 +97,7 @@ def moving_start(plant: Plant, trial: Trial) -> str:
     The beginning in motion must be clear in the readings alone, and explain them better than one at
     rest: a command that moves from the first row on moves a rig at rest a little later.
     """
-    seen = [found for name in trial.measurements if (found := _first_speed(trial, name))]
+    seen = [moving for name in trial.measurements if (moving := _first_speed(trial, name))]
     if not seen:
         return ""
     # Contraction's speed is named where it is known, else the most certain one.
@@ -204,12 +204,12 @@ def _first_speed(trial: Trial, quantity: str) -> tuple[str, float, float] | None
     count = max(SPEED_ROWS, int(np.searchsorted(time, SPEED_S)))
     # A parabola's slope at its beginning: a rig at rest that is set in motion has none there.
     columns = np.stack([np.ones(count), time[:count], time[:count] ** 2], axis=1)
-    found, *_ = np.linalg.lstsq(columns, values[:count], rcond=None)
+    coefficients, *_ = np.linalg.lstsq(columns, values[:count], rcond=None)
     noise = _noise(values[: max(count, 50)])
     line = float(np.polyfit(time[:count], values[:count], 1)[0])
     error = noise / float(np.sqrt(np.sum((time[:count] - time[:count].mean()) ** 2)))
     sure = abs(line) / error
-    if sure < SURE or abs(line) < LEAST[quantity] or found[1] / line < 0.3:
+    if sure < SURE or abs(line) < LEAST[quantity] or coefficients[1] / line < 0.3:
         return None
     return quantity, line, sure
 
@@ -261,6 +261,6 @@ def _misfit(model: Model, trial: Trial, simulated: Array, rows: NDArray[np.bool_
         if there.sum() >= SPEED_ROWS:
             # A model that is wrong makes a motion larger or smaller; its beginning it does not.
             columns = np.stack([row[there], np.ones(there.sum())], axis=1)
-            found, *_ = np.linalg.lstsq(columns, measured[there], rcond=None)
-            total += float(np.sum((measured[there] - columns @ found) ** 2)) / width**2
+            coefficients, *_ = np.linalg.lstsq(columns, measured[there], rcond=None)
+            total += float(np.sum((measured[there] - columns @ coefficients) ** 2)) / width**2
     return total

@@ -35,11 +35,11 @@ DIRECT = ("load", "pressure")
 """Signals that follow their commands straight. Friction and hysteresis make motion late, alone."""
 
 
-def lags(found: Sequence[Pair]) -> dict[str, float]:
+def lags(pairs: Sequence[Pair]) -> dict[str, float]:
     """How late each measured signal is (s), where that is clear in most trials that show it."""
     late = {}
     for quantity in MEASUREMENTS:
-        each = [lag for pair in found if (lag := _lag(pair, quantity)) is not None]
+        each = [lag for pair in pairs if (lag := _lag(pair, quantity)) is not None]
         shown = [lag for lag, clear in each if clear]
         if each and 2 * len(shown) > len(each):
             late[quantity] = float(np.median(shown))
@@ -99,5 +99,5 @@ def _left(time: Array, simulated: Array, measured: Array, lag: float) -> float:
         inner[:] = True
     late = np.interp(time - lag, time, simulated)[inner]
     columns = np.stack([late, np.ones(late.size)], axis=1)
-    found, *_ = np.linalg.lstsq(columns, measured[inner], rcond=None)
-    return float(np.sum((measured[inner] - columns @ found) ** 2))
+    coefficients, *_ = np.linalg.lstsq(columns, measured[inner], rcond=None)
+    return float(np.sum((measured[inner] - columns @ coefficients) ** 2))

@@ -165,15 +165,15 @@ def _correlations(
     time: Array, simulated: Array, measured: Array
 ) -> list[tuple[float, float, float]]:
     """Correlation, lag and what speaks for the lag: none at all is preferred, and no sign."""
-    found = []
+    correlations = []
     for lag in np.linspace(0.0, MOST_LAG_S, LAGS):
         late = np.interp(time - lag, time, simulated)
         if np.ptp(late) == 0.0:
             continue
         value = float(np.corrcoef(late, measured)[0, 1])
         # A signal that is late by half a period of a sine looks like the opposite sign.
-        found.append((value, float(lag), 0.05 * (value > 0.0) - 1e-3 * lag))
-    return found
+        correlations.append((value, float(lag), 0.05 * (value > 0.0) - 1e-3 * lag))
+    return correlations
 
 
 def _robust_slope(simulated: Array, measured: Array) -> float:
@@ -254,14 +254,14 @@ def pressure_unit(pairs: Sequence[Pair]) -> Unit | None:
 
 def _levels(pairs: Sequence[Pair]) -> tuple[Array, Array]:
     """Pressures of many instants of the trials, simulated and measured (Pa)."""
-    found: list[tuple[Array, Array]] = []
+    levels: list[tuple[Array, Array]] = []
     for pair in pairs:
         _, simulated, measured = pair.signal("pressure")
         chosen = slice(None, None, max(1, simulated.size // 200))
-        found.append((simulated[chosen], measured[chosen]))
-    if not found:
+        levels.append((simulated[chosen], measured[chosen]))
+    if not levels:
         return np.empty(0), np.empty(0)
-    return np.concatenate([s for s, _ in found]), np.concatenate([m for _, m in found])
+    return np.concatenate([s for s, _ in levels]), np.concatenate([m for _, m in levels])
 
 
 def _off(simulated: Array, measured: Array, unit: Unit) -> float:

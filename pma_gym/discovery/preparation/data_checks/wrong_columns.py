@@ -27,10 +27,10 @@ COMMAND_OF = {"load": "load_command", "pressure": "pressure_command"}
 
 def clock_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model) -> list[str]:
     """What to say of a clock that cannot be in seconds; nothing of one that may be."""
-    found = wrong_clock(named, model)
-    if found is None:
+    wrong_factor = wrong_clock(named, model)
+    if wrong_factor is None:
         return []
-    said, factor = found
+    said, factor = wrong_factor
     if not factor:
         return [f"{said}; give time_s in seconds"]
     return [f"{said}; {_how(dataset, [each.name for each in named], 'time', factor)}"]
@@ -39,28 +39,30 @@ def clock_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model)
 def unit_proposals(dataset: Dataset, named: Sequence[NamedTrial], model: Model) -> list[str]:
     """What to say of every signal that is certainly in another unit, with the lines to write."""
     trials = [each.trial for each in named]
-    found = pairs(model, trials)
+    simulated = pairs(model, trials)
     said = []
     for quantity in MOTION_UNITS:
-        said += _of_motion(dataset, named, found, quantity)
-    unit = pressure_unit(found)
+        said += _of_motion(dataset, named, simulated, quantity)
+    unit = pressure_unit(simulated)
     if unit is not None:
-        said.append(_of_pressure(dataset, named, found, unit))
+        said.append(_of_pressure(dataset, named, simulated, unit))
     elif (misfits := both_absolute(model, trials)) is not None:
         said.append(_of_both(dataset, named, *misfits))
     return said
 
 
 def _of_motion(
-    dataset: Dataset, named: Sequence[NamedTrial], found: Sequence[Pair], quantity: str
+    dataset: Dataset, named: Sequence[NamedTrial], simulated: Sequence[Pair], quantity: str
 ) -> list[str]:
     """Of contraction, rotation or load: which trials have it in which unit."""
-    told = {pair.number: motion_unit(quantity, pair) for pair in found if slope_of(pair, quantity)}
+    told = {
+        pair.number: motion_unit(quantity, pair) for pair in simulated if slope_of(pair, quantity)
+    }
     said = []
     for unit in dict.fromkeys(unit for unit in told.values() if unit is not None):
         numbers = [number for number, other in told.items() if other == unit]
         right = [number for number, other in told.items() if other is None]
-        slopes = [slope_of(pair, quantity) for pair in found if pair.number in numbers]
+        slopes = [slope_of(pair, quantity) for pair in simulated if pair.number in numbers]
         slope = float(np.median([each.slope for each in slopes if each is not None]))
         name = BY_QUANTITY[quantity].name
         seen = f"{name} is {slope:.3g} times what model and commands give"
@@ -70,7 +72,7 @@ def _of_motion(
         else:
             seen += f": {unit.words}"
         if not right:
-            zero = _zero(quantity, unit, [pair for pair in found if pair.number in numbers])
+            zero = _zero(quantity, unit, [pair for pair in simulated if pair.number in numbers])
             said.append(f"{seen}; {_for_unit(dataset, named, quantity, unit, zero)}")
         elif len(numbers) >= len(right):
             files = [named[number].name for number in numbers]
@@ -95,23 +97,23 @@ def _for_unit(
     return _how(dataset, names, quantity, 1.0 / unit.factor, zero - unit.offset / unit.factor)
 
 
-def _zero(quantity: str, unit: Unit, found: Sequence[Pair]) -> float:
+def _zero(quantity: str, unit: Unit, simulated: Sequence[Pair]) -> float:
     """What a corrected contraction is to be moved by (m): 0 unless it is far from a muscle's.
 
     Its zero is free in every trial, so a whole millimetre will do.
     """
     if quantity != "contraction":
         return 0.0
-    signals = [pair.signal(quantity)[1:] for pair in found]
+    signals = [pair.signal(quantity)[1:] for pair in simulated]
     away = float(np.median([np.median(s) - np.median(m) / unit.factor for s, m in signals]))
     return round(1e3 * away) * 1e-3 if abs(away) > FAR_M else 0.0
 
 
 def _of_pressure(
-    dataset: Dataset, named: Sequence[NamedTrial], found: Sequence[Pair], unit: Unit
+    dataset: Dataset, named: Sequence[NamedTrial], pairs: Sequence[Pair], unit: Unit
 ) -> str:
     column, command = BY_QUANTITY["pressure"], BY_QUANTITY["pressure_command"]
-    levels = [pair.signal("pressure")[1:] for pair in found]
+    levels = [pair.signal("pressure")[1:] for pair in pairs]
     simulated = np.concatenate([each[0] for each in levels])
     measured = np.concatenate([each[1] for each in levels])
     names = [each.name for each in named]

@@ -1,0 +1,193 @@
+"""Nested laws: parameters of an effect that the trials do not determine leave its law.
+
+The profile of a parameter is chi-square with the parameter held and all others refitted. Where it
+stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far above all speeds),
+the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
+value is given for it, only the bound that the profile has on the other side. An effect may also
+say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
+stays where it explains more than its further parameters cost.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pma_gym.discovery.diagnosis import Undetermined
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.covariance import covariance
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import unit, values
+from pma_gym.discovery.selection.candidate_fits import cost
+from pma_gym.discovery.selection.profile_limits import limits
+from pma_gym.effects import CATALOGUE
+
+FLAT = 4.0
+"""Chi-square by which a profile may rise and still be flat: twice a log-likelihood of 2."""
+
+UNSURE = 3.0
+"""Standard errors within which a limit, or a parameter that may be equal, makes one doubtful."""
+
+EQUAL = 1e-3
+"""Share by which two parameters that are held equal may differ in the end."""
+
+ROUNDS = 5
+"""How often they are held equal anew, each time at what the other became."""
+
+HALVINGS = 5
+"""How often the place where a profile leaves its flat is halved."""
+
+Chosen = tuple[CandidateEffect, ...]
+
+
+@dataclass(frozen=True)
+class Nested:
+    """Effects whose laws have lost what the trials do not determine.
+
+    Attributes:
+        chosen: the effects.
+        fit: of the model with them.
+        undetermined: what left, by path.
+    """
+
+    chosen: Chosen
+    fit: Fitted
+    undetermined: Mapping[str, Undetermined]
+
+
+def nested(problem: FitProblem, fit: Fitted, chosen: Chosen) -> Nested:
+    """Take from effects what the trials do not determine, one parameter after the other.
+
+    Args:
+        problem: the trials, with the noise that the fit leaves.
+        fit: of the model with the effects.
+        chosen: the effects.
+    """
+    state = Nested(chosen, fit, {})
+    paths = [path for candidate in chosen for path in candidate.fitted_paths]
+    state = _all_tied(problem, state)
+    for path in paths:
+        state = _left(problem, state, path) or state
+    # What only mattered together with a parameter that has left does nothing any more.
+    state = _all_tied(problem, state)
+    if not state.undetermined:
+        return state
+    fit = replace(state.fit, covariance=covariance(problem, state.fit, state.chosen))
+    return replace(state, fit=fit)
+
+
+def _left(problem: FitProblem, state: Nested, path: str) -> Nested | None:
+    """Without a parameter whose profile is flat up to a limit; None where it is determined."""
+    place = _place(state.chosen, path)
+    candidate = state.chosen[place]
+    shape = not candidate.amplitudes[candidate.paths.index(path)]
+    if path not in candidate.fitted_paths or len(candidate.fitted_paths) < 2 or not shape:
+        return None
+    low, high = limits(problem, state.fit, state.chosen, path)
+    value, error = state.fit.estimate(path)
+    doubtful = [
+        end
+        for end in (low, high)
+        if not np.isfinite(error) or abs(value - end) < UNSURE * error or _beyond(value, end, low)
+    ]
+    held = {end: _held(problem, state, place, {path: end}) for end in doubtful}
+    flat = {end: new for end, new in held.items() if new is not None and _flat(state.fit, new.fit)}
+    if not flat:
+        return None
+    end = min(flat, key=lambda each: flat[each].fit.chi_square)
+    other = low if end == high else high
+    bound = None
+    if other not in flat:
+        bound = _bound(problem, state, place, path, (min(max(value, low), high), other))
+    sides = (bound, None) if end == high else (None, bound)
+    known = Undetermined(*sides, unit(path))
+    return replace(flat[end], undetermined={**state.undetermined, path: known})
+
+
+def _beyond(value: float, end: float, low: float) -> bool:
+    """Whether a value is at a limit of its law, or beyond."""
+    return value <= end if end == low else value >= end
+
+
+def _flat(best: Fitted, held: Fitted) -> bool:
+    return held.chi_square - best.chi_square < FLAT
+
+
+def _held(
+    problem: FitProblem,
+    state: Nested,
+    place: int,
+    at: Mapping[str, float],
+    begun: Mapping[str, float] | None = None,
+) -> Nested | None:
+    """The fit with some parameters of an effect held, others begun at values."""
+    candidate = state.chosen[place]
+    less = replace(candidate, left=(*candidate.left, *at))
+    chosen = (*state.chosen[:place], less, *state.chosen[place + 1 :])
+    refit = problem.fit(state.fit.model.replace({**at, **(begun or {})}), chosen)
+    return None if refit is None else replace(state, chosen=chosen, fit=refit)
+
+
+def _bound(
+    problem: FitProblem, state: Nested, place: int, path: str, ends: tuple[float, float]
+) -> float | None:
+    """Where a profile has risen by `FLAT`, between where it is flat and where it is not."""
+    flat, steep = ends
+    logarithmic = min(ends) > 0.0
+    for _ in range(HALVINGS):
+        middle = float(np.sqrt(flat * steep) if logarithmic else 0.5 * (flat + steep))
+        new = _held(problem, state, place, {path: middle})
+        if new is not None and _flat(state.fit, new.fit):
+            flat = middle
+        else:
+            steep = middle
+    return steep
+
+
+def _all_tied(problem: FitProblem, state: Nested) -> Nested:
+    """With the simpler law of each effect that has one and bears it."""
+    for place in range(len(state.chosen)):
+        state = _tied(problem, state, place) or state
+    return state
+
+
+def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
+    """With the simpler law of an effect; None where it has none, or the trials refuse it."""
+    candidate = state.chosen[place]
+    doors = CATALOGUE[candidate.effect].names_at_the_door()
+    stems = {doors[path.partition(".")[2]]: path for path in candidate.fitted_paths}
+    for one, other, *idle in CATALOGUE[candidate.effect].ties:
+        path, twin = stems.get(one), stems.get(other)
+        if path is None or twin is None:
+            continue
+        rest = [stems[stem] for stem in idle if stem in stems]
+        equal = _equal(problem, state, place, (path, twin), rest)
+        # What the whole law explains more must be worth its parameters, as anywhere.
+        if equal is not None and cost(equal.fit) < cost(state.fit):
+            known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
+            return replace(equal, undetermined={**state.undetermined, **known})
+    return None
+
+
+def _equal(
+    problem: FitProblem, state: Nested, place: int, pair: tuple[str, str], rest: list[str]
+) -> Nested | None:
+    """The best fit in which the first of two parameters equals the other, and some do nothing."""
+    path, twin = pair
+    idle = dict(zip(rest, values(state.fit.model, rest).tolist(), strict=True))
+    best: Nested | None = None
+    for size in (state.fit.estimate(twin)[0], state.fit.estimate(path)[0]):
+        for _ in range(ROUNDS):
+            held = _held(problem, state, place, {path: size} | idle, {twin: size})
+            if held is None:
+                break
+            before, size = size, held.fit.estimate(twin)[0]
+            if abs(size - before) < EQUAL * abs(size):
+                if best is None or held.fit.chi_square < best.fit.chi_square:
+                    best = held
+                break
+    return best
+
+
+def _place(chosen: Chosen, path: str) -> int:
+    return next(k for k, candidate in enumerate(chosen) if path in candidate.paths)

@@ -1,0 +1,77 @@
+"""Where a parameter's law is at its limit: values beyond the scales of the data.
+
+A speed far above all speeds in the trials, or far below, does what an infinite one or none would.
+Scales come from the trials and the model; where neither tells, the catalogue's bounds are taken.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
+from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
+from pma_gym.discovery.fitting.free_parameters import unit
+from pma_gym.estimation.logged import Logged
+from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.units import SI_FACTORS
+
+FAR_ABOVE, FAR_BELOW = 30.0, 1e-4
+"""How many times as large as the largest in the trials a value is that does what an infinite one
+does; and the share of it that does what none does."""
+
+
+LEAST_ROWS = 3
+"""Fewest readings from which a speed is taken."""
+
+Array = NDArray[np.float64]
+
+
+def limits(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...], path: str
+) -> tuple[float, float]:
+    """Values of a parameter, in its unit, at which its law is at its limits.
+
+    Args:
+        problem: the trials.
+        fit: of a model with effects.
+        chosen: the effects.
+        path: the parameter.
+    """
+    (low,), (high,) = bounds([path])
+    largest = _scales(problem, fit, chosen).get(unit(path))
+    if largest is None:
+        return float(low), float(high)
+    ends = np.clip([FAR_BELOW * largest, FAR_ABOVE * largest], low, high)
+    return (float(ends[0]), float(ends[1])) if ends[0] < ends[1] else (float(low), float(high))
+
+
+def _scales(
+    problem: FitProblem, fit: Fitted, chosen: tuple[CandidateEffect, ...]
+) -> dict[str, float]:
+    """The largest travel, speed, time and pressure in the trials, by the units they are given in.
+
+    Force over speed or over travel needs none of its own: a force is an amplitude.
+    """
+    whitened = problem.whitened_at(fit, chosen)
+    readings = whitened.readings(fit.values)
+    if readings is None:
+        return {}
+    travel, speed, pressure, seconds = 0.0, 0.0, 0.0, 0.0
+    for held, logged in zip(readings, whitened.logged, strict=True):
+        # A model that lacks much may run away; what was measured did not.
+        contraction, time = _known(logged, held, "contraction")
+        travel = max(travel, float(np.ptp(contraction)))
+        speed = max(speed, float(np.abs(np.gradient(contraction, time)).max()))
+        pressure = max(pressure, float(np.ptp(_known(logged, held, "pressure")[0])))
+        seconds = max(seconds, float(logged.time[-1] - logged.time[0]))
+    si = {"mm": travel, "um": travel, "mm/s": speed, "kPa": pressure, "s": seconds, "ms": seconds}
+    return {name: size / SI_FACTORS[name] for name, size in si.items() if size > 0.0}
+
+
+def _known(logged: Logged, held: Array, name: str) -> tuple[Array, Array]:
+    """A signal (SI) as measured, else as simulated, and the times (s) of its readings."""
+    channel = OUTPUTS.index(name)
+    there = np.full(len(logged.time), bool(logged.measures[channel]))
+    there[logged.missing[channel]] = False
+    if there.sum() < LEAST_ROWS:
+        return held[channel], logged.time
+    return logged.measured[channel, there], logged.time[there]

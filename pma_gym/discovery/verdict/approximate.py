@@ -1,0 +1,74 @@
+"""Effects whose law fits only approximately: how much of the misfit they close, and what is left.
+
+An effect of the catalogue that closes most of the misfit beyond noise, on readings that its fit had
+not seen, is missing in the model even where its law leaves structure: a dead zone with a smooth
+edge is a dead zone. It is named with its size and with what its law leaves. Several effects
+together close most of any misfit, so it must be one.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pma_gym.discovery.diagnosis import Gap
+
+MOST_LEFT = 0.15
+"""Most of the misfit beyond noise (mean square) that an approximate law may leave, as a share."""
+
+WORTH_SAYING = 0.5
+"""The same from which on the best candidate's size says nothing."""
+
+LEAST_MISFIT = 0.3
+"""Mean square beyond noise, over that of the noise and summed over signals, below which a share of
+it is none that the trials tell."""
+
+
+@dataclass(frozen=True)
+class Closing:
+    """How much of the misfit beyond noise effects close.
+
+    Attributes:
+        left: share of the mean square beyond noise that they leave, summed over signals in units
+            of their noise.
+        held_out: whether it is that of readings which the fits had not seen.
+        effects: how many effects close it.
+    """
+
+    left: float
+    held_out: bool
+    effects: int
+
+    @property
+    def closed(self) -> float:
+        """The share that they close."""
+        return 1.0 - self.left
+
+    @property
+    def named(self) -> bool:
+        """Whether the effect is named although its law is only approximate."""
+        return self.held_out and self.effects == 1 and self.left <= MOST_LEFT
+
+    @property
+    def worth_saying(self) -> bool:
+        """Whether so much is closed that the size means something."""
+        return self.left <= WORTH_SAYING
+
+
+def closing(gaps: Mapping[str, Gap], effects: int) -> Closing | None:
+    """How much of the misfit that refitted parameters leave is closed by the proposed model.
+
+    Args:
+        gaps: by signal.
+        effects: how many effects the proposed model has more.
+    Returns:
+        It; None where the parameters leave too little beyond noise.
+    """
+    before = sum(_beyond(gap.parameters, gap.floor) for gap in gaps.values())
+    after = sum(_beyond(gap.after, gap.floor) for gap in gaps.values())
+    if before < LEAST_MISFIT:
+        return None
+    return Closing(after / before, all(gap.held_out for gap in gaps.values()), effects)
+
+
+def _beyond(misfit: float, floor: float) -> float:
+    """Mean square beyond noise, in units of that of the noise."""
+    return max((misfit / floor) ** 2 - 1.0, 0.0) if floor > 0.0 else 0.0

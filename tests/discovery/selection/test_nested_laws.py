@@ -1,0 +1,118 @@
+"""Nested laws: what trials do not determine leaves the law of an effect, and has no value."""
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.fitting.fit_problem import FitProblem
+from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.preparation.noise import white_noise
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.selection import profile_limits
+from pma_gym.discovery.selection.nested_laws import FLAT, nested
+from pma_gym.discovery.selection.profile_limits import limits
+from pma_gym.discovery.workflow import diagnose
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import load_model
+from pma_gym.plant.plant import Plant
+from tests.discovery.rig_trials import FROZEN
+
+SLIDE = load_model(FROZEN / "driven_slide" / "model.toml")
+STATIC, DYNAMIC, SPEED = (
+    f"coulomb_friction.{name}" for name in ("static_n", "dynamic_n", "stribeck_speed_mm_per_s")
+)
+DRY = next(each for each in candidate_effects(SLIDE) if each.name == "coulomb_friction")
+
+
+@cache
+def rubbing(static, dynamic, speed, count=3):
+    """Trials of a driven slide with dry friction (N, N, mm/s), and their model."""
+    table = {"static_n": static, "dynamic_n": dynamic, "stribeck_speed_mm_per_s": speed}
+    truth = SLIDE.with_effects({"coulomb_friction": table | {"presliding_um": 10.0}})
+    time, logs = np.arange(0.0, 1.0, 0.01), []
+    for k in range(count):
+        waves = 60.0 * np.sin(2 * np.pi * (0.9 + 0.3 * k) * time + k)
+        force = waves + 30.0 * np.sign(np.sin(2 * np.pi * (1.1 + 0.4 * k) * time))
+        logs.append(Plant(truth).simulate(Trial(time, {"load_command": force}), seed=k))
+    return logs, truth
+
+
+def fit_of(static, dynamic, speed, begun):
+    """A fit of such trials with the whole law, begun at values, and on which bench."""
+    logs, _ = rubbing(static, dynamic, speed)
+    noise = tuple(map(white_noise, (2e-5, 1.0, 1.0, 1.0)))
+    bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
+    start = np.array([*begun, *DRY.absent[len(begun) :]])
+    found = bench.fit(SLIDE, (DRY,), {DRY.name: start})
+    assert found is not None
+    return bench, found
+
+
+def test_friction_of_one_size_has_one_number():
+    """One that falls with the speed is at its bound, or anywhere, and is said to be neither."""
+    bench, fit = fit_of(12.0, 12.0, 5.0, (40.0, 11.0, 0.02))
+    less = nested(bench, fit, (DRY,))
+    assert set(less.undetermined) == {STATIC, SPEED}
+    assert less.chosen[0].fitted_paths == [DYNAMIC]
+    assert less.fit.chi_square < fit.chi_square + FLAT
+    value, error = less.fit.estimate(DYNAMIC)
+    assert value == pytest.approx(12.0, rel=0.005)
+    assert abs(value - 12.0) < 4.0 * error
+
+
+def test_friction_that_falls_with_the_speed_keeps_its_law():
+    bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
+    less = nested(bench, fit, (DRY,))
+    assert not less.undetermined
+    assert less.fit is fit
+
+
+def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
+    """A static friction that hardly falls: the fall's speed is above something, no more."""
+    logs, truth = rubbing(12.0, 4.0, 900.0)
+    noise = tuple(map(white_noise, (2e-4, 1.0, 1.0, 1.0)))
+    bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
+    table = truth.at_the_door("coulomb_friction")
+    begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)
+    fit = bench.fit(SLIDE, (DRY,), {DRY.name: begun})
+    assert fit is not None
+    less = nested(bench, fit, (DRY,))
+    assert SPEED in less.undetermined
+    known = less.undetermined[SPEED]
+    assert known.below is None and known.unit == "mm/s"
+    assert known.above is not None and 100.0 < known.above < 900.0
+
+
+def test_scales_of_limits_come_from_the_trials():
+    bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
+    low, high = limits(bench, fit, (DRY,), SPEED)
+    contractions = [log.measurements["contraction"] for log in bench.trials]
+    fastest = max(1e3 * np.abs(np.gradient(each, 0.01)).max() for each in contractions)
+    quantity = CATALOGUE["coulomb_friction"].quantities["stribeck_speed"]
+    assert low == pytest.approx(max(quantity.lower, 1e-4 * fastest), rel=0.2)
+    assert high == pytest.approx(min(quantity.upper, 30.0 * fastest), rel=0.2)
+
+
+@pytest.mark.parametrize("largest", [1e-9, 1e9])
+def test_limits_stay_within_what_the_catalogue_allows(monkeypatch, largest):
+    bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
+    monkeypatch.setattr(profile_limits, "_scales", lambda *_: {"mm/s": largest})
+    quantity = CATALOGUE["coulomb_friction"].quantities["stribeck_speed"]
+    assert limits(bench, fit, (DRY,), SPEED) == (quantity.lower, quantity.upper)
+
+
+def test_no_value_is_said_of_what_is_not_determined():
+    logs, _ = rubbing(12.0, 12.0, 5.0)
+    found = diagnose(logs, SLIDE, propose=False)
+    (effect,) = found.effects
+    assert list(effect.parameters) == ["dynamic_n"]
+    assert "static not determined" in found.sentence
+    assert "stribeck speed not determined" in found.sentence
+    assert "limit" not in found.sentence
+    (written,) = json.loads(found.text())["effects"]
+    assert set(written["not_determined"]) == {"static_n", "stribeck_speed_mm_per_s"}
+    assert set(written["parameters"]) == {"dynamic_n"}
+    assert "not determined" in found.model.notes[STATIC].source
