@@ -51,6 +51,8 @@ WORDS = {
 CLEAN = (
     "benchmarks",
     "controllers",
+    *(f"pma_gym/{room}" for room in ("codegen", "integrator", "plant", "estimation")),
+    *(f"pma_gym/{room}" for room in ("effects", "data", "studies", "pages")),
 )
 """Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
 

@@ -20,7 +20,7 @@ def reading_blocks(model: str) -> list[Block]:
         model: a shipped name, or a TOML file.
     """
     plant = Plant(model)
-    if plant.model.plant != "station":
+    if not plant.model.rig.balances_loads:
         return []
     trials = read_trials(plant)
     return [

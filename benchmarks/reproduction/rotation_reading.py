@@ -166,7 +166,7 @@ def entries(model: str) -> list[dict[str, object]]:
         model: a shipped name, or a TOML file.
     """
     plant = Plant(model)
-    if plant.model.plant != "station":
+    if not plant.model.rig.balances_loads:
         return []
     return [
         {

@@ -272,13 +272,13 @@ _HEAD += f"{'rounds':>7}{'trials':>7}{'chi2/n':>10}"
 
 def _line(row: Mapping[str, Any]) -> str:
     times = [row[f"{name}_s"] for name in ("compile", "fit", "fit_cpu", "fit_one", "fit_one_cpu")]
-    times = "".join(
+    cells = "".join(
         f"{value:{width}.2f}" for value, width in zip(times, (9, 8, 8, 9, 8), strict=True)
     )
     end = "" if row["converged"] else "  not converged"
     end += "" if row["same"] else "  other bits with one thread"
     return (
-        f"{row['title']:26}{row['free']:5}{times}{row['rounds']:7}"
+        f"{row['title']:26}{row['free']:5}{cells}{row['rounds']:7}"
         f"{row['simulated']:7}{row['reduced_chi_square']:10.3g}{end}"
     )
 

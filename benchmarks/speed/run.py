@@ -139,11 +139,11 @@ def _sentence(verdict: Verdict) -> str:
     return f"{target.title}: {rate(verdict.got[1])}, at least {rate(target.limit)} wanted"
 
 
-def _table(table: SpeedTable) -> Table:
-    table = Table(title=table.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(table.header):
-        words = number < table.words
+def _table(content: SpeedTable) -> Table:
+    table = Table(title=content.title, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    for number, name in enumerate(content.header):
+        words = number < content.words
         table.add_column(name, justify="left" if words else "right", no_wrap=not words)
-    for row in table.rows:
+    for row in content.rows:
         table.add_row(*row)
     return table

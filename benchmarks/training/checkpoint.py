@@ -67,8 +67,8 @@ def save_checkpoint(
             {key: one.contiguous().clone() for key, one in tensors.items()},
             partial / "state.safetensors",
         )
-        content = json.dumps({"numbers": numbers, "told": dict(content)}, indent=1)
-        (partial / "state.json").write_text(content, encoding="utf-8")
+        state = json.dumps({"numbers": numbers, "told": dict(content)}, indent=1)
+        (partial / "state.json").write_text(state, encoding="utf-8")
         if final.exists():
             # Whole under another name until the new one is there: a kill may come between.
             final.rename(replaced)

@@ -108,17 +108,17 @@ class PilotedVecEnv(EngineVecEnv):
     def _last(
         self, i: int, entries: NDArray[np.float32], info: Mapping[str, Any], broken: bool
     ) -> dict[str, Any]:
-        """What is told of an environment whose episode ends; errors unless it was cut."""
+        """Info of an environment whose episode ends; errors unless it was cut."""
         name = f"rmse_by_phase_{self.envs.task.protocol.suffix}"
-        info: dict[str, Any] = {
+        last: dict[str, Any] = {
             "terminal_observation": entries,
             "TimeLimit.truncated": not broken,
             "episode": {"r": float(self._returns[i]), "l": int(self.pilots.steps[i]), "t": 0.0},
         }
         if name in info and info[f"_{name}"][i]:
             phases = info[name]
-            info[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
-        return info
+            last[name] = {k: float(v[i]) for k, v in phases.items() if not k.startswith("_")}
+        return last
 
     def _begin_again(self, which: NDArray[np.int64], over: NDArray[np.bool_]) -> None:
         self.envs.reset(options={"reset_mask": over})

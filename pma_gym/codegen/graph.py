@@ -67,12 +67,12 @@ class Graph(ValueGraph):
         Raises:
             ValueError: the name is taken by an input of another kind or level.
         """
-        found = self._known.get(("input", name))
-        if found is None:
-            found = self._known["input", name] = self._new("input", (), kind, level, name)
-        elif (found.kind, found.level) != (kind, level):
-            raise ValueError(f"input {name} is {found.kind} of level {found.level} already")
-        return found
+        value = self._known.get(("input", name))
+        if value is None:
+            value = self._known["input", name] = self._new("input", (), kind, level, name)
+        elif (value.kind, value.level) != (kind, level):
+            raise ValueError(f"input {name} is {value.kind} of level {value.level} already")
+        return value
 
     def inputs(self, name: str, like: Any, level: int = FIXED) -> Any:  # noqa: ANN401
         """The same named tuple with an input for each number.
@@ -101,11 +101,11 @@ class Graph(ValueGraph):
             key = number = int(number) & MASK
         else:
             key = number = bool(number)
-        found = self._known.get(("constant", kind, key))
-        if found is None:
-            found = self._new("constant", (), kind, CONSTANT, number)
-            self._known["constant", kind, key] = found
-        return found
+        value = self._known.get(("constant", kind, key))
+        if value is None:
+            value = self._new("constant", (), kind, CONSTANT, number)
+            self._known["constant", kind, key] = value
+        return value
 
     def value(self, given: "Value | Number", kind: Kind = "real") -> Value:
         """The value itself, or the number as a constant of this kind.
@@ -132,11 +132,11 @@ class Graph(ValueGraph):
     def node(self, operation: str, operands: tuple[Value, ...], kind: Kind) -> Value:
         """The value of exactly this operation, as `simplify` wants it left."""
         key = (operation, *[operand.id for operand in operands])
-        found = self._known.get(key)
-        if found is None:
+        value = self._known.get(key)
+        if value is None:
             level = max(operand.level for operand in operands)
-            found = self._known[key] = self._new(operation, operands, kind, level)
-        return found
+            value = self._known[key] = self._new(operation, operands, kind, level)
+        return value
 
     def select(
         self, condition: "Value | Number", yes: "Value | Number", no: "Value | Number"

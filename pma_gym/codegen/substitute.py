@@ -15,11 +15,11 @@ def substitute(outputs: Sequence[Value], given: Mapping[int, Value]) -> list[Val
     Returns:
         The outputs, made of the new values; what depends on none of them stays the same value.
     """
-    found = dict(given)
+    replaced = dict(given)
     for value in order(outputs):
-        if value.id in found:
+        if value.id in replaced:
             continue
-        parts = [found[part.id] for part in value.operands]
+        parts = [replaced[part.id] for part in value.operands]
         same = all(a is b for a, b in zip(parts, value.operands, strict=True))
-        found[value.id] = value if same else value.graph.apply(value.operation, *parts)
-    return [found[value.id] for value in outputs]
+        replaced[value.id] = value if same else value.graph.apply(value.operation, *parts)
+    return [replaced[value.id] for value in outputs]

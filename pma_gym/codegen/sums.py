@@ -72,19 +72,19 @@ class Sums:
         return all(_is_sum(user) and user.operands[0] is not user.operands[1] for user in users)
 
     def _flattened(self, value: Value) -> list[Term]:
-        found: list[Term] = []
+        terms: list[Term] = []
         waiting = [(False, value)]
         while waiting:
             is_negative, part = waiting.pop()
             if part is not value and part.id not in self.within:
-                found.append(Term(is_negative, (part,)))
+                terms.append(Term(is_negative, (part,)))
             elif part.operation == "multiply":
-                found.append(Term(is_negative, part.operands))
+                terms.append(Term(is_negative, part.operands))
             else:
                 left, right = part.operands
                 waiting.append((is_negative ^ (part.operation == "subtract"), right))
                 waiting.append((is_negative, left))
-        return found
+        return terms
 
 
 def _is_sum(value: Value) -> bool:

@@ -128,13 +128,13 @@ def evaluate(outputs: Sequence[Value], given: Mapping[str, Any]) -> list[np.ndar
         outputs: results of the calculation.
         given: a number or an array for every input that they depend on, by name.
     """
-    found: dict[int, Any] = {}
+    numbers: dict[int, Any] = {}
     with np.errstate(all="ignore"):
         for value in order(outputs):
             if value.operands:
-                parts = [found[part.id] for part in value.operands]
-                found[value.id] = np.asarray(_NUMPY[value.operation](*parts))
+                parts = [numbers[part.id] for part in value.operands]
+                numbers[value.id] = np.asarray(_NUMPY[value.operation](*parts))
             else:
                 number = value.data if value.is_constant else given[value.data]
-                found[value.id] = np.asarray(number, _TYPES[value.kind])
-    return [found[value.id] for value in outputs]
+                numbers[value.id] = np.asarray(number, _TYPES[value.kind])
+    return [numbers[value.id] for value in outputs]

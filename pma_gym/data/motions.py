@@ -45,8 +45,8 @@ class Pieces:
             i = max(bisect_right(self.starts, time + EARLY_S) - 1, 0)
             return self.positions[i] + self.speeds[i] * (time - self.starts[i])
         starts, positions, speeds = self._arrays
-        found = np.maximum(np.searchsorted(starts, time + EARLY_S, side="right") - 1, 0)
-        return positions[found] + speeds[found] * (time - starts[found])
+        piece = np.maximum(np.searchsorted(starts, time + EARLY_S, side="right") - 1, 0)
+        return positions[piece] + speeds[piece] * (time - starts[piece])
 
     @cached_property
     def _arrays(self) -> tuple[NDArray[np.float64], ...]:

@@ -142,9 +142,9 @@ class Effect:
         {'slope': 2.0}
         """
         known = self.parameters._field_defaults
-        found = {door: stem for door, stem in self._doors.items() if stem in known}
+        stems = {door: stem for door, stem in self._doors.items() if stem in known}
         return MappingProxyType(
-            {door: self.quantities[stem].from_si(known[stem]) for door, stem in found.items()}
+            {door: self.quantities[stem].from_si(known[stem]) for door, stem in stems.items()}
         )
 
     def parse(self, values: Mapping[str, Value]) -> Parameters:

@@ -26,9 +26,9 @@ def _parameters(name: str, unit: str, least: float, most: float, usual: tuple[fl
         "reach": Quantity(unit, 1.0, most - least, "how far they go from there", usual=usual[1]),
     }
     fields = ends | {f"h{k}": _HEIGHT for k in range(HEIGHTS)}
-    found = namedtuple(name, fields)
-    found.__annotations__ = {stem: Annotated[float, each] for stem, each in fields.items()}
-    return found
+    tuple_class = namedtuple(name, fields)
+    tuple_class.__annotations__ = {stem: Annotated[float, each] for stem, each in fields.items()}
+    return tuple_class
 
 
 ForceOfContraction = _parameters("ForceOfContraction", "mm", -50, 200, (-10, 70))

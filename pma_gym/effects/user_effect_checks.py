@@ -116,8 +116,8 @@ def _arithmetic(effect: Effect, _module: ModuleType) -> str:
             for name in signals(law)
         ]
         try:
-            found = trace(law, *arguments)
-            pairs = found if effect.memories > 1 else (found,)
+            traced = trace(law, *arguments)
+            pairs = traced if effect.memories > 1 else (traced,)
             if law is effect.rate:
                 if len(pairs) != effect.memories:
                     return f"has {effect.memories} memories, but {law.__name__} gives {len(pairs)}"
@@ -125,7 +125,7 @@ def _arithmetic(effect: Effect, _module: ModuleType) -> str:
                     graph.value(source)
                     graph.value(decay)
             else:
-                graph.value(found)
+                graph.value(traced)
         except Exception as error:
             form = "(source, decay)" if law is effect.rate else "one number"
             return (
@@ -150,14 +150,14 @@ def _absence(effect: Effect, _module: ModuleType) -> str:
             known = {name: abs(value) for name, value in known.items()}
         known |= {"p": effect.neutral, "memory": _memories(effect, lambda _: 0.0)}
         try:
-            found = law(*(known[name] for name in signals(law)))
+            given = law(*(known[name] for name in signals(law)))
         except ZeroDivisionError:
             return f"divides by 0 at its neutral values, in {law.__name__}; change the formula"
         expected = known[absent] if isinstance(absent, str) else absent
-        if found != expected:
+        if given != expected:
             at = ", ".join(f"{n} {known[n]:g}" for n in signals(law) if n not in ("p", "memory"))
             return (
-                f"is not absent at its neutral values: {law.__name__} gives {found:g} at {at} "
+                f"is not absent at its neutral values: {law.__name__} gives {given:g} at {at} "
                 f"(SI), and {expected:g} would change nothing at port {effect.port}"
             )
     return ""

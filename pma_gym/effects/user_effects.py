@@ -67,20 +67,20 @@ def load_effects(path: str | Path) -> list[Effect]:
     if known and all(_sources[name].text == text for name in known):
         return [CATALOGUE[name] for name in known]
     module = _run(path, text)
-    found = _defined(module)
-    if not found:
+    effects = _defined(module)
+    if not effects:
         raise OwnEffectError(
             f"{path}: defines no effect; write NAME = Effect(...) at its top level, with Effect "
             "from pma_gym.effects"
         )
-    for i, effect in enumerate(found):
-        _check(path, module, effect, [other.name for other in found[:i]])
+    for i, effect in enumerate(effects):
+        _check(path, module, effect, [other.name for other in effects[:i]])
     for name in known:
         del CATALOGUE[name], _sources[name]
-    for effect in found:
+    for effect in effects:
         CATALOGUE[effect.name] = effect
         _sources[effect.name] = _Source(path, text, _digest(effect, text))
-    return found
+    return effects
 
 
 def source_of(name: str) -> str:
@@ -127,11 +127,11 @@ def _line(error: BaseException, path: Path) -> str:
 def _defined(module: ModuleType) -> list[Effect]:
     """Effects that the module defines itself, each once."""
     catalogue = {id(effect) for effect in CATALOGUE.values()}
-    found: dict[int, Effect] = {}
+    effects: dict[int, Effect] = {}
     for value in vars(module).values():
         if isinstance(value, Effect) and id(value) not in catalogue:
-            found[id(value)] = value
-    return list(found.values())
+            effects[id(value)] = value
+    return list(effects.values())
 
 
 def _check(path: Path, module: ModuleType, effect: Effect, others: list[str]) -> None:

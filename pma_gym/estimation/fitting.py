@@ -102,10 +102,10 @@ def fit(
 
     with linear_algebra_alone():
         few = residuals(_some(trials)) if len(trials) >= 2 * FEW else None
-        rough = None if few is None else Search(few, central, ROUGH)
+        rough = None if few is None else LevenbergMarquardt(few, central, ROUGH)
         if rough is not None:
             rough.run(progress)
-        search = Search(residuals(trials), central, 1.0, rough)
+        search = LevenbergMarquardt(residuals(trials), central, 1.0, rough)
         return search.result(search.run(progress))
 
 
@@ -114,7 +114,7 @@ def _some(trials: Sequence[Trial]) -> list[Trial]:
     return [trials[i] for i in sorted(chosen)]
 
 
-class Search:
+class LevenbergMarquardt:
     """Parameters on their way to the best.
 
     Args:
@@ -133,7 +133,11 @@ class Search:
     """
 
     def __init__(
-        self, residuals: Residuals, central: bool, rough: float, before: "Search | None" = None
+        self,
+        residuals: Residuals,
+        central: bool,
+        rough: float,
+        before: "LevenbergMarquardt | None" = None,
     ) -> None:
         self.residuals, self.central, self.rough = residuals, central, rough
         self.lower, self.upper = residuals.lower, residuals.upper
@@ -189,8 +193,8 @@ class Search:
             return True
         damped, gain = self._step(self.damping)
         tried = np.clip(self.values + damped, self.lower, self.upper)
-        found = self._sums(tried)
-        lowered = self.best.chi_square - found.chi_square
+        sums = self._sums(tried)
+        lowered = self.best.chi_square - sums.chi_square
         if not lowered > 0.0:
             self.damping = max(10.0 * self.damping, _FIRST_DAMPING)
             self.failures += 1
@@ -200,18 +204,18 @@ class Search:
             self.damping *= 0.1
         elif lowered < 0.1 * gain:
             self.damping *= 5.0
-        self.values, self.best, self.failures = tried, found, 0
+        self.values, self.best, self.failures = tried, sums, 0
         self.rate = self._step(0.0)[1] / promise
         return False
 
     def _last(self, step: Array, promise: float) -> bool:
         """Take a step after which none should be needed; whether chi-square falls as promised."""
         tried = np.clip(self.values + step, self.lower, self.upper)
-        found = self.residuals.sums(tried, np.empty(0)).chi_square
+        chi_square = self.residuals.sums(tried, np.empty(0)).chi_square
         self.simulated += self.residuals.trials
-        if not abs(self.best.chi_square - found - promise) < MISSED * (promise + self.mean):
+        if not abs(self.best.chi_square - chi_square - promise) < MISSED * (promise + self.mean):
             return False
-        self.values, self.best = tried, replace(self.best, chi_square=found)
+        self.values, self.best = tried, replace(self.best, chi_square=chi_square)
         return True
 
     def _sums(self, values: Array) -> Sums:
@@ -220,10 +224,10 @@ class Search:
         # Towards the inside where a bound is near.
         inward = values + self.moves > self.upper
         steps = np.where(inward, -self.moves, self.moves)
-        found = self.residuals.sums(values, steps, self.central)
-        if np.isfinite(found.chi_square):
-            self.moves = self._next_moves(values, found)
-        return found
+        sums = self.residuals.sums(values, steps, self.central)
+        if np.isfinite(sums.chi_square):
+            self.moves = self._next_moves(values, sums)
+        return sums
 
     def _next_moves(self, values: Array, sums: Sums) -> Array:
         shown = np.sqrt(np.diag(sums.curvature) / self.residuals.count)

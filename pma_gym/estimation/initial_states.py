@@ -25,8 +25,8 @@ MOVE = 1e-3
 
 def starts(trials: Sequence[Logged]) -> tuple[Array, Array]:
     """Contraction (m) and its rate (m/s) where trials begin, shape (trials,) each."""
-    found = np.array([_start(logged) for logged in trials])
-    return found[:, 0], found[:, 1]
+    fitted = np.array([_start(logged) for logged in trials])
+    return fitted[:, 0], fitted[:, 1]
 
 
 def meet(states: Array, held: Array, logged: Logged) -> None:

@@ -37,8 +37,8 @@ def least(gradient: Array, curvature: Array, damping: float, low: Array, high: A
     from scipy.optimize import lsq_linear
 
     bounds = np.minimum(low * scale, -1e-300), np.maximum(high * scale, 1e-300)
-    found = lsq_linear(roots[:, None] * across, right, bounds, method="bvls", tol=1e-12)
-    return np.clip(found.x / scale, low, high)
+    solution = lsq_linear(roots[:, None] * across, right, bounds, method="bvls", tol=1e-12)
+    return np.clip(solution.x / scale, low, high)
 
 
 def inverse(curvature: Array) -> Array:
@@ -47,8 +47,7 @@ def inverse(curvature: Array) -> Array:
     scale = np.where(scale > 0.0, scale, 1.0)
     values, vectors = _eigen(curvature / np.outer(scale, scale))
     known = values > 1e-10 * np.max(values, initial=0.0)
-    found = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
-    np.fill_diagonal(
-        found, np.where(np.any(np.abs(vectors[:, ~known]) > 1e-3, axis=1), np.inf, np.diag(found))
-    )
-    return found
+    inverted = (vectors[:, known] / values[known]) @ vectors[:, known].T / np.outer(scale, scale)
+    is_undetermined = np.any(np.abs(vectors[:, ~known]) > 1e-3, axis=1)
+    np.fill_diagonal(inverted, np.where(is_undetermined, np.inf, np.diag(inverted)))
+    return inverted

@@ -71,7 +71,7 @@ def products(trials: Sequence[Signals], threads: int = 1) -> list[Array]:
     Returns:
         Of each trial a symmetric matrix of shape (1 + moved, 1 + moved), summed over its sensors.
     """
-    jobs, kept, found = np.zeros((len(trials), len(_JOB)), np.int64), [], []
+    jobs, kept, results = np.zeros((len(trials), len(_JOB)), np.int64), [], []
     for job, trial in zip(jobs, trials, strict=True):
         tried, rows = trial.simulated[0].shape
         moved = (tried - 1) // 2 if trial.central else tried - 1
@@ -85,12 +85,12 @@ def products(trials: Sequence[Signals], threads: int = 1) -> list[Array]:
         addresses = (array.ctypes.data for array in (entries, scratch, out))
         job[:] = [rows, tried, moved, len(entries), *addresses]
         kept.append((trial, entries, scratch))
-        found.append(out)
+        results.append(out)
     library = compiled(["products"], _module, "products")
     multiply = library.function("products", [ctypes.c_int64, ctypes.c_void_p])
     parts = [np.ascontiguousarray(jobs[k::threads]) for k in range(threads)]
-    share(lambda k: multiply(len(parts[k]), parts[k].ctypes.data), threads, (parts, kept, found))
-    return found
+    share(lambda k: multiply(len(parts[k]), parts[k].ctypes.data), threads, (parts, kept, results))
+    return results
 
 
 def _module() -> Module:
@@ -105,12 +105,12 @@ def _module() -> Module:
 
 def _entries(b: Builder, table: Operand, names: Sequence[str]) -> dict[str, Operand]:
     """What a table of entries says, by name."""
-    found = {}
+    entries = {}
     for i, name in enumerate(names):
-        found[name] = b.load(offset(b, table, i, INTEGER), typ=INTEGER)
+        entries[name] = b.load(offset(b, table, i, INTEGER), typ=INTEGER)
         if name in _ADDRESSES:
-            found[name] = b.inttoptr(found[name], POINTER)
-    return found
+            entries[name] = b.inttoptr(entries[name], POINTER)
+    return entries
 
 
 _ADDRESSES = ("signals", "scratch", "out", "simulated", "measured", "weights")
@@ -160,10 +160,10 @@ def _differ(
     none, half = real(0.0), lanes.constant(0.5)
 
     def gathered(numbers: Sequence[Operand]) -> Operand:
-        found = lanes.constant(0.0)
+        vector = lanes.constant(0.0)
         for k, number in enumerate(numbers):
-            found = lanes.insert(b, found, number, k)
-        return found
+            vector = lanes.insert(b, vector, number, k)
+        return vector
 
     def column(name: str) -> list[Operand]:
         return [b.load(offset(b, given[name], row), typ=DOUBLE) for row in rows]

@@ -168,21 +168,22 @@ class Residuals:
         Raises:
             ValueError: the model cannot balance the load at the beginning of a trial.
         """
-        return [found[0] for found in self._dense(values, np.ones(0), central=False)]
+        return [differences[0] for differences in self._dense(values, np.ones(0), central=False)]
 
     def jacobian(self, values: Array, steps: Array, central: bool = False) -> list[Array]:
         """Derivatives of each trial's residuals, shape (p, rows, 4), as `sums` uses them."""
-        return [found[1:] / steps[:, None, None] for found in self._dense(values, steps, central)]
+        trials = self._dense(values, steps, central)
+        return [differences[1:] / steps[:, None, None] for differences in trials]
 
     def _dense(self, values: Array, steps: Array, central: bool) -> list[Array]:
         def copy(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
-            found = self._differences(logged, states, zeros, vectors, central)
-            return (found / self.deviations[:, None]).transpose(0, 2, 1)
+            dense = self._differences(logged, states, zeros, vectors, central)
+            return (dense / self.deviations[:, None]).transpose(0, 2, 1)
 
-        found = self._each(_moved(values, steps, central), copy)
+        dense = self._each(_moved(values, steps, central), copy)
         if not self._settled:
             raise ValueError("no contraction balances the load at the beginning of a trial")
-        return found
+        return dense
 
     def _each(
         self, tried: Array, work: Callable[[Logged, Array, Array, Array], Array]
@@ -219,13 +220,13 @@ class Residuals:
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
         states, zeros = solver.equilibria_at(self.plant, commands[0], commands[1], every)
-        found: list[Array] = []
+        results: list[Array] = []
         shape = (len(self._trials), count)
         finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
         self._settled = bool(finite.all())
         self.balanced = np.asarray(finite.reshape(shape).all(axis=0))
         if not self._settled:
-            return found
+            return results
         states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
         for block in self._blocks(8 * number * count):
             runs, spaces = [], self._spaces(block, count)
@@ -240,8 +241,8 @@ class Residuals:
             if moved:
                 each = zip(block, spaces, strict=True)
                 spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
-            found += work(block, spaces, zeros[block, : len(tried)], vectors)
-        return found
+            results += work(block, spaces, zeros[block, : len(tried)], vectors)
+        return results
 
     def _moved_starts(self) -> list[tuple[int, float]]:
         """Parameters that say how trials begin, and by how much each is moved once more."""
@@ -298,8 +299,8 @@ class Residuals:
 
     def _places(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
         """Where values (SI) go that a parameter has in each trial, by its path."""
-        found = _free(self.plant.model, list(own))
-        return [(each.place, np.asarray(own[each.path], float)) for each in found]
+        free = _free(self.plant.model, list(own))
+        return [(each.place, np.asarray(own[each.path], float)) for each in free]
 
     def _blocks(self, bytes_a_row: int) -> list[list[int]]:
         """Trials that fit into memory together."""
@@ -332,11 +333,11 @@ class Residuals:
         held = self._held(states, zeros, vectors)
         count, rows = len(states), len(logged.time)
         moved = (count - 1) // 2 if central else count - 1
-        found = np.zeros((1 + moved, len(OUTPUTS), rows))
+        differences = np.zeros((1 + moved, len(OUTPUTS), rows))
         for channel, signal in enumerate(held):
             if not logged.measures[channel]:
                 continue
-            there = found[:, channel]
+            there = differences[:, channel]
             np.subtract(signal[0], logged.measured[channel], out=there[0])
             if central:
                 np.subtract(signal[1 : 1 + moved], signal[1 + moved :], out=there[1:])
@@ -345,7 +346,7 @@ class Residuals:
                 np.subtract(signal[1:], signal[0], out=there[1:])
             if logged.missing[channel].size:
                 there[:, logged.missing[channel]] = 0.0
-        return found
+        return differences
 
     def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
         """What the sensors hold, shape (tried, rows) each."""
@@ -390,7 +391,7 @@ def _moved(values: Array, steps: Array, central: bool) -> Array:
 
 
 def _free(model: Model, paths: Sequence[str]) -> list[Free]:
-    names, found = parameter_names(model), []
+    names, parameters = parameter_names(model), []
     # Its message names the nearest that there is.
     model.replace({path: 0.0 for path in paths if path not in set(model.paths())})
     for path in paths:
@@ -402,5 +403,5 @@ def _free(model: Model, paths: Sequence[str]) -> list[Free]:
                 f"{path} cannot be fitted: it is "
                 + ("a row of numbers" if stem in law.rows else "what residuals are counted in")
             )
-        found.append(Free(path, 1 + names.index(f"{effect}.{stem}"), law.quantities[stem]))
-    return found
+        parameters.append(Free(path, 1 + names.index(f"{effect}.{stem}"), law.quantities[stem]))
+    return parameters

@@ -58,12 +58,12 @@ def solver(
         if last is not None:
             values = last(values)
         for pivot, inverse, across, _ in reversed(steps):
-            found = values[pivot]
+            solution = values[pivot]
             for j, value in across.items():
                 below = values[j]
                 if below is not None:
-                    found = _less(found, value * below)
-            values[pivot] = None if found is None else found * inverse
+                    solution = _less(solution, value * below)
+            values[pivot] = None if solution is None else solution * inverse
         zero = part.graph.constant(0.0)
         return [zero if value is None else value for value in values]
 
@@ -78,19 +78,19 @@ def _inverses(pivots: Mapping[int, Value]) -> dict[int, Value]:
     Args:
         pivots: the numbers, none of them so large or small that their product is no number.
     """
-    found = {i: 1.0 / pivot for i, pivot in pivots.items() if pivot.is_constant}
-    rest = [i for i in pivots if i not in found]
+    inverses = {i: 1.0 / pivot for i, pivot in pivots.items() if pivot.is_constant}
+    rest = [i for i in pivots if i not in inverses]
     if not rest:
-        return found
+        return inverses
     products = [pivots[rest[0]]]
     for i in rest[1:]:
         products.append(products[-1] * pivots[i])
     inverse = 1.0 / products[-1]
     for k in range(len(rest) - 1, 0, -1):
-        found[rest[k]] = inverse * products[k - 1]
+        inverses[rest[k]] = inverse * products[k - 1]
         inverse = inverse * pivots[rest[k]]
-    found[rest[0]] = inverse
-    return found
+    inverses[rest[0]] = inverse
+    return inverses
 
 
 def _coupled(rows: Sequence[Mapping[int, Value]], left: Iterable[int]) -> bool:

@@ -152,8 +152,8 @@ def step(
 def substituted(jacobian: list[list[Entry]], given: Mapping[int, Value]) -> list[list[Entry]]:
     """A matrix with values in the place of others, by id."""
     present = [entry for row in jacobian for entry in row if entry is not None]
-    found = iter(substitute(present, given))
-    return [[None if entry is None else next(found) for entry in row] for row in jacobian]
+    results = iter(substitute(present, given))
+    return [[None if entry is None else next(results) for entry in row] for row in jacobian]
 
 
 def total(start: Value | None, factors: Sequence[Value | float], values: Sequence[Value]) -> Value:

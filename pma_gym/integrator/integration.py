@@ -155,9 +155,9 @@ class Lane:
             given: inputs of level HELD, by id.
         """
         known = {value.id: self.get(value, lane) for value in self.layout.fixed} | given
-        found = self.one.emit(self.builder, self.layout.held, known)
+        emitted = self.one.emit(self.builder, self.layout.held, known)
         for value in self.layout.held:
-            self.put(value, lane, found[value.id])
+            self.put(value, lane, emitted[value.id])
 
 
 def memory(builder: Builder, type_: ir.Type) -> Operand:
@@ -199,19 +199,19 @@ def integrate_lanes(
         for i in range(len(lane.at) + len(lane.own)):
             where = b.add(integer(i * lanes.places), k)
             b.store(zero, offset(b, lane.memory, where, lanes.element))
-        found = take(k)
-        b.store(b.select(found, b.load(lane.job(k), typ=INTEGER), integer(-1)), lane.job(k))
-        b.store(b.add(b.load(active, typ=INTEGER), b.zext(found, INTEGER)), active)
+        has_work = take(k)
+        b.store(b.select(has_work, b.load(lane.job(k), typ=INTEGER), integer(-1)), lane.job(k))
+        b.store(b.add(b.load(active, typ=INTEGER), b.zext(has_work, INTEGER)), active)
     with repeat(b) as leave_if:
         leave_if(b.icmp_signed("<=", b.load(active, typ=INTEGER), integer(0)))
         b.store(b.add(b.load(attempts, typ=INTEGER), integer(1)), attempts)
         known = {value.id: lane.vector(value) for value in layout.slots}
-        found = lanes.emit(b, [*layout.outputs, *extra], known)
+        emitted = lanes.emit(b, [*layout.outputs, *extra], known)
         if watch is not None:
-            watch(found)
+            watch(emitted)
         for value, new in zip(layout.changing, layout.outputs, strict=True):
-            lane.put_vector(value, found[new.id])
-        left = found[attempt.next_left.id]
+            lane.put_vector(value, emitted[new.id])
+        left = emitted[attempt.next_left.id]
         finished = b.fcmp_ordered("<=", left, lanes.constant(0.0))
         with b.if_then(lanes.any(b, finished)):
             with loop(b, lanes.width) as k:

@@ -39,10 +39,10 @@ def rates(eq: Equations) -> list[Value]:
 
     frozen, here = step_start(eq)
     own = [state.rate for state in eq.states if state.name not in COMMANDS]
-    found = substitute(own, {**frozen, **here})
+    rates_there = substitute(own, {**frozen, **here})
     for memory in eq.rate_independent_states:
         assert eq.travelled is not None
         (slope,) = derivative(memory.after, [eq.travelled[0]])
         assert slope is not None
-        found.append(substitute([slope], frozen)[0] * eq.travelled[1])
-    return found
+        rates_there.append(substitute([slope], frozen)[0] * eq.travelled[1])
+    return rates_there

@@ -83,8 +83,8 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             larger = b.fcmp_ordered(">", moves, moved)
             moved = b.select(larger, moves, moved)
         size = lane.get(made.size, k)
-        found = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
-        lane.put(made.size, k, b.select(linear, size, found[begun.id]))
+        emitted = lane.one.emit(b, [begun], {made.size.id: size, jump.id: moved})
+        lane.put(made.size, k, b.select(linear, size, emitted[begun.id]))
         lane.hold(k, known)
         b.store(row, offset(b, rows, k, INTEGER))
 
@@ -95,8 +95,8 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
 
     def take(k: Operand) -> Operand:
         job = b.atomic_rmw("add", atomic(b, taken), integer(1), "monotonic")
-        found = b.icmp_signed("<", job, count)
-        with b.if_then(found):
+        is_job = b.icmp_signed("<", job, count)
+        with b.if_then(is_job):
             b.store(job, lane.job(k))
             start = address(job, "start")
             for i, state in enumerate(eq.remembered):
@@ -105,7 +105,7 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
             lane.tabulate(k, address(job, "table"))
             keep(k, job, integer(0))
             begin_row(k, job, integer(0))
-        return found
+        return is_job
 
     def proceed(k: Operand) -> Operand:
         job = b.load(lane.job(k), typ=INTEGER)

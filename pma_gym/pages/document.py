@@ -136,7 +136,7 @@ def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
     page = _PAGE.read_text(encoding="utf-8")
     # Once and together: a title may hold `{body}`.
     parts = {"{title}": html.escape(printable(title)), "{body}": printable(body)}
-    return re.sub(r"\{(?:title|body)\}", lambda found: parts[found[0]], page)
+    return re.sub(r"\{(?:title|body)\}", lambda match: parts[match[0]], page)
 
 
 def _markdown_table(table: TextTable) -> str:
@@ -157,7 +157,7 @@ def _cell(text: str) -> str:
 
 def _without_tags(text: str) -> str:
     """Text of Markdown that holds no HTML; `code` stays as it is."""
-    return re.sub(r"(`[^`\n]*`)|<(?=[A-Za-z/!?])", lambda found: found[1] or "&lt;", text)
+    return re.sub(r"(`[^`\n]*`)|<(?=[A-Za-z/!?])", lambda match: match[1] or "&lt;", text)
 
 
 def _html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
@@ -211,7 +211,7 @@ def _html_header(table: TextTable) -> str:
     """One row of column names, or two where columns share a group."""
     top, below = [], []
     names = [name.partition(_GROUP) for name in table.header]
-    grouped = any(found for _, found, _ in names)
+    grouped = any(title for _, title, _ in names)
     for group, same in groupby(enumerate(names), key=_group_of):
         members = list(same)
         index, (name, _, _) = members[0]
@@ -228,8 +228,8 @@ def _html_header(table: TextTable) -> str:
 
 def _group_of(column: tuple[int, tuple[str, str, str]]) -> str | int:
     """The name of a column's group; its own number if it has none."""
-    index, (group, found, _) = column
-    return group if found else index
+    index, (group, group_title, _) = column
+    return group if group_title else index
 
 
 def _verdict_class(cell: str) -> str:

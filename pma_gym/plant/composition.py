@@ -129,8 +129,8 @@ class PlantEquations(Equations):
                 self._add_memory(effect, effect.rate)
 
     def _add_memory(self, effect: Effect, law: Callable) -> None:
-        found = self.call(effect, law)
-        rates = found if effect.memories > 1 else (found,)
+        pairs = self.call(effect, law)
+        rates = pairs if effect.memories > 1 else (pairs,)
         for name, rate in zip(effect.memory_names, rates, strict=True):
             self.add_decaying(name, rate, effect.memory_scale)
 

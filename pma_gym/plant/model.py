@@ -296,9 +296,9 @@ def parse_model(document: Mapping[str, Any]) -> Model:
     tables = {key: value for key, value in document.items() if key not in _HEAD}
     parameters, notes = {}, {}
     for effect, table in tables.items():
-        values, found = _split(effect, table)
+        values, table_notes = _split(effect, table)
         parameters[effect] = _parse(effect, values)
-        notes |= found
+        notes |= table_notes
     head = {key: document[key] for key in ("name", "title", "plant")}
     return Model(**head, parameters=parameters, notes=notes)
 

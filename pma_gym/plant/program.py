@@ -171,9 +171,9 @@ class Program:
         fixed = self.first_order_hold.layout.fixed
         b, (vector, out) = function(module, "table", [("vector", POINTER), ("out", POINTER)])
         # Without fused products: the table may be made in other ways, of the same bits.
-        found = SimdEmitter(1).emit(b, fixed, self.parameters(b, vector, fixed))
+        emitted = SimdEmitter(1).emit(b, fixed, self.parameters(b, vector, fixed))
         for i, value in enumerate(fixed):
-            b.store(found[value.id], offset(b, out, i))
+            b.store(emitted[value.id], offset(b, out, i))
         b.ret_void()
         b, _ = function(module, "table_size", [], INTEGER)
         b.ret(integer(len(fixed)))
@@ -196,10 +196,10 @@ class Program:
             for i, name in enumerate(given):
                 where = b.add(b.mul(row, integer(len(given))), integer(i))
                 known[eq[name].id] = b.load(offset(b, inputs, where), typ=DOUBLE)
-            found = SimdEmitter(1).emit(b, rates, known)
+            emitted = SimdEmitter(1).emit(b, rates, known)
             for i, rate in enumerate(rates):
                 where = b.add(b.mul(row, integer(len(rates))), integer(i))
-                b.store(found[rate.id], offset(b, out, where))
+                b.store(emitted[rate.id], offset(b, out, where))
         b.ret_void()
 
     def rates(self) -> list[Value]:
@@ -221,10 +221,10 @@ class Program:
             for i, entry in enumerate(eq.remembered):
                 where = b.add(b.mul(row, integer(n)), integer(i))
                 known[entry.value.id] = b.load(offset(b, states, where), typ=DOUBLE)
-            found = SimdEmitter(1).emit(b, outputs, known)
+            emitted = SimdEmitter(1).emit(b, outputs, known)
             for i, value in enumerate(outputs):
                 where = b.add(b.mul(row, integer(len(outputs))), integer(i))
-                b.store(found[value.id], offset(b, out, where))
+                b.store(emitted[value.id], offset(b, out, where))
         b.ret_void()
 
     def _balance(self, module: Module) -> None:
@@ -246,8 +246,8 @@ class Program:
             known[eq["pressure"].id] = b.load(offset(b, pressures, row), typ=DOUBLE)
             load = b.load(offset(b, loads, row), typ=DOUBLE)
             reach = [b.load(offset(b, vector, i), typ=DOUBLE) for i in (stretch, contraction)]
-            found = balanced(b, eq, force, known, load, reach)
-            b.store(found, offset(b, out, row))
+            balancing = balanced(b, eq, force, known, load, reach)
+            b.store(balancing, offset(b, out, row))
         b.ret_void()
 
 
@@ -279,8 +279,9 @@ def balanced(
     with loop(b, HALVINGS):
         a, c = b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE)
         middle = b.fmul(real(0.5), b.fadd(a, c))
-        found = SimdEmitter(1).emit(b, [force], {**known, eq["contraction"].id: middle})[force.id]
-        pulls = b.fcmp_ordered(">", found, load)
+        there = {**known, eq["contraction"].id: middle}
+        emitted = SimdEmitter(1).emit(b, [force], there)
+        pulls = b.fcmp_ordered(">", emitted[force.id], load)
         b.store(b.select(pulls, middle, a), low)
         b.store(b.select(pulls, c, middle), high)
     half = b.fadd(b.load(low, typ=DOUBLE), b.load(high, typ=DOUBLE))

@@ -37,8 +37,8 @@ SENSORS = {
 
 def noise_levels(model: Model) -> np.ndarray:
     """Standard deviations of the four sensors (m, rad, N, Pa); 0 for one without noise."""
-    found = [model.parameters.get(name) for name in SENSORS]
-    return np.array([getattr(sensor, "noise", 0.0) for sensor in found])
+    sensors = [model.parameters.get(name) for name in SENSORS]
+    return np.array([getattr(sensor, "noise", 0.0) for sensor in sensors])
 
 
 def read(lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray) -> np.ndarray:
@@ -117,7 +117,7 @@ def _voltage(
     if wished is None or line is None:
         choice = f"{voltage}_v or {BY_QUANTITY[wish].name}" if line else f"{voltage}_v"
         raise TrialError(f"the trial does not command the {voltage.split('_')[0]}: give {choice}")
-    found = (wished - line.offset) / line.gain
+    volts = (wished - line.offset) / line.gain
     lowest, highest = VOLTAGE_RANGE
     low, high = max(least, line.gain * lowest + line.offset), line.gain * highest + line.offset
     margin = _ROUNDING * line.gain
@@ -131,7 +131,7 @@ def _voltage(
             + (_NO_PUSH if wish == "load_command" and wished[at] < 0.0 == least else _MENDS[wish]),
             at,
         )
-    return np.clip(found, *VOLTAGE_RANGE)
+    return np.clip(volts, *VOLTAGE_RANGE)
 
 
 def _command(trial: Trial, name: str) -> np.ndarray | None:

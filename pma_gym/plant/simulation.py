@@ -112,8 +112,8 @@ def _rows(program: Program, run: Run) -> int:
     check_interpolation(run.interpolation)
     rows, *others = len(run.time), len(run.motor), len(run.regulator)
     if others != [rows, rows]:
-        found = sorted({rows, *others})
-        raise ValueError(f"time, motor and regulator of a run must have one length; got {found}")
+        lengths = sorted({rows, *others})
+        raise ValueError(f"time, motor and regulator of a run must have one length; got {lengths}")
     if run.table.shape != (program.table_size,) or run.state.shape != (len(program.states),):
         raise ValueError(
             f"all runs of one call must be of models of one structure (the same effects): a table "

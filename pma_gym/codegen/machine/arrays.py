@@ -38,8 +38,8 @@ def _is_known(array: np.ndarray) -> bool:
         return False
     if ctypes.c_int.from_address(begin + DIMENSIONS).value != array.ndim:
         return False
-    found = [pointer(SIZES), pointer(STRIDES)]
-    return None not in found and all(
-        tuple((ctypes.c_int64 * array.ndim).from_address(at or 0)) == told
-        for at, told in zip(found, (array.shape, array.strides), strict=True)
+    pointers = [pointer(SIZES), pointer(STRIDES)]
+    return None not in pointers and all(
+        tuple((ctypes.c_int64 * array.ndim).from_address(at or 0)) == known
+        for at, known in zip(pointers, (array.shape, array.strides), strict=True)
     )

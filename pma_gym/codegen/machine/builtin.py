@@ -46,8 +46,8 @@ class _Definition(ctypes.Structure):
 @cache
 def addresses() -> dict[str, int]:
     """Address of every function of the interface."""
-    found = {name: getattr(ctypes.pythonapi, name) for name in INTERFACE}
-    return {name: ctypes.cast(one, ctypes.c_void_p).value or 0 for name, one in found.items()}
+    symbols = {name: getattr(ctypes.pythonapi, name) for name in INTERFACE}
+    return {name: ctypes.cast(one, ctypes.c_void_p).value or 0 for name, one in symbols.items()}
 
 
 def builtin(address: int, name: str, bound: object) -> Callable[[Any], Any]:

@@ -172,8 +172,8 @@ LOOKS = 10_000
 
 def _external(module: ir.Module, name: str, returns: ir.Type) -> Operand:
     """A function of the process without arguments."""
-    found = module.globals.get(name)
-    return found or ir.Function(module, ir.FunctionType(returns, []), name)
+    symbol = module.globals.get(name)
+    return symbol or ir.Function(module, ir.FunctionType(returns, []), name)
 
 
 def intrinsic(builder: Builder, name: str, *arguments: Operand) -> Operand:

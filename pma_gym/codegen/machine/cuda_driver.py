@@ -146,13 +146,13 @@ class Gpu:
             name: the kernel's name in it.
             threads: threads of a block.
         """
-        key, found = digest([text]), ctypes.c_void_p()
+        key, handle = digest([text]), ctypes.c_void_p()
         with self._current():
             if key not in self._modules:
                 self._modules[key] = self._driver.load(text)
             module = self._modules[key]
-            self._driver("cuModuleGetFunction", ctypes.byref(found), module, name.encode())
-        return Function(self, found, threads)
+            self._driver("cuModuleGetFunction", ctypes.byref(handle), module, name.encode())
+        return Function(self, handle, threads)
 
     def call(self, name: str, *arguments: Any) -> None:
         """Call a function of the driver in this GPU's context."""

@@ -81,11 +81,11 @@ class Library:
             KeyError: there is none of this name.
         """
         try:
-            found = _jit().lookup(self._unit, name)
+            address = _jit().lookup(self._unit, name)
         except RuntimeError as error:
             raise KeyError(f"no function {name} in library {self.name}: {error}") from error
-        _alive.append(found)
-        return found[name]
+        _alive.append(address)
+        return address[name]
 
     def function(
         self,

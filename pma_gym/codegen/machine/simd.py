@@ -102,18 +102,18 @@ class SimdEmitter:
         Raises:
             KeyError: an input that is not among the known.
         """
-        found = dict(known)
-        todo = _missing(outputs, found)
+        emitted = dict(known)
+        todo = _missing(outputs, emitted)
         sums = Sums(todo, outputs) if self.fused else Sums((), ())
         for value in todo:
             if value.is_constant:
-                found[value.id] = self.constant(value.data, value.kind)
+                emitted[value.id] = self.constant(value.data, value.kind)
             elif value.id in sums.terms:
-                found[value.id] = self._sum(builder, sums.terms[value.id], found)
+                emitted[value.id] = self._sum(builder, sums.terms[value.id], emitted)
             elif value.id not in sums.within:
-                parts = [found[part.id] for part in value.operands]
-                found[value.id] = self._one(builder, value, parts)
-        return found
+                parts = [emitted[part.id] for part in value.operands]
+                emitted[value.id] = self._one(builder, value, parts)
+        return emitted
 
     def _one(self, builder: Builder, value: Value, parts: list[Operand]) -> Operand:
         operation = value.operation
@@ -156,15 +156,15 @@ class SimdEmitter:
         "from_bits": _from_bits,
     }
 
-    def _sum(self, builder: Builder, terms: Sequence[Term], found: dict[int, Operand]) -> Operand:
+    def _sum(self, builder: Builder, terms: Sequence[Term], emitted: dict[int, Operand]) -> Operand:
         """A sum of terms in their order, products rounded together with their sum."""
         first, *others = terms
-        total, is_negative = self._first(builder, first, found), first.is_negative
+        total, is_negative = self._first(builder, first, emitted), first.is_negative
         for term in others:
             differs = term.is_negative != is_negative
             # What was subtracted so far is subtracted from the first term that is not.
             turns = differs and is_negative
-            own, *factor = [found[value.id] for value in term.factors]
+            own, *factor = [emitted[value.id] for value in term.factors]
             if factor:
                 if turns:
                     total = builder.fneg(total)
@@ -178,8 +178,8 @@ class SimdEmitter:
             is_negative &= not turns
         return builder.fneg(total) if is_negative else total
 
-    def _first(self, builder: Builder, term: Term, found: dict[int, Operand]) -> Operand:
-        own, *factor = [found[value.id] for value in term.factors]
+    def _first(self, builder: Builder, term: Term, emitted: dict[int, Operand]) -> Operand:
+        own, *factor = [emitted[value.id] for value in term.factors]
         return builder.fmul(own, *factor) if factor else own
 
     def load(
@@ -285,13 +285,13 @@ class SimdEmitter:
         return builder.icmp_unsigned(sign, builder.bitcast(truths, mask), ir.Constant(mask, bits))
 
 
-def _missing(outputs: Sequence[Value], found: Mapping[int, Operand]) -> list[Value]:
+def _missing(outputs: Sequence[Value], emitted: Mapping[int, Operand]) -> list[Value]:
     """What is yet to be computed, in order."""
     seen: dict[int, Value] = {}
-    waiting = [value for value in outputs if value.id not in found]
+    waiting = [value for value in outputs if value.id not in emitted]
     while waiting:
         value = waiting.pop()
-        if value.id in seen or value.id in found:
+        if value.id in seen or value.id in emitted:
             continue
         if value.operation == "input":
             raise KeyError(f"input {value.data} is not given")

@@ -110,7 +110,7 @@ class _Board:
             [np.array([part.ctypes.data for part in share], np.int64) for share in shares]
             for _, shares in works
         ]
-        self._told = [
+        self._parts = [
             np.array([(len(table), table.ctypes.data, address) for table in tables], np.int64)
             for (address, _), tables in zip(works, self._tables, strict=True)
         ]
@@ -123,7 +123,7 @@ class _Board:
 
     def prepare(self, work: int) -> None:
         """Have that work done from now on; nobody looks at it before the next is announced."""
-        self._numbers[:, PARTS : FUNCTION + 1] = self._told[work]
+        self._numbers[:, PARTS : FUNCTION + 1] = self._parts[work]
         self.ready = work
 
     def announce(self) -> None:
@@ -212,7 +212,7 @@ def _write_take(module: ir.Module) -> None:
     shares, threads, own = (
         b.load(offset(b, pool, place, INTEGER), typ=INTEGER) for place in (SHARES, THREADS, OWN)
     )
-    found, ahead = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
+    part, ahead = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
     with repeat(b) as leave_if:
         number = b.load(ahead, typ=INTEGER)
         leave_if(b.icmp_signed(">=", number, threads))
@@ -225,18 +225,18 @@ def _write_take(module: ir.Module) -> None:
                 more = b.add(taken, integer(1))
                 tried = b.cmpxchg(atomic(b, share, TAKEN), taken, more, "acq_rel", "acquire")
                 with b.if_then(b.extract_value(tried, 1)):
-                    b.store(_arguments(b, share, b.sub(taken, end)), found)
+                    b.store(_arguments(b, share, b.sub(taken, end)), part)
                     b.store(b.ptrtoint(share, INTEGER), offset(b, pool, FROM, INTEGER))
             with none:
                 b.store(b.add(number, integer(1)), ahead)
-        leave_if(b.icmp_signed("!=", b.load(found, typ=INTEGER), integer(0)))
-    b.ret(b.load(found, typ=INTEGER))
+        leave_if(b.icmp_signed("!=", b.load(part, typ=INTEGER), integer(0)))
+    b.ret(b.load(part, typ=INTEGER))
     # The part in whose midst it is taken is not done before both are.
     b, (pool,) = function(module, "another", [("thread pool", POINTER)], INTEGER)
-    found = b.call(module.get_global("take"), [pool])
-    with b.if_then(b.icmp_signed("!=", found, integer(0))):
+    part = b.call(module.get_global("take"), [pool])
+    with b.if_then(b.icmp_signed("!=", part, integer(0))):
         _done(b, pool)
-    b.ret(found)
+    b.ret(part)
 
 
 def _arguments(b: Builder, share: Operand, before_end: Operand) -> Operand:

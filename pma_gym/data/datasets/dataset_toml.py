@@ -91,8 +91,8 @@ def _parsed(path: Path) -> dict[str, Any]:
         raise TrialError(str(error)) from None
 
 
-def _check_keys(place: str, found: Iterable[str], known: Sequence[str]) -> None:
-    for key in found:
+def _check_keys(place: str, keys: Iterable[str], known: Sequence[str]) -> None:
+    for key in keys:
         if key not in known:
             raise TrialError(
                 f"{place} takes {', '.join(known)}, got {key!r}{suggestion(key, known)}; remove or "

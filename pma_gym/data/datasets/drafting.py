@@ -58,7 +58,7 @@ def seen_columns(folder: Path, description: Description) -> tuple[list[SeenColum
             if name:
                 numbers.setdefault(name, []).append(_numbers(table, index))
                 units.setdefault(name, table.units.get(index, ""))
-    found, taken = [], set()
+    columns, taken = [], set()
     for name, parts in numbers.items():
         values = np.concatenate(parts)
         there = values[np.isfinite(values)]
@@ -67,8 +67,8 @@ def seen_columns(folder: Path, description: Description) -> tuple[list[SeenColum
         if guess is not None:
             taken.add(guess.column.quantity)
         low, high = (float(there.min()), float(there.max())) if there.size else (np.nan, np.nan)
-        found.append(SeenColumn(name, units[name], low, high, len(parts), guess, chosen))
-    return found, len(tables)
+        columns.append(SeenColumn(name, units[name], low, high, len(parts), guess, chosen))
+    return columns, len(tables)
 
 
 def draft(title: str, model: str, columns: Sequence[SeenColumn], proposals: Sequence[str]) -> str:
@@ -129,5 +129,5 @@ def _numbers(table: Table, index: int) -> NDArray[np.float64]:
     if seconds is not None:
         return np.asarray(seconds, float)
     mark = decimal_mark([cells])
-    found = [cell_number(cell, mark) for cell in cells]
-    return np.array([np.nan if number is None else number for number in found], float)
+    numbers = [cell_number(cell, mark) for cell in cells]
+    return np.array([np.nan if number is None else number for number in numbers], float)

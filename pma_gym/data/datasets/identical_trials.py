@@ -24,12 +24,12 @@ def copies(trials: Sequence[Trial]) -> dict[int, int]:
         Index of the earlier one by the index of the copy.
     """
     seen: dict[str, int] = {}
-    found = {}
+    originals = {}
     for number, trial in enumerate(trials):
         first = seen.setdefault(_content(trial), number)
         if first != number:
-            found[number] = first
-    return found
+            originals[number] = first
+    return originals
 
 
 def _content(trial: Trial) -> str:

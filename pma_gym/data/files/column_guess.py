@@ -73,8 +73,8 @@ def guess_column(name: str, unit: str, values: Array) -> Guess | None:
     """
     if name in BY_NAME:
         return Guess(BY_NAME[name], 1.0, "its name")
-    stem, found = _split(name)
-    unit = unit_of(unit) or found
+    stem, suffix_unit = _split(name)
+    unit = unit_of(unit) or suffix_unit
     words = re.findall(r"[^\W\d_]+", re.sub(r"(?<=[a-z])(?=[A-Z])", " ", stem).lower())
     for quantity, known in _WORDS.items():
         if not any(word in known for word in words):

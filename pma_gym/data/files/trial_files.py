@@ -207,12 +207,12 @@ def _match(table: Table, mapping: ColumnMap) -> list[Source]:
     twice = sorted(name for name, count in counted.items() if count > 1)
     if twice:
         raise TrialError(f"{table.file} has the column {twice[0]!r} twice; rename or remove one")
-    found, unknown = sources(table.header, mapping, table.file)
+    matched, unknown = sources(table.header, mapping, table.file)
     strange = [f"{shown(name)}{suggestion(name)}" for name in unknown.values() if name]
     strange += [f"column {index + 1}, which has no name" for index, n in unknown.items() if not n]
     strange = _few(strange)
     absent = [f"{shown(name)}{suggestion(name, named)}" for name in mapping if name not in counted]
-    if not any(source.column.quantity == "time" for source in found):
+    if not any(source.column.quantity == "time" for source in matched):
         kind = TrialError if len(named) > 1 else UnreadableError
         raise kind(
             f"{table.file} has no column time_s; its columns are "
@@ -223,7 +223,7 @@ def _match(table: Table, mapping: ColumnMap) -> list[Source]:
         warn(f"{table.file}: unknown columns are ignored: {', '.join(strange)}")
     if absent:
         warn(f"{table.file} lacks columns that [columns] maps: {', '.join(absent)}")
-    return found
+    return matched
 
 
 def _time_hint(names: Iterable[str]) -> str:

@@ -54,10 +54,10 @@ def looks_like(name: str) -> tuple[Column, float] | None:
         for known in stems
         if not unit or unit in FACTORS[BY_NAME[column].unit]
     ]
-    likeness, found = max(close, default=(0.0, ""), key=lambda pair: pair[0])
+    likeness, nearest = max(close, default=(0.0, ""), key=lambda pair: pair[0])
     if likeness < _ALIKE:
         return None
-    column = BY_NAME[found]
+    column = BY_NAME[nearest]
     return column, FACTORS[column.unit].get(unit, 1.0)
 
 
@@ -75,9 +75,9 @@ def strange_columns(header: Sequence[str], mapping: ColumnMap, trial: Trial) -> 
     held = {"time", *trial.commands, *trial.measurements}
     hints = []
     for name in strange:
-        found = looks_like(name)
-        if found and found[0].quantity not in held:
-            hints.append((name, *found))
+        likely = looks_like(name)
+        if likely and likely[0].quantity not in held:
+            hints.append((name, *likely))
     said = f"unknown columns are ignored: {', '.join(map(repr, strange))}"
     if hints:
         meant = ", ".join(f"{name!r} looks like {column.name}" for name, column, _ in hints)

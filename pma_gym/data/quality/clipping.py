@@ -75,13 +75,13 @@ def ends(trials: Sequence[Trial]) -> list[End]:
     Returns:
         The ends, in the order of the columns, the upper one of a sensor first.
     """
-    found = []
+    limits = []
     for quantity in MEASUREMENTS:
         for sign in (1.0, -1.0):
             end = _end(trials, quantity, sign)
             if end is not None:
-                found.append(end)
-    return found
+                limits.append(end)
+    return limits
 
 
 def without(trials: Sequence[Trial], clipped: Sequence[End]) -> list[Trial]:
@@ -158,8 +158,8 @@ def _jumps(row: Array, start: int, stop: int, step: float) -> bool:
 def _closed(there: Rows) -> Rows:
     """The rows, with short gaps between them."""
     closed = there.copy()
-    found = list(runs(there))
-    for (_, stop), (start, _) in zip(found, found[1:], strict=False):
+    stretches = list(runs(there))
+    for (_, stop), (start, _) in zip(stretches, stretches[1:], strict=False):
         if start - stop <= NEAR:
             closed[stop:start] = True
     return closed

@@ -62,7 +62,7 @@ def gaps(trial: Trial) -> list[Gap]:
         return []
     usual = float(np.median(steps))
     limit = max(LONGEST_S, TIMES * usual)
-    found = [
+    missing = [
         Gap(
             int(at),
             int(at) + 1,
@@ -72,9 +72,9 @@ def gaps(trial: Trial) -> list[Gap]:
         for at in np.flatnonzero(steps > limit)
     ]
     for name, values in trial.commands.items():
-        found += _without_command(BY_QUANTITY[name].name, values, trial.time, limit)
+        missing += _without_command(BY_QUANTITY[name].name, values, trial.time, limit)
     kept: list[Gap] = []
-    for gap in sorted(found, key=lambda each: each.last):
+    for gap in sorted(missing, key=lambda each: each.last):
         if not kept or gap.last >= kept[-1].first:
             kept.append(gap)
     return kept
@@ -97,10 +97,10 @@ def _without_command(name: str, values: Array, time: Array, limit: float) -> Ite
         yield Gap(int(last), int(first), since, until, int(first - last) - 1, name)
 
 
-def pieces(trial: Trial, found: list[Gap]) -> list[Trial]:
+def pieces(trial: Trial, missing: list[Gap]) -> list[Trial]:
     """What lies between gaps, less pieces that are too short to tell anything."""
-    starts = [0, *(gap.first for gap in found)]
-    stops = [*(gap.last + 1 for gap in found), len(trial)]
+    starts = [0, *(gap.first for gap in missing)]
+    stops = [*(gap.last + 1 for gap in missing), len(trial)]
     kept = []
     for start, stop in zip(starts, stops, strict=True):
         long = stop > start and trial.time[stop - 1] - trial.time[start] >= LEAST_S

@@ -13,7 +13,7 @@ from pma_gym.discovery.fitting.free_parameters import FreeParameters, values
 from pma_gym.discovery.preparation.assumed_range import LEAST_GAIN, MOST_DOUBLINGS
 from pma_gym.discovery.preparation.noise import Whitening
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
-from pma_gym.estimation.fitting import Search
+from pma_gym.estimation.fitting import LevenbergMarquardt
 from pma_gym.estimation.least_squares import inverse
 from pma_gym.plant.model import Model
 
@@ -245,7 +245,7 @@ class FitProblem:
         if reach:
             whitened = self.whitened_residuals(model, extra, trials, reach)
         try:
-            search = Search(whitened, False, 1.0)
+            search = LevenbergMarquardt(whitened, False, 1.0)
         except ValueError:
             return None
         converged = search.run(None, ROUNDS)
@@ -255,7 +255,7 @@ class FitProblem:
                 break
             wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
             whitened = self.whitened_residuals(_at(model, search), extra, trials, wider)
-            further = Search(whitened, False, 1.0)
+            further = LevenbergMarquardt(whitened, False, 1.0)
             ended = further.run(None, ROUNDS)
             if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
                 break
@@ -273,6 +273,6 @@ class FitProblem:
         )
 
 
-def _at(model: Model, search: Search) -> Model:
+def _at(model: Model, search: LevenbergMarquardt) -> Model:
     """A model with the parameters that a search is at."""
     return model.replace(search.named(search.values))

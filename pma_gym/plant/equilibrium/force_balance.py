@@ -59,14 +59,14 @@ def _settle_by_angle(problem: EquilibriumProblem) -> None:
         load = _drive_load(problem)
         problem["angle"] = 0.0
         problem["contraction"] = _balance(problem, np.maximum(load, 0.0))
-        found = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
-        near = ~(np.abs(found - angle) > _NEAR_RAD)
+        wanted = np.where(load > 0.0, _taut_angles(problem, load), 0.0)
+        near = ~(np.abs(wanted - angle) > _NEAR_RAD)
         contraction = np.where(done, contraction, problem["contraction"])
         with np.errstate(invalid="ignore", divide="ignore"):
-            share = (angle - before) / (angle - before - (found - asked))
+            share = (angle - before) / (angle - before - (wanted - asked))
         share = np.where(np.isfinite(share), np.clip(share, 0.2, 2.0), 0.5)
-        before, asked = angle, found
-        angle = np.where(done, angle, np.where(near, found, angle + share * (found - angle)))
+        before, asked = angle, wanted
+        angle = np.where(done, angle, np.where(near, wanted, angle + share * (wanted - angle)))
         done = done | near
         if np.all(done):
             break
@@ -84,8 +84,8 @@ def _balance(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
     limits = problem.parameters("limits")
     low, high = -2.0 * limits["stretch"], 2.0 * limits["contraction"]
     at_low, at_high = problem.force(low), problem.force(high)
-    found = balances(problem.plant, problem["pressure"], loads, problem.vectors)
-    found = np.where((loads == 0.0) & (at_low == 0.0) & (at_high == 0.0), 0.0, found)
+    contraction = balances(problem.plant, problem["pressure"], loads, problem.vectors)
+    contraction = np.where((loads == 0.0) & (at_low == 0.0) & (at_high == 0.0), 0.0, contraction)
     outside = ~((at_low - loads) * (at_high - loads) <= 0.0)
     if np.any(outside):
         ends = np.broadcast_to(1e3 * low, outside.shape), np.broadcast_to(1e3 * high, outside.shape)
@@ -94,7 +94,7 @@ def _balance(problem: EquilibriumProblem, loads: np.ndarray) -> np.ndarray:
             "no contraction between {:g} and {:g} mm balances a load of {:.4g} N (the muscle gives "
             "{:.4g} to {:.4g} N there); lower the first motor voltage or raise the pressure"
         ).format(*numbers)
-    return np.where(outside, np.nan, found)
+    return np.where(outside, np.nan, contraction)
 
 
 def balances(
@@ -160,14 +160,14 @@ def _roots(
     Each row stops by itself, so that its bits do not depend on the others.
     """
     at_low, at_high = function(low), function(high)
-    found, done = high, np.zeros(low.shape, bool)
+    root, done = high, np.zeros(low.shape, bool)
     for _ in range(_MOST_SECANTS):
         with np.errstate(invalid="ignore", divide="ignore"):
             middle = high - at_high * (high - low) / (at_high - at_low)
         middle = np.where((middle >= low) & (middle <= high), middle, 0.5 * (low + high))
         value = function(middle)
-        near = np.abs(middle - found) <= 1e-15 + 1e-14 * np.abs(middle)
-        found = np.where(done, found, middle)
+        near = np.abs(middle - root) <= 1e-15 + 1e-14 * np.abs(middle)
+        root = np.where(done, root, middle)
         done = done | near | ~(value != 0.0) | np.isnan(value)
         if np.all(done):
             break
@@ -176,4 +176,4 @@ def _roots(
         at_high = np.where(above, 0.5 * at_high, value)
         at_low = np.where(above, value, 0.5 * at_low)
         low, high = np.where(above, middle, low), np.where(above, high, middle)
-    return found
+    return root

@@ -159,11 +159,12 @@ def _settle_pressure(problem: EquilibriumProblem) -> None:
         return
     with np.errstate(divide="ignore", invalid="ignore"):
         problem.relax("pressure")
-        found, line = problem["pressure"].copy(), problem.parameters("regulator_line")
+        pressure, line = problem["pressure"].copy(), problem.parameters("regulator_line")
         settled = np.abs(problem.rate("pressure")) <= _STEADY
         asked = np.maximum(line["gain"] * problem.inputs[:, 1] + line["offset"], 0.0)
         problem.relax("pressure", about=asked)
-    found = np.where(settled, found, problem["pressure"])
+    pressure = np.where(settled, pressure, problem["pressure"])
     if "regulator_deadband" in problem.plant.effects:
-        found = np.where(problem.parameters("regulator_deadband")["width"] > 0.0, asked, found)
-    problem["pressure"] = found
+        width = problem.parameters("regulator_deadband")["width"]
+        pressure = np.where(width > 0.0, asked, pressure)
+    problem["pressure"] = pressure

@@ -136,10 +136,10 @@ def follow(
     pressure = pressure_grid(model, _GRID)
     misses = []
     for rest in pressure:
-        found = _scheduled(model, device, angle, moment, float(rest), 0.0)
-        if isinstance(found, Schedule):
-            return found
-        misses.append(found)
+        schedule = _scheduled(model, device, angle, moment, float(rest), 0.0)
+        if isinstance(schedule, Schedule):
+            return schedule
+        misses.append(schedule)
     raise UnreachableError(min(misses, key=lambda miss: miss.distance))
 
 
@@ -163,10 +163,10 @@ def follow_from(
     Raises:
         UnreachableError: where it fails most, and what could be given there.
     """
-    found = _scheduled(model, device, angle, moment, rest_pressure, rest_moment)
-    if isinstance(found, Miss):
-        raise UnreachableError(found)
-    return found
+    schedule = _scheduled(model, device, angle, moment, rest_pressure, rest_moment)
+    if isinstance(schedule, Miss):
+        raise UnreachableError(schedule)
+    return schedule
 
 
 def constant_moments(
@@ -184,14 +184,14 @@ def constant_moments(
     """
     angle = FULL_ANGLE * np.linspace(0.0, 1.0, 10)
     start = float(resistive_moment(model, device, rest_pressure, FULL_ANGLE).moment)
-    found = [
+    moments = [
         float(moment)
         for moment in np.arange(step, start, step)
         if isinstance(
             _scheduled(model, device, angle, moment + 0.0 * angle, rest_pressure, moment), Schedule
         )
     ]
-    return (found[0], found[-1]) if found else None
+    return (moments[0], moments[-1]) if moments else None
 
 
 def _scheduled(
@@ -206,11 +206,11 @@ def _scheduled(
     pressure = pressure_grid(model, _GRID)
     columns = angle[:, None]
     given = resistive_moment(model, device, pressure, columns, rest_pressure, rest_moment)
-    found = [
+    pressures = [
         _miss(device, a, m, pressure[ok], row[ok])
         for a, m, row, ok in zip(angle, moment, given.moment, given.allowed, strict=True)
     ]
-    missed = [miss for miss in found if miss is not None]
+    missed = [miss for miss in pressures if miss is not None]
     if missed:
         return max(missed, key=lambda miss: miss.distance)
     rows = zip(moment, given.moment, given.allowed, strict=True)
