@@ -56,7 +56,7 @@ class Straight:
 
 def surprised(residual, by, seen, **options):
     some, every = (Straight(residual[:k], by[:, :k], **options) for k in (seen, len(residual)))
-    return PredictiveDensity(every.fit, freedom(every, every.fit)).surprise(some, some.fit)
+    return PredictiveDensity(every.fit, freedom(every, every.fit)).deviance(some, some.fit)
 
 
 def test_surprise_is_the_likelihood_given_what_seen_trials_say_of_parameters(monkeypatch):
@@ -86,7 +86,7 @@ def test_trials_that_cannot_be_simulated_surprise_without_end():
     every, seen = Straight(residual, by), Straight(residual[:5], by[:, :5])
     whole = PredictiveDensity(every.fit, freedom(every, every.fit))
     seen.curvature = np.full((2, 2), np.nan)
-    assert whole.surprise(seen, seen.fit) == np.inf
+    assert whole.deviance(seen, seen.fit) == np.inf
 
 
 def held(volts, kpa, truth, seed):

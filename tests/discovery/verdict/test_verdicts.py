@@ -159,7 +159,7 @@ def test_an_amended_model_carries_its_intervals():
 
 def found_unseen(with_it, without):
     seen = (
-        None if each is None else SimpleNamespace(surprise=np.array(each))
+        None if each is None else SimpleNamespace(deviance=np.array(each))
         for each in (with_it, without)
     )
     return SimpleNamespace(**dict(zip(("unseen", "unseen_without"), seen, strict=True)))
