@@ -33,12 +33,18 @@ from pma_gym.discovery.screening.residuals import residuals
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.backward_elimination import as_given
 from pma_gym.discovery.selection.forward_selection import passes
-from pma_gym.discovery.verdict.approximate import closing
+from pma_gym.discovery.verdict.approximate import MOST_SCATTER, closing
 from pma_gym.discovery.verdict.decision import suspicious, verdict_of
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.discovery.verdict.residual_fraction import residual_fraction, tones
 from pma_gym.discovery.verdict.residual_laws import residual_law
-from pma_gym.discovery.verdict.unknown import Reason, shapeless_laws, telling, why_unknown
+from pma_gym.discovery.verdict.unknown import (
+    Reason,
+    shapeless_laws,
+    telling,
+    why_unknown,
+    widest_scatter,
+)
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
@@ -83,7 +89,7 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
     records = trial_records(findings)
     count = 0 if unknown is None else len(unknown.effects)
     closes = closing(gaps(records), count) if count else None
-    if closes is not None and closes.named:
+    if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)
         verdict = named if named == "effect" else verdict

@@ -14,6 +14,10 @@ from pma_gym.discovery.diagnosis import Gap
 MOST_LEFT = 0.15
 """Most of the misfit beyond noise (mean square) that an approximate law may leave, as a share."""
 
+MOST_SCATTER = 0.25
+"""Most that the size of an effect may scatter by trial or condition for its law to be named as an
+approximate one: what scatters more (a friction that grows with pressure) has another law."""
+
 WORTH_SAYING = 0.5
 """The same from which on the best candidate's size says nothing."""
 

@@ -173,6 +173,21 @@ def shapeless_laws(findings: Findings, left: ResidualFraction) -> list[Estimated
     return estimated_laws(findings.selection.problem, findings.refitted)
 
 
+def widest_scatter(findings: Findings) -> float:
+    """How much the size of an effect that was selected scatters, where it scatters most."""
+    selection = findings.selection
+    return max(
+        (
+            scatter
+            for place in range(len(selection.chosen))
+            for scatter in homogeneity_test(
+                selection.problem, selection.fit, selection.chosen, place
+            ).values()
+        ),
+        default=0.0,
+    )
+
+
 def _scatters(findings: Findings, left: ResidualFraction) -> Reason | None:
     """The first effect that was selected whose size differs by trial or by condition, and how."""
     selection, most = findings.selection, np.inf if left.most >= DOUBTFUL else EXTRAPOLATED

@@ -388,6 +388,13 @@ def _given(path):
     return STATION.at_the_door(effect)[door]
 
 
+def test_the_widest_scatter_is_over_all_effects_and_conditions(same_size):
+    same_size[1].update(contraction=0.5)
+    assert unknown.widest_scatter(made_up(("creep", "filling"))) == 0.5
+    assert unknown.widest_scatter(made_up(("creep",))) == 0.12
+    assert unknown.widest_scatter(made_up(())) == 0.0
+
+
 def test_a_scatter_that_slopes_alone_tell_is_not_believed_where_nothing_is_left(same_size):
     # A dead zone with a smooth edge: its size scatters with the pressure by 586 %, to first order.
     same_size[0].update(pressure=5.86)
