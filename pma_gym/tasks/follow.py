@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.metrics import SAMPLE_RATE_HZ
+from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks.task import Task
@@ -52,7 +53,8 @@ def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str
     reason = _jump(task)
     if reason is not None or task.exercise:
         return reason
-    balance = _Balance(task, Plant(nominal), pressure)
+    # The zero too without memories: one that begins on a branch would move it by some N.
+    balance = _Balance(task, Plant(begun_at(nominal, 0.0)), pressure)
     return balance.of_motor() if task.actuator == "motor" else balance.of_regulator()
 
 
