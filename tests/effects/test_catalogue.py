@@ -306,7 +306,8 @@ def test_usual_values_are_a_parameter_set_that_is_there(effect):
 def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
     found = [effect for effect in CATALOGUE.values() if effect.defaults]
     assert [(effect.name, dict(effect.defaults)) for effect in found] == [
-        ("drive_dead_zone", {"slope": 2.0})
+        ("hysteresis", {"memory_at_start": 0.0}),
+        ("drive_dead_zone", {"slope": 2.0}),
     ]
     for effect in found:
         for door, value in effect.defaults.items():

@@ -89,7 +89,8 @@ def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
 
 
 def test_a_random_policy_takes_few_attempts():
-    # 23 in 10 ms with a Rosenbrock method that foresees nothing, 14 now.
+    # 23 in 10 ms with a Rosenbrock method that foresees nothing, 15.5 now: the hysteresis of
+    # the station bends more often than before.
     attempts, steps = 0, 100
     for pressure in (200e3, 350e3, 550e3):
         plant = Plant("station")
@@ -97,7 +98,7 @@ def test_a_random_policy_takes_few_attempts():
         columns = (told.time, told.motor, told.regulator)
         run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
         attempts += simulate_all(plant.program, [run])
-    assert attempts / (3 * steps) < 15.0
+    assert attempts / (3 * steps) < 16.0
 
 
 @pytest.mark.parametrize("model", ["serres2008", "station"])

@@ -129,7 +129,7 @@ def answer(model, effect=None, verdict="effect"):
         sentence="",
         effects=[],
         candidates=[candidate("creep", "chance")] + ([candidate(effect)] if effect else []),
-        blind=("creep",),
+        not_detectable=("creep",),
         next_experiment=None,
         gap={},
         seconds={},

@@ -70,5 +70,5 @@ def test_episodes_are_on_drawn_stations_with_an_operator():
     names = {model.name for model in envs.engine.models}
     assert names == {"station-0", "station-1"}
     # What controllers are told is the nominal one.
-    assert envs.engine.nominal.name == "station"
+    assert envs.engine.nominal_model.name == "station"
     envs.close()
