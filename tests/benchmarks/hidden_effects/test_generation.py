@@ -154,7 +154,8 @@ def model_with(lab, name):
         "force_intercept_n": 44.6,
         "stiffness_n_per_mm": 20.0,
     }
-    return lab.with_effects({name: {d: values.get(d, defaults.get(d)) for d in doors}})
+    given = {**defaults, **values}
+    return lab.with_effects({name: {d: given[d] for d in doors if d in given}})
 
 
 @pytest.mark.parametrize("name", KINDS)
