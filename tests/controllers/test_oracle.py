@@ -70,12 +70,12 @@ def test_of_errors_linear_in_the_plan_it_finds_the_least_squares_within_limits(l
     generator, blocks = np.random.default_rng(1), np.array([0, 1, 2, 2, 3, 3, 3, 3])
     matrix, wanted = generator.normal(size=(20, 8)), 5.0 * generator.normal(size=20)
     plan, space = np.full(8, 5.0), Space(blocks, 5.0 - limit, 5.0 + limit)
-    found = best_plan(
+    optimum = best_plan(
         lambda plans: (plans - 5.0) @ matrix.T - wanted, plan, plan[None, :] + 0.5, space
     )
     by_block = matrix @ np.eye(4)[blocks]
     expected = lsq_linear(by_block, wanted, (-limit, limit)).x
-    assert found - 5.0 == pytest.approx(expected[blocks], abs=1e-5)
+    assert optimum - 5.0 == pytest.approx(expected[blocks], abs=1e-5)
 
 
 def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_number():
@@ -83,9 +83,9 @@ def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_numbe
         return np.where(plans > 3.0, np.nan, np.cos(5.0 * plans) + 0.1 * plans**2)
 
     starts = np.array([[1.0], [4.0], [2.0]])
-    found = best_plan(errors, np.zeros(1), starts, Space(np.zeros(1, int), 0.0, 5.0))
+    optimum = best_plan(errors, np.zeros(1), starts, Space(np.zeros(1, int), 0.0, 5.0))
     best = min(float(errors(s) ** 2) for s in (0.0, *starts[:, 0]) if s <= 3.0)
-    assert float(errors(found)[0] ** 2) <= best
+    assert float(errors(optimum)[0] ** 2) <= best
 
 
 def test_a_plan_is_held_to_the_limits_period_by_period():

@@ -62,9 +62,9 @@ def test_a_neutral_effect_leaves_every_bit(name, case, station, station_with):
     trial, (start, states, truth) = case
     plant = station_with(name, neutral=True)
     assert plant.states == station.states
-    begun, found, seen = simulated(plant, *trial)
+    begun, readings, seen = simulated(plant, *trial)
     np.testing.assert_array_equal(begun.state, start.state)
-    np.testing.assert_array_equal(found, states)
+    np.testing.assert_array_equal(readings, states)
     for output, values in truth.items():
         np.testing.assert_array_equal(seen[output], values)
 
@@ -73,13 +73,13 @@ def test_a_neutral_effect_leaves_every_bit(name, case, station, station_with):
 def test_a_neutral_effect_leaves_all_but_rounding(name, case, station, station_with):
     trial, (start, states, truth) = case
     plant = station_with(name, neutral=True)
-    begun, found, seen = simulated(plant, *trial)
+    begun, readings, seen = simulated(plant, *trial)
     columns = kept(plant, station)
     np.testing.assert_array_equal(begun.state[columns], start.state)
     moved = np.abs(states).max(axis=0)
-    assert np.all(np.abs(found[:, columns] - states) <= 1e-10 * moved)
+    assert np.all(np.abs(readings[:, columns] - states) <= 1e-10 * moved)
     own = [i for i in range(len(plant.states)) if i not in columns]
-    assert np.all(found[:, own] == 0.0)
+    assert np.all(readings[:, own] == 0.0)
     for output, values in truth.items():
         np.testing.assert_allclose(seen[output], values, rtol=0.0, atol=1e-9 * np.ptp(values))
 
@@ -94,8 +94,8 @@ def test_a_neutral_effect_leaves_every_rate(name, station, station_with):
         wide = np.zeros(len(plant.states))
         wide[columns] = state
         commands = generator.uniform(0, 10), generator.uniform(2, 9), 0.04
-        found = plant.derivative(wide, *commands)[columns]
-        np.testing.assert_array_equal(found, station.derivative(state, *commands))
+        rates = plant.derivative(wide, *commands)[columns]
+        np.testing.assert_array_equal(rates, station.derivative(state, *commands))
 
 
 def filled(plant):
@@ -113,11 +113,11 @@ def test_an_effect_that_is_there_changes_something(name, station, station_with):
         assert laws.law(-1e-3, plant.model.parameters[name]) > 30.0
         return
     if name in ("regulator_delay", "regulator_deadband"):
-        found, states = (filled(each) for each in (plant, station))
+        readings, states = (filled(each) for each in (plant, station))
     else:
-        _, found, _ = simulated(plant, "random", "zoh")
+        _, readings, _ = simulated(plant, "random", "zoh")
         _, states, _ = simulated(station, "random", "zoh")
-    change = np.abs(found[:, kept(plant, station)] - states).max(axis=0)
+    change = np.abs(readings[:, kept(plant, station)] - states).max(axis=0)
     assert np.any(change > 1e-3 * np.ptp(states, axis=0))
 
 

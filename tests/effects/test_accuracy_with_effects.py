@@ -45,9 +45,9 @@ def test_positions_keep_their_limit_with_an_effect(name, trial, station_with, st
     positions = [plant.states.index(state) for state in ("contraction", "angle")]
     made = plain = 0
     for pressure in PRESSURES:
-        found, attempts = integrated(plant, trial, pressure)
+        ends, attempts = integrated(plant, trial, pressure)
         truth, _ = integrated(fine, trial, pressure)
-        error = np.abs(found - truth)[:, positions].max(axis=0)
+        error = np.abs(ends - truth)[:, positions].max(axis=0)
         assert np.all(error <= 1e-6 * np.ptp(truth[:, positions], axis=0))
         made, plain = made + attempts, plain + integrated(station, trial, pressure)[1]
     # Nothing bends as sharply as damping whose factor follows a cable that whips.

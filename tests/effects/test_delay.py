@@ -37,17 +37,17 @@ def test_a_delayed_drive_asks_for_what_was_asked_before(station_with, share):
     drive, p = (plant.model.parameters[name] for name in ("drive", "drive_delay"))
     columns = [plant.states.index(name) for name in CATALOGUE["drive_delay"].memory_names]
     asked = drive.gain * motor + drive.offset
-    found = np.array(
+    loads = np.array(
         [delayed_load(a, tuple(m), p) for a, m in zip(asked, states[:, columns], strict=True)]
     )
     # The first while still knows the command at rest, which stood still.
     late = np.interp(time - DELAY_S, time, asked)
     expected = asked + share * (late - asked)
     later = time > 0.2
-    error = np.abs(found - expected)[later].max() / np.ptp(asked)
+    error = np.abs(loads - expected)[later].max() / np.ptp(asked)
     # At 3 Hz, w = 0.38: amplitude 1 % low, a third of the swing.
     assert error < 0.006
-    assert np.abs(found - asked)[later].max() / np.ptp(asked) > 0.1 * share
+    assert np.abs(loads - asked)[later].max() / np.ptp(asked) > 0.1 * share
 
 
 def test_a_delayed_regulator_fills_a_while_later(station_with, station):
@@ -60,11 +60,11 @@ def test_a_delayed_regulator_fills_a_while_later(station_with, station):
         states, zero = plant.run(time, np.full(len(time), 1.0), told)
         return plant.observe(states, zero)["pressure"]
 
-    plain, found = pressures(station), pressures(late)
+    plain, late_pressures = pressures(station), pressures(late)
     expected = np.interp(time - DELAY_S, time, plain)
     later = time > 0.5
-    assert np.abs(found - expected)[later].max() < 0.005 * np.ptp(plain)
-    assert np.abs(found - plain)[later].max() > 0.05 * np.ptp(plain)
+    assert np.abs(late_pressures - expected)[later].max() < 0.005 * np.ptp(plain)
+    assert np.abs(late_pressures - plain)[later].max() > 0.05 * np.ptp(plain)
 
 
 @pytest.mark.parametrize("name", ["drive_delay", "regulator_delay"])

@@ -197,14 +197,14 @@ def test_a_memory_without_a_rate_is_no_obstacle(tool):
     with_hand = Plant(load_model("station").with_effects({"operator": {"share": 1.0}}))
     bare = Plant("station")
     if tool == "settle":
-        found, expected = (p.settle(3.0, pressure=300e3) for p in (with_hand, bare))
+        with_memory, expected = (p.settle(3.0, pressure=300e3) for p in (with_hand, bare))
         kept = [with_hand.states.index(name) for name in bare.states]
-        np.testing.assert_allclose(found.state[kept], expected.state, rtol=1e-12, atol=1e-15)
-        assert found.state[with_hand.states.index("memory_operator")] == 0.0
+        np.testing.assert_allclose(with_memory.state[kept], expected.state, rtol=1e-12, atol=1e-15)
+        assert with_memory.state[with_hand.states.index("memory_operator")] == 0.0
     elif tool == "linearize":
-        found, expected = (p.linearize(300e3, 0.03) for p in (with_hand, bare))
-        np.testing.assert_allclose(found.A, expected.A, rtol=1e-9, atol=1e-12)
-        assert found.state_labels == expected.state_labels
+        with_memory, expected = (p.linearize(300e3, 0.03) for p in (with_hand, bare))
+        np.testing.assert_allclose(with_memory.A, expected.A, rtol=1e-9, atol=1e-12)
+        assert with_memory.state_labels == expected.state_labels
     else:
         condition = with_hand.settle(3.0, pressure=300e3)
         condition.state[with_hand.states.index("memory_operator")] = -50.0

@@ -124,10 +124,10 @@ def test_rmse_is_that_of_the_trajectory(name):
         volts = rest + 0.3e2 * env.reference(env.time)
         *_, terminated, truncated, info = env.step(env.action(volts))
         ended = terminated or truncated
-    found = phase_rmse(env.task.protocol, env.trajectory())
-    assert info["rmse_mm"] == pytest.approx(1e3 * found.pop("all"), rel=1e-12)
-    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in found.items()}
-    assert info["rmse_by_phase_mm"] == by_phase and list(found) == ["I", "II", "III"]
+    errors = phase_rmse(env.task.protocol, env.trajectory())
+    assert info["rmse_mm"] == pytest.approx(1e3 * errors.pop("all"), rel=1e-12)
+    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in errors.items()}
+    assert info["rmse_by_phase_mm"] == by_phase and list(errors) == ["I", "II", "III"]
     share = 100.0 * info["rmse_mm"] / (1e3 * env.task.protocol.span)
     assert info["percent_of_range"] == pytest.approx(share)
 

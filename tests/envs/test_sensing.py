@@ -77,8 +77,8 @@ def test_spread_of_readings_at_rest_is_the_models_noise_and_the_quantisation(mak
     levels = noise_levels(env.plant.model)
     # Rounding to steps that are wide against the noise adds between 0 and 1/2 step, by where the
     # value lies; a fine step adds its step^2 / 12.
-    for level, step, found in zip(levels, steps, spread, strict=True):
-        assert level - 0.5 * step <= found <= np.hypot(level, 0.5 * step) * 1.05
+    for level, step, measured in zip(levels, steps, spread, strict=True):
+        assert level - 0.5 * step <= measured <= np.hypot(level, 0.5 * step) * 1.05
 
 
 def test_noise_is_the_models_where_no_step_of_the_daq_hides_it(make):

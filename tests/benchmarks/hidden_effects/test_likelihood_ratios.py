@@ -55,8 +55,8 @@ def test_odds_of_a_parameter_grow_with_the_square_of_what_it_is_off_by():
 
 
 def test_a_light_slide_is_not_told_beside_a_rotor_and_a_radius_is():
-    found = off(radius=1.1, mass=1.2)
-    assert found["mass"] < UNTOLD and found["radius"] > 1000.0
+    truth = off(radius=1.1, mass=1.2)
+    assert truth["mass"] < UNTOLD and truth["radius"] > 1000.0
 
 
 def test_cases_tell_of_their_parameters_whether_data_do():
