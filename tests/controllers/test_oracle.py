@@ -53,10 +53,10 @@ def test_what_is_foreseen_depends_on_no_other_plan_and_leaves_the_plant_alone():
     plant = Plant("station")
     condition = plant.settle(3.0, pressure=300e3)
     before = condition.state.copy()
-    foresight = Prediction(plant, np.array([0.0, 0.01, 0.02]))
+    prediction = Prediction(plant, np.array([0.0, 0.01, 0.02]))
     volts = np.linspace(0.0, 10.0, PLANS)[:, None] * np.ones(2)
-    together = foresight(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
-    alone = foresight(condition, Commands(volts[7:8], 5.0), 1)["extension"]
+    together = prediction(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
+    alone = prediction(condition, Commands(volts[7:8], 5.0), 1)["extension"]
     assert np.array_equal(alone[0], together[7])
     assert np.array_equal(condition.state, before)
 
@@ -129,15 +129,15 @@ def test_it_beats_feedforward_and_feedback(task, pressure, options, drive):
 
 def test_it_knows_a_station_that_is_not_its_model(drive):
     got, _ = drive(Oracle(), "displacement", 300, randomisation="varied")
-    told, _ = drive(ImprovedFeedforward(), "displacement", 300, randomisation="varied")
-    assert got["displacement"] < 0.015 < 0.05 * told["displacement"]
+    feedforward, _ = drive(ImprovedFeedforward(), "displacement", 300, randomisation="varied")
+    assert got["displacement"] < 0.015 < 0.05 * feedforward["displacement"]
 
 
 def test_it_commands_the_regulator_where_that_is_the_actuator(drive):
     for options in ({}, LATE):
         got, _ = drive(Oracle(), "triangle_low", 150, **options)
-        told, _ = drive(ImprovedFeedforward(), "triangle_low", 150, **options)
-        assert all(got[phase] < 0.8 * told[phase] for phase in got)
+        feedforward, _ = drive(ImprovedFeedforward(), "triangle_low", 150, **options)
+        assert all(got[phase] < 0.8 * feedforward[phase] for phase in got)
 
 
 def test_no_noise_enters_it():

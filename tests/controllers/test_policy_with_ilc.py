@@ -29,8 +29,8 @@ def trials(controller, seeds, env):
     errors = []
     for seed in seeds:
         _, ended = env.reset(seed=seed), False
-        told = replace(env.station, model=load_model("station"))
-        controller.reset(env.reference, told)
+        information = replace(env.station, model=load_model("station"))
+        controller.reset(env.reference, information)
         while not ended:
             volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))

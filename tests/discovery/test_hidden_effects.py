@@ -63,9 +63,9 @@ def test_parameters_that_were_off_are_named(name):
         for factor, path in MOVED.items()
         if abs(TRUTH[name]["base_factors"].get(factor, 1.0) - 1.0) > 0.05
     }
-    told = {path for path in off if path not in diagnosis.not_identifiable}
-    assert told
-    for path in told:
+    identifiable = {path for path in off if path not in diagnosis.not_identifiable}
+    assert identifiable
+    for path in identifiable:
         moved = diagnosis.parameters[path]
         assert moved.significant
         assert moved.now.value / moved.start == pytest.approx(off[path], rel=0.02)

@@ -171,17 +171,17 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
 
 
 def test_progress_is_told():
-    told = []
+    messages = []
     diagnose(
         laboratory("parameters")[0],
         STATION,
-        progress=lambda *each: told.append(each),
+        progress=lambda *each: messages.append(each),
         propose=False,
     )
-    steps = [step for step, _, _ in told]
+    steps = [step for step, _, _ in messages]
     assert steps[0] == "refitting parameters"
     assert steps[-1] == "putting the answer together"
-    assert all(0 <= done <= total for _, done, total in told)
+    assert all(0 <= done <= total for _, done, total in messages)
 
 
 def test_nothing_cannot_be_diagnosed():

@@ -43,8 +43,10 @@ EVERY = (
 
 def simulated(plant, trial, interpolation):
     start = plant.settle(1.5, 300e3)
-    told = TRIALS[trial](plant, 300e3)
-    states, zero = plant.run(told.time, told.motor, told.regulator, interpolation, start)
+    commands = TRIALS[trial](plant, 300e3)
+    states, zero = plant.run(
+        commands.time, commands.motor, commands.regulator, interpolation, start
+    )
     return start, states, plant.observe(states, zero)
 
 
@@ -101,8 +103,8 @@ def test_a_neutral_effect_leaves_every_rate(name, station, station_with):
 def filled(plant):
     """States while the pressure is raised."""
     time = np.arange(0.0, 0.5, 0.01)
-    told = np.where(time > 0.0, *(plant.regulator_voltage(p) for p in (320e3, 300e3)))
-    return plant.run(time, np.full(len(time), 2.0), told)[0]
+    commands = np.where(time > 0.0, *(plant.regulator_voltage(p) for p in (320e3, 300e3)))
+    return plant.run(time, np.full(len(time), 2.0), commands)[0]
 
 
 @pytest.mark.parametrize("name", EVERY)

@@ -31,8 +31,8 @@ PRESSURES = (200e3, 550e3)
 
 def integrated(plant, trial, pressure):
     """States at every command, and attempts at steps."""
-    start, told = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
-    columns = (told.time, told.motor, told.regulator)
+    start, commands = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
+    columns = (commands.time, commands.motor, commands.regulator)
     run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
     attempts = simulate_all(plant.program, [run])
     return run.states, attempts

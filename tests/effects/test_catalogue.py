@@ -197,12 +197,12 @@ def test_names_are_unique_and_are_their_keys():
 
 
 def test_a_signature_sets_every_phenomenon_apart():
-    told = [
+    signatures = [
         effect.signature
         for effect in CATALOGUE.values()
         if effect.port in PHENOMENA or (effect.port.startswith("sensor:") and effect.law)
     ]
-    assert all(told)
+    assert all(signatures)
 
 
 ADDED = [effect for effect in CATALOGUE.values() if effect.port in PHENOMENA]

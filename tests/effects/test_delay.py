@@ -56,8 +56,8 @@ def test_a_delayed_regulator_fills_a_while_later(station_with, station):
 
     def pressures(plant):
         line = plant.model.parameters["regulator_line"]
-        told = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
-        states, zero = plant.run(time, np.full(len(time), 1.0), told)
+        volts = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
+        states, zero = plant.run(time, np.full(len(time), 1.0), volts)
         return plant.observe(states, zero)["pressure"]
 
     plain, late_pressures = pressures(station), pressures(late)
@@ -108,10 +108,10 @@ def test_a_cascade_has_a_delayed_regulator_too():
         load_model("cascade").with_effects({"regulator_delay": {"share": 1.0, "delay_ms": 20}})
     )
     time = np.arange(0.0, 0.5, 0.001)
-    told = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
+    volts = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
 
     def half(plant):
-        states, zero = plant.run(time, np.full(len(time), 2.0), told)
+        states, zero = plant.run(time, np.full(len(time), 2.0), volts)
         return time[np.argmax(plant.observe(states, zero)["pressure"] > 325e3)]
 
     assert half(late) - half(plain) == pytest.approx(0.02, abs=0.002)

@@ -21,8 +21,8 @@ def disturbed(env: PMAEnv, seed: int, volts: float) -> tuple[np.ndarray, np.ndar
     rows, states, over = [], [], False
     while not over:
         *_, terminated, truncated, info = env.step(env.action(volts))
-        told = [info[name] for name in ("regulator_voltage_v", "pressure_kpa", "load_n")]
-        rows.append([*env.disturbance, *told])
+        signals = [info[name] for name in ("regulator_voltage_v", "pressure_kpa", "load_n")]
+        rows.append([*env.disturbance, *signals])
         states.append(env.condition.state)
         over = terminated or truncated
     return np.array(rows), np.array(states)
@@ -130,8 +130,8 @@ def _first_event(env: PMAEnv, seed: int) -> float:
 
 def test_the_regulator_hears_no_more_than_10_volts(make):
     env = make(disturbances="regulator", pressure_kpa=575.0)
-    heard = [disturbed(env, seed, 3.0)[0][:, 2].max() for seed in range(4)]
-    assert max(heard) == 10.0 and env.ended_by == ""
+    highest = [disturbed(env, seed, 3.0)[0][:, 2].max() for seed in range(4)]
+    assert max(highest) == 10.0 and env.ended_by == ""
 
 
 def test_controllers_are_told_the_station_without_the_operator(make):

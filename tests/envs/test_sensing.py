@@ -17,14 +17,14 @@ def test_entries_are_those_of_the_table(make, task, regulator):
     env.reset(seed=0)
     at = TASKS[task].protocol.quantity
     span = {"extension": 25e-3, "rotation": np.pi / 2}[at]
-    heard = [env.measurement]
+    delayed = [env.measurement]
     for k in range(30):
         action = env.action(0.1 * k)
         observation, *_ = env.step(action)
-        heard.append(env.measurement)
+        delayed.append(env.measurement)
         reading = env.measurement
         references = [env.reference(env.time + 0.01 * ahead) / span for ahead in range(3)]
-        past = [getattr(heard[max(-1 - back, -len(heard))], at) / span for back in (1, 2, 3)]
+        past = [getattr(delayed[max(-1 - back, -len(delayed))], at) / span for back in (1, 2, 3)]
         expected = [
             reading.extension / 25e-3,
             reading.rotation / (np.pi / 2),

@@ -76,13 +76,13 @@ def test_a_step_has_the_damping_of_the_way_that_it_goes(pressure):
     # one is in a moment: it still shortens by 0.1 um/s.
     plant = Plant("serres2008")
     rest, at = plant.settle(2.0, pressure), plant.states.index("velocity")
-    told, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
+    commands, zero = (3.0, plant.regulator_voltage(pressure)), rest.zero_contraction
     rest.state[at] = 1e-7
-    made = PlainPlant(plant).attempt(rest.state, told, zero, 5e-4, 1e-3)
+    made = PlainPlant(plant).attempt(rest.state, commands, zero, 5e-4, 1e-3)
     assert made.accepted
 
     def rate(_, state):
-        return plant.derivative(state, *told, zero)
+        return plant.derivative(state, *commands, zero)
 
     truth = integrated(rate, rest.state, made.length, switches(plant, zero))
     assert made.state[at] == pytest.approx(truth[at], rel=1e-4) and truth[at] < -5e-5
@@ -93,8 +93,8 @@ def test_a_random_policy_takes_few_attempts():
     attempts, steps = 0, 100
     for pressure in (200e3, 350e3, 550e3):
         plant = Plant("station")
-        start, told = plant.settle(0.0, pressure), random_commands(plant, pressure, steps=steps)
-        columns = (told.time, told.motor, told.regulator)
+        start, commands = plant.settle(0.0, pressure), random_commands(plant, pressure, steps=steps)
+        columns = (commands.time, commands.motor, commands.regulator)
         run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
         attempts += simulate_all(plant.program, [run])
     assert attempts / (3 * steps) < 15.0

@@ -181,8 +181,8 @@ def test_parameters_count_as_named_only_where_they_moved():
     off = truth("parameters", base_factors={"radius": 1.12})
     named = document("parameters") | {"parameters": {"rotor.radius_mm": {"significant": True}}}
     other = document("parameters") | {"parameters": {"slide.mass_kg": {"significant": True}}}
-    told = document("parameters") | {"not_identifiable": {"rotor.radius_mm": "constant"}}
-    first, second, third = (compare(off, each) for each in (named, other, told))
+    answer = document("parameters") | {"not_identifiable": {"rotor.radius_mm": "constant"}}
+    first, second, third = (compare(off, each) for each in (named, other, answer))
     assert first.parameters and not first.parameters_spurious
     assert second.parameters is False and second.parameters_spurious
     assert third.parameters is False and third.parameters_told

@@ -160,33 +160,37 @@ def diagnose_small(folder, code="this", recompute=False):
 
     data = measured_dataset((150.0,), (75.0,), steps=0)
     stages = Stages(folder, recompute, code)
-    told = stages.others()
-    return *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent), stages, told
+    messages = stages.others()
+    return (
+        *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent),
+        stages,
+        messages,
+    )
 
 
 def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
-    rounds, model, _, told = diagnose_small(tmp_path)
+    rounds, model, _, messages = diagnose_small(tmp_path)
     assert [each.effects for each in rounds] == [("cable_slack",), ()]
     assert model.parameters["cable"].slack == pytest.approx(1e-3)
-    assert len(asked) == 2 and not told
-    again, same, stages, told = diagnose_small(tmp_path)
+    assert len(asked) == 2 and not messages
+    again, same, stages, messages = diagnose_small(tmp_path)
     assert len(asked) == 2, "a finished round is not asked again"
     assert (again[0].effects, again[1].verdict) == (["cable_slack"], "agrees")
     assert same.parameters == model.parameters
-    assert stages.codes == {"this": 2} and not told
+    assert stages.codes == {"this": 2} and not messages
 
 
 def test_rounds_of_other_code_are_told_and_used_unless_made_anew(tmp_path, asked):
     diagnose_small(tmp_path, "older")
-    *_, stages, told = diagnose_small(tmp_path, "newer")
+    *_, stages, messages = diagnose_small(tmp_path, "newer")
     assert len(asked) == 2 and stages.codes == {"older": 2}
-    assert told == (
+    assert messages == (
         f"2 of 2 stages kept in {tmp_path} are by other code than this "
         "(--recompute makes those anew)"
     )
-    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
-    assert len(asked) == 4 and stages.codes == {"newer": 2} and not told
-    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
+    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
+    assert len(asked) == 4 and stages.codes == {"newer": 2} and not messages
+    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
     assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --recompute goes on"
 
 

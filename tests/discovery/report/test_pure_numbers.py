@@ -27,9 +27,9 @@ def hardly_held(path):
 
 def refused(quantity, value):
     """What a value out of bounds is told."""
-    with pytest.raises(ValueError, match="must lie in") as told:
+    with pytest.raises(ValueError, match="must lie in") as error:
         quantity.check("exponent", value)
-    return str(told.value)
+    return str(error.value)
 
 
 def test_messages_give_a_pure_number_no_unit():

@@ -52,18 +52,18 @@ def localised(made: list[Trial], seed: int = 0):
 
 def test_noise_alone_lies_nowhere():
     data = trials(6)
-    told = [localised(noisy(data, seed=seed))[0] for seed in range(10)]
-    assert sum(map(len, told)) == 0
+    places = [localised(noisy(data, seed=seed))[0] for seed in range(10)]
+    assert sum(map(len, places)) == 0
 
 
 def test_noise_larger_than_was_thought_lies_nowhere_in_particular():
     data = trials(6)
     generator = np.random.default_rng(3)
-    told = [
+    places = [
         localised(noisy(data, lambda trial: 1.0 * generator.standard_normal(len(trial)), seed))[0]
         for seed in range(10)
     ]
-    assert sum(1 for each in told if each) <= 1
+    assert sum(1 for each in places if each) <= 1
 
 
 def after_reversals(trial: Trial) -> np.ndarray:
