@@ -49,15 +49,15 @@ def draw_diagnosis() -> None:
         os.chdir(folder)
         try:
             exec(block[1], {})
-            found = diagnose(read_dataset("lab"), "serres2008", jobs=2)
+            diagnosis = diagnose(read_dataset("lab"), "serres2008", jobs=2)
         finally:
             os.chdir(here)
-    worst = worst_trial(found)
+    worst = worst_trial(diagnosis)
     assert worst is not None
     for name, picture in (
-        ("where", map_picture(found.maps[:1])),
-        ("gap", gap_picture(dict(found.gap), ["as given", "refitted", "effect added"])),
-        ("worst", curves_picture(worst, found)),
+        ("where", map_picture(diagnosis.maps[:1])),
+        ("gap", gap_picture(dict(diagnosis.gap), ["as given", "refitted", "effect added"])),
+        ("worst", curves_picture(worst, diagnosis)),
     ):
         (IMAGES / f"diagnosis-{name}.png").write_bytes(picture)
 

@@ -208,10 +208,10 @@ def _check_nodes(file: str, root: Any) -> None:  # noqa: ANN401 - a node of PyYA
 
     def measure(node: Any) -> tuple[int, int]:  # noqa: ANN401
         if id(node) in known:
-            found = known[id(node)]
-            if found is None:
+            measured = known[id(node)]
+            if measured is None:
                 raise DocumentError(f"{file} has an alias inside what it names; write it out")
-            return found
+            return measured
         known[id(node)] = None
         size, depth = 1, 0
         if isinstance(node.value, str):
@@ -262,10 +262,10 @@ def _check_scan(file: str, bare: str) -> None:
     deepest = int(depth.argmax()) if depth.size else 0
     line = bare.count("\n", 0, deepest) + 1
     check_limit(f"line {line} of {file}", "nesting", int(depth.max(initial=0)))
-    found = re.search(_LONG_NUMBER % limit("digits"), bare)
-    if found:
-        line = bare.count("\n", 0, found.start()) + 1
-        check_limit(f"a number in line {line} of {file}", "digits", len(found[0]))
+    match = re.search(_LONG_NUMBER % limit("digits"), bare)
+    if match:
+        line = bare.count("\n", 0, match.start()) + 1
+        check_limit(f"a number in line {line} of {file}", "digits", len(match[0]))
 
 
 def _checked(document: Any, file: str, own: bool = False, finite: bool = True) -> Any:  # noqa: ANN401
@@ -305,9 +305,9 @@ def _broken(text: str, words: str) -> str:
         text: of the file.
         words: the parser's, which end in `(at line 5, column 7)` or `(at end of document)`.
     """
-    found = re.search(r"at line (\d+)", words)
+    match = re.search(r"at line (\d+)", words)
     lines = text.splitlines() or [""]
-    number = int(found[1]) if found else len(lines)
+    number = int(match[1]) if match else len(lines)
     line = lines[min(number, len(lines)) - 1].strip()
     shown = line if len(line) <= _SHOWN else line[:_SHOWN] + "..."
     return f"line {number}, {shown!r}: {_line(words)}"

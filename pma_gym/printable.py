@@ -20,4 +20,4 @@ def printable(text: str) -> str:
         >>> printable("a\x1b[31mb"), printable("\udce9t\u00e9")
         ('a\\x1b[31mb', '\\udce9t\xe9')
     """
-    return _UNSAFE.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return _UNSAFE.sub(lambda match: match[0].encode("unicode_escape").decode(), text)

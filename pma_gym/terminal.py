@@ -31,8 +31,8 @@ class SafeConsole(Console):
 
 def table_console() -> SafeConsole:
     """Where tables go; as wide as they need where nobody watches."""
-    found = SafeConsole()
-    return found if found.is_terminal else SafeConsole(width=WIDTH)
+    console = SafeConsole()
+    return console if console.is_terminal else SafeConsole(width=WIDTH)
 
 
 class _SafeStream:

@@ -81,11 +81,11 @@ def _effect(effect: Effect, common: str) -> str:
 
 def _law(law: Callable) -> str:
     """What a law's docstring says and where it comes from."""
-    told = {law.__name__: sections(law)}
-    told |= {called.__name__: sections(called) for called in _called_by(law)}
-    own, *others = told
-    parts = [told[own][""], *(f"`{name}`: {told[name]['']}" for name in others)]
-    sources = [said["Source"] for said in told.values() if "Source" in said]
+    described = {law.__name__: sections(law)}
+    described |= {called.__name__: sections(called) for called in _called_by(law)}
+    own, *others = described
+    parts = [described[own][""], *(f"`{name}`: {described[name]['']}" for name in others)]
+    sources = [said["Source"] for said in described.values() if "Source" in said]
     return "\n\n".join([*parts, "Source:", *sources] if sources else parts)
 
 

@@ -44,12 +44,12 @@ def _own(block: str, title: str) -> str:
     """The table of a block whose title begins so, as the report has it."""
     document = _read("hidden-effects")
     alone = {**document, "blocks": {block: document["blocks"][block]}}
-    found = [
+    tables = [
         each
         for each in report_blocks(alone)
         if isinstance(each, TextTable) and each.title.startswith(title)
     ]
-    return to_markdown(found, {}, "")
+    return to_markdown(tables, {}, "")
 
 
 def hidden_kinds() -> str:
@@ -129,12 +129,12 @@ def _bound(each: dict[str, Any]) -> list[str]:
         100.0 * float(detected(each["nothing"])),
         100.0 * float(identified(each["to_rival"])),
     )
-    found, known = (f"{chance:.0f}" for chance in chances)
+    shown, known = (f"{chance:.0f}" for chance in chances)
     rival = code(each["rival"])
     return [
         f"{each['r']:.2f}",
         f"{each['nothing']:.0f}",
-        found,
+        shown,
         rival,
         f"{each['to_rival']:.1f}",
         known,

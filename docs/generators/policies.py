@@ -23,8 +23,8 @@ def _read() -> dict[str, Any]:
     return json.loads(FIGURES.read_text("utf-8"))
 
 
-def _written(found: TextTable) -> str:
-    return to_markdown([found], {}, "")
+def _written(table: TextTable) -> str:
+    return to_markdown([table], {}, "")
 
 
 def policies_judged(group: str) -> str:

@@ -12,9 +12,9 @@ from pma_gym.studies.voltage_profile import profile_model
 
 def misprints() -> str:
     """Every corrected cell; table I3's change of unit on one line."""
-    found = corrections()
-    reasons = Counter(item.reason for item in found)
-    single = [item for item in found if reasons[item.reason] < 10]
+    by_place = corrections()
+    reasons = Counter(item.reason for item in by_place)
+    single = [item for item in by_place if reasons[item.reason] < 10]
     rows = [
         [
             item.table,

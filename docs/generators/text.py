@@ -49,8 +49,8 @@ def summary(documented: object) -> str:
 
 def entries(section: str) -> dict[str, str]:
     """The entries of an `Args:` or `Attributes:` section on one line each, by name."""
-    found = re.findall(r"^(\w+): (.*(?:\n    .*)*)", section, re.MULTILINE)
-    return {name: " ".join(text.split()) for name, text in found}
+    matches = re.findall(r"^(\w+): (.*(?:\n    .*)*)", section, re.MULTILINE)
+    return {name: " ".join(text.split()) for name, text in matches}
 
 
 def _cell(value: object) -> str:

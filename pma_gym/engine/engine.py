@@ -88,7 +88,7 @@ class Engine(Episodes):
         shares = [list(share) for share in np.split(self._beginnings, threads)]
         address = self.kernel.library.address
         self._steps = self._parts(threads)
-        self._crew = ThreadPool((address("step"), self._steps), (address("begin"), shares))
+        self._threads = ThreadPool((address("step"), self._steps), (address("begin"), shares))
         self._least_shared = LEAST_BEGUN if threads > 1 else count + 1
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -135,7 +135,7 @@ class Engine(Episodes):
             raise ActionError("actions must be finite")
         if self._has_idle_lanes:
             self._idle_lanes[:] = 0
-        return self._crew.run()
+        return self._threads.run()
 
     def _begin(self, count: int, settles: bool) -> None:
         if count < self._least_shared:
@@ -144,11 +144,11 @@ class Engine(Episodes):
         parts = self._beginnings
         edges = np.arange(len(parts) + 1) * count // len(parts)
         parts[:, FIRST], parts[:, LAST], parts[:, SETTLES] = edges[:-1], edges[1:], settles
-        self._crew.run(_BEGINNING)
+        self._threads.run(_BEGINNING)
 
     def close(self) -> None:
         """End the threads."""
-        self._crew.close()
+        self._threads.close()
 
     def advance(self, copy: Callable[[], Any], given: NDArray[np.float64]) -> Callable[[Any], Any]:
         """The step of a single environment, as fast as Python can call it.

@@ -132,10 +132,10 @@ def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
     unit = task.protocol.unit
     span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
     volts = "10 V, -1.0 = 0 V"
-    now, less, heard = "reference now", "reference now less measured position", "position heard"
+    now, less, delayed = "reference now", "reference now less measured position", "position heard"
     if task.protocol.quantity == "excess":
         now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
-        heard = "excess of the moment heard"
+        delayed = "excess of the moment heard"
     return [
         ("measured extension", "25 mm"),
         ("measured rotation", "90 deg"),
@@ -146,7 +146,7 @@ def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
         *((f"reference {_steps(k)} ahead", span) for k in range(1, options.preview + 1)),
         (f"last {task.actuator} action", volts),
         *([("last regulator action", volts)] if options.regulator_action else []),
-        *((f"{heard} {_steps(k)} before", span) for k in range(1, options.history + 1)),
+        *((f"{delayed} {_steps(k)} before", span) for k in range(1, options.history + 1)),
     ]
 
 

@@ -51,8 +51,8 @@ def held_pressures(plant, asked):
     """Pressures (Pa) after a second each at what is asked for."""
     time = np.arange(0.0, float(len(asked)), 0.01)
     steps = np.array([plant.regulator_voltage(p) for p in asked])
-    told = steps[np.minimum(time.astype(int), len(asked) - 1)]
-    states, zero = plant.run(time, np.full(len(time), 1.0), told)
+    volts = steps[np.minimum(time.astype(int), len(asked) - 1)]
+    states, zero = plant.run(time, np.full(len(time), 1.0), volts)
     return plant.observe(states, zero)["pressure"][99::100]
 
 

@@ -184,10 +184,10 @@ def next_experiment(
     promised = min(best.log_odds, *_after_refit(discrimination, rivals, best))
     shared = set.intersection(*(set(fit.names) for fit in discrimination.fits))
     names = [" + ".join(n for n in fit.names if n not in shared) for fit in discrimination.fits]
-    told = [name for name in names if name]
-    if len(told) != 1:
-        told = [name or "none of them" for name in names]
-    return proposal(best.excitation, told, promised)
+    distinguished = [name for name in names if name]
+    if len(distinguished) != 1:
+        distinguished = [name or "none of them" for name in names]
+    return proposal(best.excitation, distinguished, promised)
 
 
 def fastest(
@@ -203,8 +203,8 @@ def fastest(
     pairs = discrimination.pairs()
     bound = discrimination.odds(excitations, pairs, refitted=False)
     # Two rivals that nothing tells apart must not hide what tells them from a third.
-    told = np.max(bound, axis=0) >= LEAST
-    kept = np.flatnonzero(told if told.any() else ~told)
+    resolved = np.max(bound, axis=0) >= LEAST
+    kept = np.flatnonzero(resolved if resolved.any() else ~resolved)
     chosen = [pairs[k] for k in kept]
     hoped = [
         ExpectedOdds(each, float(np.min(row[kept])))

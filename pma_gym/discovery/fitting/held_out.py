@@ -26,13 +26,13 @@ class HeldOutMisfit:
     Attributes:
         readings: what its sensors hold (SI), shape (4, rows) for each trial.
         chi_square: of the whitened residuals of each trial, shape (trials,).
-        surprise: the same of each fold, given how well the others hold the parameters
-            (`predicting.Whole.surprise`), shape (folds,); empty if that was not asked for.
+        deviance: the same of each fold, given how well the others hold the parameters
+            (`PredictiveDensity.deviance`), shape (folds,); empty if that was not asked for.
     """
 
     readings: list[Array]
     chi_square: Array
-    surprise: Array
+    deviance: Array
 
 
 def held_out_misfit(
@@ -59,7 +59,7 @@ def held_out_misfit(
         return _unseen_stretches(problem, fit, chosen, progress, whole)
     count = len(problem.trials)
     readings: list[Array] = [np.empty(0)] * count
-    chi_square, surprised = np.zeros(count), list[float]()
+    chi_square, deviances = np.zeros(count), list[float]()
     parts, begun = folds(count, problem.files), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
@@ -70,10 +70,10 @@ def held_out_misfit(
         if refit is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(problem.whitened_residuals(begun, chosen, seen), refit))
+            deviances.append(whole.deviance(problem.whitened_residuals(begun, chosen, seen), refit))
         for k, i in enumerate(left_out):
             readings[i], chi_square[i] = held.readings[k], held.chi_square[k]
-    return HeldOutMisfit(readings, chi_square, np.array(surprised))
+    return HeldOutMisfit(readings, chi_square, np.array(deviances))
 
 
 def _unseen_stretches(
@@ -89,7 +89,7 @@ def _unseen_stretches(
         return None
     (trial,) = problem.trials
     readings, chi_square = np.full((4, len(trial)), np.nan), 0.0
-    surprised, begun = list[float](), fit.model if whole is None else whole.fit.model
+    deviances, begun = list[float](), fit.model if whole is None else whole.fit.model
     for number, left_out in enumerate(parts):
         if progress is not None:
             progress(number, len(parts))
@@ -106,10 +106,10 @@ def _unseen_stretches(
         if refit is None or held is None:
             return None
         if whole is not None:
-            surprised.append(whole.surprise(part.whitened_residuals(begun, chosen), refit))
+            deviances.append(whole.deviance(part.whitened_residuals(begun, chosen), refit))
         readings[:, left_out] = held.readings[0][:, left_out]
         chi_square += float(held.chi_square[0])
-    return HeldOutMisfit([readings], np.array([chi_square]), np.array(surprised))
+    return HeldOutMisfit([readings], np.array([chi_square]), np.array(deviances))
 
 
 @dataclass(frozen=True)

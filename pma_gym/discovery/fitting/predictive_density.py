@@ -74,7 +74,7 @@ class PredictiveDensity:
             refit = replace(refit, chi_square=_chi_square(whitened, refit))
         return cls(refit, freedom(whitened, refit))
 
-    def surprise(self, seen: WhitenedResiduals, apart: Fitted) -> float:
+    def deviance(self, seen: WhitenedResiduals, apart: Fitted) -> float:
         """How little some trials expect the others: twice the negative log-likelihood.
 
         p(others | seen) = p(all) / p(seen), each by Laplace, the determinants at what fits all: by

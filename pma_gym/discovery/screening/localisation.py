@@ -103,7 +103,7 @@ def _places(bins: TimeBins, seen: Sequence[int], seed: int) -> tuple[Place, ...]
     places = []
     for channel, p_value in zip(seen, p_values, strict=True):
         share, readings = _shares(bins, channel, member)
-        for k in _told(bins.excess[channel], inside, names, share, readings, p_value):
+        for k in _shown(bins.excess[channel], inside, names, share, readings, p_value):
             words = ", ".join(singles[i].words for i in names[k])
             signal = BY_QUANTITY[OUTPUTS[channel]].name
             places.append(Place(signal, words, float(share[k]), float(p_value[k])))
@@ -148,7 +148,7 @@ def adjusted(p_values: Array) -> Array:
     return raised
 
 
-def _told(
+def _shown(
     excess: Array,
     inside: Mask,
     names: Sequence[tuple[int, ...]],

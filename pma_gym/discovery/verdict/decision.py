@@ -77,7 +77,7 @@ def _confirmed(findings: Findings) -> bool:
     """Whether the effects help on trials that the fits had not seen."""
     if findings.unseen is None or findings.unseen_without is None:
         return True
-    with_it, without = findings.unseen.surprise, findings.unseen_without.surprise
+    with_it, without = findings.unseen.deviance, findings.unseen_without.deviance
     # By the number of folds too: one beyond what the others reach may weigh more than all.
     return bool(with_it.sum() < without.sum() or np.mean(with_it < without) > 0.5)
 

@@ -57,12 +57,12 @@ def residual_fraction(findings: Findings) -> ResidualFraction:
 def tones(findings: Findings) -> dict[str, float]:
     """Frequency (Hz) of each signal, by column, whose residual after the refit oscillates."""
     whitened = findings.problem.whitened_residuals(findings.refitted.model)
-    left, rate, heard = residuals(whitened, findings.refitted), _rate(findings), {}
+    left, rate, hertz = residuals(whitened, findings.refitted), _rate(findings), {}
     for channel, name in enumerate(OUTPUTS):
         kept = tone([part[channel] for part in left], rate)
         if kept is not None:
-            heard[BY_QUANTITY[name].name] = kept.hertz
-    return heard
+            hertz[BY_QUANTITY[name].name] = kept.hertz
+    return hertz
 
 
 def _rate(findings: Findings) -> float:

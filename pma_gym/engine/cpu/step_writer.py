@@ -119,7 +119,7 @@ class Writer(ResetWriter):
         b.store(integer(0), offset(b, part, BEFORE, INTEGER))
         newest = variable(b, INTEGER, b.ptrtoint(part, INTEGER))
         given = self._arguments(b, part)
-        self._march(b, given, lambda: self._take_part(b, pool, newest))
+        self._integrate(b, given, lambda: self._take_part(b, pool, newest))
         ended = memory(b, INTEGER)
         b.store(integer(0), ended)
         with repeat(b) as leave_if:
@@ -177,7 +177,7 @@ class Writer(ResetWriter):
         emitted = lanes.emit(b, values, known)
         self._store(b, lanes, emitted, self.commanded, records, 0)
 
-    def _march(
+    def _integrate(
         self,
         b: Builder,
         given: dict[str, Operand],

@@ -42,9 +42,9 @@ def test_training_and_validation_have_other_stations(monkeypatch):
 @pytest.mark.parametrize("suite", ["robust", "hard"])
 def test_never_the_suites_own_seed(suite):
     own = frozen_suite(suite).recipe
-    found = training_recipe(suite)
-    assert found.seed == own.training_seed != own.seed
-    assert Stations(suite).recipe is found
+    recipe = training_recipe(suite)
+    assert recipe.seed == own.training_seed != own.seed
+    assert Stations(suite).recipe is recipe
 
 
 def test_the_draws_differ_in_their_parameters():

@@ -91,9 +91,9 @@ def test_shipped_gains_are_stable_on_stations_of_other_force_and_damping():
     for task, pressure in (("displacement", 225.0), ("rotation", 400.0), ("isotonic", 225.0)):
         for force, damping in itertools.product(factors, factors):
             job = Job(scaled_model(known, force, damping), task, "pid", pressure, 0, 50.0, 0.02)
-            loop, told = Loop(job), replace(job.station, model=known)
+            loop, information = Loop(job), replace(job.station, model=known)
             for controller in tune.CONTROLLERS:
-                sensitivity = loop.sensitivity(scheduled_gains(controller, told))
+                sensitivity = loop.sensitivity(scheduled_gains(controller, information))
                 assert sensitivity < 3.0, (controller, task, force, damping)
 
 

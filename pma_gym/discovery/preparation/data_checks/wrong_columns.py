@@ -55,13 +55,13 @@ def _of_motion(
     dataset: Dataset, named: Sequence[NamedTrial], simulated: Sequence[Pair], quantity: str
 ) -> list[str]:
     """Of contraction, rotation or load: which trials have it in which unit."""
-    told = {
+    unit_of = {
         pair.number: motion_unit(quantity, pair) for pair in simulated if slope_of(pair, quantity)
     }
     said = []
-    for unit in dict.fromkeys(unit for unit in told.values() if unit is not None):
-        numbers = [number for number, other in told.items() if other == unit]
-        right = [number for number, other in told.items() if other is None]
+    for unit in dict.fromkeys(unit for unit in unit_of.values() if unit is not None):
+        numbers = [number for number, other in unit_of.items() if other == unit]
+        right = [number for number, other in unit_of.items() if other is None]
         slopes = [slope_of(pair, quantity) for pair in simulated if pair.number in numbers]
         slope = float(np.median([each.slope for each in slopes if each is not None]))
         name = BY_QUANTITY[quantity].name
