@@ -22,8 +22,8 @@ from benchmarks.accuracy.reference import (
     switches,
 )
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.model import load_model
-from pma_gym.plant.plain import PlainPlant
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.simulation import Run, simulate_all
 

@@ -6,10 +6,10 @@ import pytest
 import sympy
 
 from benchmarks.accuracy.limits import with_effect
-from pma_gym.plant.linear import linearize, operating_point
+from pma_gym.plant.forms.linear import linearize, operating_point
+from pma_gym.plant.forms.symbolic import symbolic
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.symbolic import symbolic
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from benchmarks.tuning.job import Job
 from benchmarks.tuning.loop import Loop, lambda_tuning
 from benchmarks.tuning.tune import TuneError, gains_from, run_tune
 from controllers.design.gains import GAINS_FILE, Gains, scheduled_gains
-from pma_gym.plant.linear import linearize
+from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
