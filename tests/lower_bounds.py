@@ -26,11 +26,11 @@ def requirements(tools: bool = False) -> list[tuple[str, str, str]]:
     """
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = {"": project["dependencies"], **project["optional-dependencies"]}
-    found = []
+    every = []
     for extra, lines in groups.items():
         if tools or extra not in TOOLS:
-            found += [(extra, *_parsed(line)) for line in lines]
-    return found
+            every += [(extra, *_parsed(line)) for line in lines]
+    return every
 
 
 def _parsed(line: str) -> tuple[str, str]:

@@ -76,11 +76,11 @@ def engine(monkeypatch):
                 raise self.answer
             return self.answer
 
-    found = Engine()
-    found.calls = []
+    fake = Engine()
+    fake.calls = []
     for name in ("diagnose", "refit"):
-        monkeypatch.setattr(f"pma_gym.discovery.{name}", found, raising=False)
-    return found
+        monkeypatch.setattr(f"pma_gym.discovery.{name}", fake, raising=False)
+    return fake
 
 
 def names(folder):

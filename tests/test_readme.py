@@ -184,10 +184,10 @@ def small_run(**changed):
 
 def test_figures_replace_what_stands_between_the_marks():
     text = "before\n<!-- figures: displacement -->\nold\n<!-- end of figures -->\nafter\n"
-    found = refreshed(text, small_run())
-    assert "| 150 | 0.250 | 0.250 |" in found and "old" not in found
-    assert found.startswith("before\n") and found.endswith("after\n")
-    assert refreshed(found, small_run()) == found
+    refreshed_text = refreshed(text, small_run())
+    assert "| 150 | 0.250 | 0.250 |" in refreshed_text and "old" not in refreshed_text
+    assert refreshed_text.startswith("before\n") and refreshed_text.endswith("after\n")
+    assert refreshed(refreshed_text, small_run()) == refreshed_text
 
 
 def test_every_kind_of_figures_can_be_written():
@@ -209,10 +209,12 @@ def test_figures_that_were_kept_stand_in_the_readme_as_they_are():
 
 def test_a_kept_figure_is_written_without_a_run_which_is_left_alone():
     run_only = "<!-- figures: displacement -->\nold\n<!-- end of figures -->\n"
-    found = refreshed(run_only + "<!-- figures: diagnosis -->\n<!-- end of figures -->", None)
-    assert found.startswith(run_only)
+    refreshed_text = refreshed(
+        run_only + "<!-- figures: diagnosis -->\n<!-- end of figures -->", None
+    )
+    assert refreshed_text.startswith(run_only)
     rates = json.loads(KEPT.read_text("utf-8"))["blocks"]["nothing"]["rates"]
-    row = next(line for line in found.splitlines() if line.startswith("| nothing hidden"))
+    row = next(line for line in refreshed_text.splitlines() if line.startswith("| nothing hidden"))
     assert float(row.split("|")[2].split("%")[0]) == pytest.approx(
         100.0 * rates["false alarm"]["rate"], abs=0.05
     )

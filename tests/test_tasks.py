@@ -132,15 +132,15 @@ def test_drawn_tasks_are_known_by_their_number():
 def test_the_station_can_follow_everything_but_steps_and_the_way_back_to_zero(name, pressure):
     task = EVERY_TASK[name]
     low, high = task.starts
-    found = infeasibility_reason(task, "station", low + pressure * (high - low))
+    reason = infeasibility_reason(task, "station", low + pressure * (high - low))
     if name.endswith("steps"):
         jump = np.abs(np.diff(task.protocol.reference(np.arange(3841) / 384.0)))
         size = jump[jump > 0.0][0] / SI_FACTORS[task.protocol.unit]
-        assert found == f"the reference jumps by {size:.3g} {task.protocol.unit} at 0.5 s"
+        assert reason == f"the reference jumps by {size:.3g} {task.protocol.unit} at 0.5 s"
     elif name == "rotation":
-        assert "the cable would have to push" in found and "first at 14." in found
+        assert "the cable would have to push" in reason and "first at 14." in reason
     else:
-        assert found is None
+        assert reason is None
 
 
 def test_obstacles_say_what_is_lacking():

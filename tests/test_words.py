@@ -48,8 +48,11 @@ WORDS = {
 }
 """Identifiers that are not used, exactly as they would stand, and what stands in their place."""
 
-CLEAN = ("benchmarks", "controllers", "docs", "pma_gym")
-"""Folders whose identifiers are held to `WORDS`. A folder that is clean is added here."""
+CLEAN = ("benchmarks", "controllers", "docs", "pma_gym", "tests")
+"""Folders whose identifiers are held to `WORDS`."""
+
+OLD_NAMES = ("tests/controllers/test_renamed.py", "tests/test_renamed_names.py")
+"""Tests that an earlier name still leads to the present one; they have to say it."""
 
 PHRASES = (
     "remembers itself",
@@ -106,6 +109,7 @@ def test_identifiers_are_the_fields_words(folder):
     wrong = [
         f"{path.relative_to(ROOT)} {message}"
         for path in files([folder], {".py"})
+        if path.relative_to(ROOT).as_posix() not in OLD_NAMES
         for message in violations(path.read_text(encoding="utf-8"))
     ]
     assert not wrong, "\n".join(wrong)

@@ -3,7 +3,7 @@
 import os
 import pickle
 from collections.abc import Callable, Mapping
-from concurrent.futures import FIRST_COMPLETED, CancelledError, TimeoutError, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, TimeoutError, wait
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from types import TracebackType
@@ -15,7 +15,7 @@ from benchmarks.executors.lifetime import end_with_parent, interrupts_blocked
 from benchmarks.executors.work import run_packed, unpacked
 
 try:
-    from pebble import ProcessExpired, ProcessFuture, ProcessPool
+    from pebble import ProcessExpired, ProcessPool
 except ImportError:
     raise ExecutorMissing(
         "several processes need pebble, which is not installed; run: "
@@ -51,7 +51,7 @@ class LocalProcesses:
         pool = _pool(1 if alone else min(self.jobs, len(works)))
         try:
             with interrupts_blocked():
-                waiting: dict[ProcessFuture[bytes], int] = {
+                waiting: dict[Future[bytes], int] = {
                     pool.schedule(run_packed, (work,), timeout=self._limit_s): index
                     for index, work in works.items()
                 }
@@ -64,7 +64,7 @@ class LocalProcesses:
                 pool.stop()
                 pool.join()
 
-    def _end(self, future: "ProcessFuture[bytes]") -> bytes | ProcessDied | TookTooLong:
+    def _end(self, future: "Future[bytes]") -> bytes | ProcessDied | TookTooLong:
         try:
             return future.result()
         except TimeoutError:

@@ -34,6 +34,7 @@ class RayCluster:
         self.jobs = jobs
         try:
             import ray
+            import ray.exceptions
         except ImportError:
             raise ExecutorMissing(
                 "--executor ray needs Ray, which is not installed; run: "

@@ -140,7 +140,7 @@ def read_through_a_gap(summary: "Summary", model: Model) -> Explanation:
         best = int(np.argmin(np.sum(left[:, ~there] ** 2, axis=1)))
         foretold[there] = left[best, there]
     best = int(np.argmin(np.sum(left**2, axis=1)))
-    fitted = dict(zip(("gain", "gap_deg"), grid[best], strict=True))
+    fitted: dict[str, float] = dict(zip(("gain", "gap_deg"), grid[best], strict=True))
     explanation = summary.explanation(READ_THROUGH_A_GAP, fitted, left[best], foretold)
     return replace(explanation, hypothesis=True)
 

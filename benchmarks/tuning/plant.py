@@ -12,7 +12,7 @@ from controllers.models.voltage import nominal_offset
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import StationInfo
 from pma_gym.plant.condition import Condition
-from pma_gym.plant.linear import linearize_at, operating_point
+from pma_gym.plant.forms.linear import linearize_at, operating_point
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Actuator
 

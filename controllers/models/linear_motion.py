@@ -19,7 +19,7 @@ from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import StationInfo
 from pma_gym.plant.compiled_model import OUTPUTS
-from pma_gym.plant.linear import FOLLOWING
+from pma_gym.plant.forms.linear import FOLLOWING
 from pma_gym.plant.plant import Plant
 
 STEP, PRESSURE_STEP, VOLTAGE_STEP = 1e-7, 100.0, 1e-4

@@ -26,7 +26,7 @@ from scipy.linalg import expm
 from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.solver import equilibria_at
-from pma_gym.plant.linear import linearize_at
+from pma_gym.plant.forms.linear import linearize_at
 from pma_gym.plant.plant import Plant
 
 if TYPE_CHECKING:

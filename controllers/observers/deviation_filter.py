@@ -62,7 +62,7 @@ FREE_JUMP = (0.02, 0.05)
 DOUBT = 0.2
 """Share to which the model's gain and lag are known."""
 
-DOUBT_TIME_S, INNOVATION_GATE, MOST_DOUBT = 0.3, 16.0, 4.0
+DOUBT_TIME_S, MOST_INNOVATION, MOST_DOUBT = 0.3, 16.0, 4.0
 """Time of the mean of squared errors over their variances (s), the most that one counts, and the
 mean beyond which a model is wrong: pushes of an operator bring it to 2."""
 
@@ -284,7 +284,7 @@ class DeviationFilter:
     def _wonder(self, innovation: float) -> None:
         """Take a squared error over its variance into the mean of late."""
         share = self._period / DOUBT_TIME_S
-        self.doubt += share * (min(innovation, INNOVATION_GATE) - self.doubt)
+        self.doubt += share * (min(innovation, MOST_INNOVATION) - self.doubt)
 
     def _may_jump(self) -> bool:
         """Whether d may have jumped: not again at once, nor with a model that is wrong anyhow."""

@@ -7,8 +7,8 @@ from typing import Any
 
 from generators.text import code, sections, table
 from pma_gym.effects.effect import Effect, signals
+from pma_gym.plant.forms.notation import Names, Notation
 from pma_gym.plant.model import Model, load_model
-from pma_gym.plant.notation import Names, Notation
 from pma_gym.plant.rigs import RIGS
 
 

@@ -103,7 +103,7 @@ class Effect:
 
         >>> from pma_gym.effects import CATALOGUE
         >>> CATALOGUE["hysteresis"].usual
-        Hysteresis(force=25.0, distance=0.0015)
+        Hysteresis(force=25.0, distance=0.0015, memory_at_start=0.0)
         """
         return (self.neutral or self.start)._replace(**self._usual)
 

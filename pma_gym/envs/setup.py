@@ -11,6 +11,7 @@ import numpy as np
 
 from pma_gym.effects.user_effects import source_of
 from pma_gym.engine.engine import Engine
+from pma_gym.engine.options import Options
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
 
@@ -31,6 +32,14 @@ _RENAMED = {
 }
 """Names of classes and fields in the texts of states that earlier versions saved."""
 
+_OPTIONS = {
+    # The nominal model stands elsewhere, number by number, wherever it was read from.
+    field.name: field.default
+    for field in fields(Options)
+    if field.name not in ("model", "pressure_kpa")
+}
+"""Options that a setup names, and their defaults."""
+
 _OLD_NAME = re.compile(rf"\b({'|'.join(_RENAMED)})(?=[{{:])")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
@@ -44,13 +53,7 @@ def setup(engine: Engine, **others: object) -> Setup:
     """
     said = {name: _text(value) for name, value in others.items()}
     said |= _task(engine)
-    # The nominal model stands below, number by number, wherever it was read from.
-    skipped = ("model", "pressure_kpa")
-    said |= {
-        field.name: _text(getattr(engine.options, field.name))
-        for field in fields(engine.options)
-        if field.name not in skipped
-    }
+    said |= {name: _text(getattr(engine.options, name)) for name in _OPTIONS}
     several = len(set(map(repr, engine.wanted))) > 1
     said["pressures_kpa" if several else "pressure_kpa"] = _text(
         engine.wanted if several else engine.wanted[0]
@@ -76,6 +79,23 @@ def with_new_names(saved: Mapping[str, Any]) -> Setup:
             stacklevel=4,
         )
     return tuple(new.items())
+
+
+def with_new_options(saved: Setup) -> Setup:
+    """A setup with the default of each option that did not exist yet when it was saved.
+
+    >>> dict(with_new_options((("noise", "False"),)))["memory_at_start"]
+    'None'
+    """
+    texts = dict(saved)
+    missing = {name: _text(default) for name, default in _OPTIONS.items() if name not in texts}
+    if not missing:
+        return saved
+    named = [name for name in texts if name in _OPTIONS]
+    first = list(texts).index(named[0]) if named else len(texts)
+    options = {name: texts.get(name, missing.get(name, "")) for name in _OPTIONS}
+    others = [item for item in saved if item[0] not in _OPTIONS]
+    return (*others[:first], *options.items(), *others[first:])
 
 
 def differences(theirs: Setup, ours: Setup) -> str:

@@ -188,14 +188,14 @@ class Plant(CompiledModel):
     def linearize(
         self, pressure: float, contraction: float, direction: str = "relaxing"
     ) -> "control.StateSpace":
-        """The plant near rest as a linear system; see `pma_gym.plant.linear.linearize`."""
+        """The plant near rest as a linear system; see `pma_gym.plant.forms.linear.linearize`."""
         # Imported here: python-control takes longer to import than all of this package.
-        from pma_gym.plant.linear import linearize
+        from pma_gym.plant.forms.linear import linearize
 
         return linearize(self, pressure, contraction, direction)
 
     def symbolic(self) -> "dict[str, sympy.Expr]":
-        """The equations of motion; see `pma_gym.plant.symbolic.symbolic`."""
-        from pma_gym.plant.symbolic import symbolic
+        """The equations of motion; see `pma_gym.plant.forms.symbolic.symbolic`."""
+        from pma_gym.plant.forms.symbolic import symbolic
 
         return symbolic(self)

@@ -60,8 +60,8 @@ class Case:
         self.given, arguments = {}, []
         for argument in signals(self.law):
             arguments.append(self.argument(argument))
-        found = trace(self.law, *arguments)
-        self.outputs = flat(found)
+        traced_values = trace(self.law, *arguments)
+        self.outputs = flat(traced_values)
         self.inputs = live_inputs(self.outputs)
         self.given = {value.data: self.given[value.data] for value in self.inputs}
         self.arguments = arguments
@@ -106,9 +106,9 @@ class Case:
         return flat(self.law(*map(number, self.arguments)))
 
 
-def flat(found):
+def flat(outputs):
     """What a law returns, as one list: a number, a pair, or pairs for several memories."""
-    parts = found if isinstance(found, tuple) else (found,)
+    parts = outputs if isinstance(outputs, tuple) else (outputs,)
     return [number for part in parts for number in (part if isinstance(part, tuple) else (part,))]
 
 
@@ -130,15 +130,15 @@ def run_columns():
 def columns_module(outputs, inputs, lanes):
     """A module whose function `run` works on blocks of rows [slot, lane]."""
     module = ir.Module()
-    arguments = [("blocks", INTEGER), ("given", POINTER), ("found", POINTER)]
+    arguments = [("blocks", INTEGER), ("given", POINTER), ("computed", POINTER)]
     builder, (blocks, given, into) = function(module, "run", arguments)
     with loop(builder, blocks) as block:
         row = lanes.address(builder, given, builder.mul(block, integer(len(inputs))))
         known = {v.id: lanes.load(builder, row, i, v.kind) for i, v in enumerate(inputs)}
-        found = lanes.emit(builder, outputs, known)
+        operands = lanes.emit(builder, outputs, known)
         row = lanes.address(builder, into, builder.mul(block, integer(len(outputs))))
         for i, value in enumerate(outputs):
-            lanes.store(builder, found[value.id], row, i, value.kind)
+            lanes.store(builder, operands[value.id], row, i, value.kind)
     builder.ret_void()
     return module
 
@@ -155,9 +155,9 @@ def run(outputs, given, width=1, real="double", fused=False, paired=False):
     blocks = len(columns[0]) // width
     packed = np.stack([c.reshape(blocks, width) for c in columns], axis=1)
     packed = np.repeat(packed, lanes.places // width, axis=2)
-    found = np.zeros((blocks, len(outputs), lanes.places), type_)
-    call(blocks, packed.ctypes.data, found.ctypes.data)
-    results = [found[:, i, :width].ravel() for i in range(len(outputs))]
+    computed = np.zeros((blocks, len(outputs), lanes.places), type_)
+    call(blocks, packed.ctypes.data, computed.ctypes.data)
+    results = [computed[:, i, :width].ravel() for i in range(len(outputs))]
     kinds = [value.kind for value in outputs]
     return [r.view(np.uint64) if k == "integer" else r for r, k in zip(results, kinds, strict=True)]
 

@@ -26,10 +26,10 @@ def test_it_follows_the_chain_rule_whatever_becomes_of_its_argument(factor):
     value = scale * trace(exponential, factor * x)
     (slope,) = derivative(value, [x])
     (curvature,) = derivative(slope, [x])
-    found = evaluate([value, slope, curvature], {"x": 0.7, "scale": 3.0})
+    computed = evaluate([value, slope, curvature], {"x": 0.7, "scale": 3.0})
     truth = 3.0 * math.exp(0.7 * factor)
     expected = [truth, factor * truth, factor * factor * truth]
-    assert [float(number) for number in found] == pytest.approx(expected, rel=1e-12)
+    assert [float(number) for number in computed] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_derivative_costs_no_second_series():
@@ -52,6 +52,6 @@ def test_what_a_law_says_of_another_value_stays_out_of_it():
     x, y = graph.input("x", CHANGING), graph.input("y", CHANGING)
     value = trace(exponential, y) * x
     by_x, by_y = derivative(value, [x, y])
-    found = evaluate([by_x, by_y], {"x": 2.0, "y": 0.5})
+    computed = evaluate([by_x, by_y], {"x": 2.0, "y": 0.5})
     expected = [math.exp(0.5), 2.0 * math.exp(0.5)]
-    assert [float(number) for number in found] == pytest.approx(expected, rel=1e-12)
+    assert [float(number) for number in computed] == pytest.approx(expected, rel=1e-12)

@@ -93,9 +93,9 @@ def test_positive_part_and_clip_take_two_operations_a_bound(graph, x):
     assert operation_counts([part])["add"] == 0
     assert operation_counts([held])["choose"] == 4
     numbers = np.array([-np.inf, -1.0, -0.0, 0.0, 0.3, 1.0, 1.5, np.inf, np.nan])
-    found = evaluate([part, held], {"x": numbers})
-    np.testing.assert_array_equal(found[0], np.maximum(numbers, 0.0))
-    np.testing.assert_array_equal(found[1], np.clip(numbers, 0.0, 1.0))
+    computed = evaluate([part, held], {"x": numbers})
+    np.testing.assert_array_equal(computed[0], np.maximum(numbers, 0.0))
+    np.testing.assert_array_equal(computed[1], np.clip(numbers, 0.0, 1.0))
     # A clip between bounds in the wrong order is left as it is.
     odd = trace(clip, x, 1.0, 0.0)
     expected = [clip(number, 1.0, 0.0) for number in numbers]
@@ -136,8 +136,8 @@ def test_simplified_arithmetic_keeps_every_bit(program, inputs):
     for step in program:
         arrays.append(perform(step, arrays, np.where))
         values.append(perform(step, values, graph.select))
-    found = evaluate(values[2:], {"x": arrays[0], "y": arrays[1]})
-    np.testing.assert_array_equal(np.ravel(found), np.ravel(arrays[2:]))
+    computed = evaluate(values[2:], {"x": arrays[0], "y": arrays[1]})
+    np.testing.assert_array_equal(np.ravel(computed), np.ravel(arrays[2:]))
 
 
 def test_the_text_of_a_law_reads_like_one(graph):
@@ -177,12 +177,12 @@ def test_integers_wrap_and_convert(graph):
     outputs += [to_bits(r), from_bits(i), floor(r), graph.select(i < 5, i, 5)]
     numbers = np.array([0, 3, 2**63, 2**64 - 1], np.uint64)
     reals = np.array([-1.5, 0.0, 2.25, 1e300])
-    found = evaluate(outputs, {"i": numbers, "r": reals})
+    computed = evaluate(outputs, {"i": numbers, "r": reals})
     namespace = {}
     exec(python_text(outputs, [i, r], "f"), namespace)
     for k in range(4):
         plain = namespace["f"](int(numbers[k]), float(reals[k]))
-        for a, b in zip(found, plain, strict=True):
+        for a, b in zip(computed, plain, strict=True):
             assert (a.dtype == np.uint64) == isinstance(b, int)
             assert a[k] == b or (np.isnan(a[k]) and np.isnan(b))
 
@@ -193,8 +193,8 @@ def test_truths_combine(graph, x, y):
     assert outputs[4] is low
     assert outputs[5] is graph.select(low, y, x)
     columns = {"x": np.array([-1.0, -1.0, 1.0, 1.0]), "y": np.array([0.0, 2.0, 0.0, 2.0])}
-    found = evaluate(outputs[:4], columns)
-    assert [column.tolist() for column in found] == [
+    computed = evaluate(outputs[:4], columns)
+    assert [column.tolist() for column in computed] == [
         [False, True, False, False],
         [True, True, False, True],
         [False, False, True, True],

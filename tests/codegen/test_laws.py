@@ -38,14 +38,14 @@ def test_an_old_processor_gives_the_same_bits(case, run_columns, monkeypatch):
         pytest.skip("names an x86 processor")
     monkeypatch.setattr(native, "host", lambda: ("x86-64", ""))
     monkeypatch.setattr(native, "_machine", native._new_machine)
-    found = run_columns(case.outputs, case.given, 8)
-    np.testing.assert_array_equal(found, evaluate(case.outputs, case.given))
+    columns = run_columns(case.outputs, case.given, 8)
+    np.testing.assert_array_equal(columns, evaluate(case.outputs, case.given))
 
 
 def test_the_graph_is_the_law_to_a_few_roundings(case):
-    found = evaluate(case.outputs, case.given)
+    computed = evaluate(case.outputs, case.given)
     for i in range(case.count):
-        for output, expected in zip(found, case.plain(i), strict=True):
+        for output, expected in zip(computed, case.plain(i), strict=True):
             # Sums cancel; what they are made of is known from the largest of them.
             scale = np.abs(output).max()
             assert output[i] == pytest.approx(expected, rel=1e-12, abs=1e-13 * scale)
@@ -79,9 +79,9 @@ def test_derivatives_are_central_differences(case):
             # Roundings of x + h count too.
             expected = (a - 8.0 * b + 8.0 * c - d) / (12.0 * step)
             noise = 1e-11 * np.maximum.reduce([np.abs(r[i]) for r in runs]) / step
-            found = np.zeros(case.count) if slope is None else numbers[slope.id]
-            found = np.broadcast_to(found, case.count)
-            wrong = np.abs(found - expected) - 1e-7 * np.abs(expected) - noise
+            computed = np.zeros(case.count) if slope is None else numbers[slope.id]
+            computed = np.broadcast_to(computed, case.count)
+            wrong = np.abs(computed - expected) - 1e-7 * np.abs(expected) - noise
             assert (wrong[smooth] <= 1e-12 * np.abs(expected).max()).all(), (by.data, i)
 
 
@@ -109,26 +109,28 @@ def test_derivatives_are_those_of_algebra(name):
     exact = p._replace(**{n: sympy.Rational(v) for n, v in p._asdict().items()})
     formula = effect.law(*symbols, exact)
     at = {s: sympy.Rational(v) for s, v in zip(symbols, numbers.values(), strict=True)}
-    for found, symbol in zip(evaluate(row, given), symbols, strict=True):
+    for computed, symbol in zip(evaluate(row, given), symbols, strict=True):
         expected = float(formula.diff(symbol).subs(at).evalf(30))
-        assert float(found) == pytest.approx(expected, rel=1e-11)
+        assert float(computed) == pytest.approx(expected, rel=1e-11)
 
 
 def test_fused_code_is_near_and_the_same_in_every_width(case, run_columns):
     exact = evaluate(case.outputs, case.given)
     scalar, vector = (run_columns(case.outputs, case.given, w, fused=True) for w in (1, 8))
     np.testing.assert_array_equal(scalar, vector)
-    for found, expected in zip(scalar, exact, strict=True):
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-10 * np.abs(expected).max())
+    for computed, expected in zip(scalar, exact, strict=True):
+        np.testing.assert_allclose(
+            computed, expected, rtol=1e-9, atol=1e-10 * np.abs(expected).max()
+        )
 
 
 def test_single_precision_is_near(case, run_columns):
     exact = evaluate(case.outputs, case.given)
     scalar, vector = (run_columns(case.outputs, case.given, w, real="float") for w in (1, 16))
     np.testing.assert_array_equal(scalar, vector)
-    for found, expected in zip(scalar, exact, strict=True):
+    for computed, expected in zip(scalar, exact, strict=True):
         bound = 2e-3 * np.abs(expected).max()
-        assert np.median(np.abs(found - expected)) <= bound
+        assert np.median(np.abs(computed - expected)) <= bound
 
 
 def test_counts_are_of_each_operation_once():

@@ -18,7 +18,7 @@ from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION, friction_fo
 def text_of(outputs, lanes):
     """A kernel of one thread a lane, on rows [slot, lane]."""
     inputs, module = live_inputs(outputs), ir.Module()
-    arguments = [("count", INTEGER), ("given", POINTER), ("found", POINTER)]
+    arguments = [("count", INTEGER), ("given", POINTER), ("computed", POINTER)]
     builder, (count, given, into) = kernel(module, "run", arguments)
     lane = thread_index(builder)
     with builder.if_then(builder.icmp_signed("<", lane, count)):
@@ -27,9 +27,9 @@ def text_of(outputs, lanes):
             return builder.add(builder.mul(count, integer(slot)), lane)
 
         known = {v.id: lanes.load(builder, given, at(i), v.kind) for i, v in enumerate(inputs)}
-        found = lanes.emit(builder, outputs, known)
+        operands = lanes.emit(builder, outputs, known)
         for i, value in enumerate(outputs):
-            lanes.store(builder, found[value.id], into, at(i), value.kind)
+            lanes.store(builder, operands[value.id], into, at(i), value.kind)
     builder.ret_void()
     return ptx(module)
 
@@ -50,13 +50,13 @@ def test_strict_text_rounds_every_operation(friction):
     assert ".visible .entry run(" in text
     assert ".target sm_90" in text
     assert all(name in text for name in ("%ctaid.x", "%ntid.x", "%tid.x"))
-    found, counts = instructions(text), operation_counts(friction)
-    assert found["mul.rn.f64"] + found["add.rn.f64"] + found["sub.rn.f64"] == (
+    written, counts = instructions(text), operation_counts(friction)
+    assert written["mul.rn.f64"] + written["add.rn.f64"] + written["sub.rn.f64"] == (
         counts["multiply"] + counts["add"]
     )
-    assert found["div.rn.f64"] + found["rcp.rn.f64"] == counts["divide"]
+    assert written["div.rn.f64"] + written["rcp.rn.f64"] == counts["divide"]
     # Without .rn the driver would be free to fuse them.
-    assert not any(name.startswith("fma") or name in ("mul.f64", "add.f64") for name in found)
+    assert not any(name.startswith("fma") or name in ("mul.f64", "add.f64") for name in written)
 
 
 def test_fused_and_single_text(friction):

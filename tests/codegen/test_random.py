@@ -49,14 +49,14 @@ def counters():
 
 @pytest.mark.parametrize("width", [1, 8])
 def test_python_and_compiled_code_draw_the_same_numbers(traced, counters, width, run_columns):
-    found = run_columns(traced, counters, width)
-    for column, expected in zip(found, evaluate(traced, counters), strict=True):
+    columns = run_columns(traced, counters, width)
+    for column, expected in zip(columns, evaluate(traced, counters), strict=True):
         np.testing.assert_array_equal(column, expected)
     plain = {name: [int(number) for number in numbers] for name, numbers in counters.items()}
     for i in range(64):
         words = philox(tuple(plain[name][i] for name in "abcd"), (plain["k"][i], 7))
-        assert words == tuple(int(column[i]) for column in found[:4])
-        assert normals(words) == tuple(column[i] for column in found[4:])
+        assert words == tuple(int(column[i]) for column in columns[:4])
+        assert normals(words) == tuple(column[i] for column in columns[4:])
 
 
 def test_drawing_calls_no_library_and_divides_twice(traced):

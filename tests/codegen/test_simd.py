@@ -48,11 +48,11 @@ def test_a_loop_is_a_range(start, step):
             kept = builder.load(where, typ=DOUBLE)
             builder.store(builder.fadd(kept, ir.Constant(DOUBLE, 1.0)), where)
 
-    found = np.zeros((20, 2))
-    call(write, 20, found)
+    computed = np.zeros((20, 2))
+    call(write, 20, computed)
     expected = np.zeros((20, 2))
     expected[start::step] = 1.0
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(computed, expected)
 
 
 def test_a_repetition_ends_where_it_is_left():
@@ -142,8 +142,8 @@ def test_every_kind_is_kept_and_every_operation_written(width, paired, run_colum
         "i": np.array([0, 4, 2**63, 2**64 - 1] * 4, np.uint64),
         "t": np.array([0.0, 1.0] * 8),
     }
-    found = run_columns(outputs, given, width, paired=paired)
-    for column, expected in zip(found, evaluate(outputs, given), strict=True):
+    columns = run_columns(outputs, given, width, paired=paired)
+    for column, expected in zip(columns, evaluate(outputs, given), strict=True):
         np.testing.assert_array_equal(column, expected)
 
 
@@ -160,8 +160,8 @@ def test_what_is_known_is_not_computed_again():
     root = (x * x + 1.0) ** 0.5
     module = ir.Module()
     builder, (given,) = function(module, "run", [("given", DOUBLE)], DOUBLE)
-    found = SimdEmitter().emit(builder, [root * 2.0], {root.id: given})
-    builder.ret(found[(root * 2.0).id])
+    operands = SimdEmitter().emit(builder, [root * 2.0], {root.id: given})
+    builder.ret(operands[(root * 2.0).id])
     assert "sqrt" not in str(module)
 
 
@@ -173,10 +173,10 @@ def test_strict_code_rounds_twice_and_fused_code_once(run_columns):
     given = {name: draw.normal(size=64) for name in "abc"}
     given["c"] = -given["a"] * given["b"]
     x, y, z = given.values()
-    for found, expected in zip(
+    for computed, expected in zip(
         run_columns(outputs, given, 8), (x * y + z, z - x * y, x * y - z), strict=True
     ):
-        np.testing.assert_array_equal(found, expected)
+        np.testing.assert_array_equal(computed, expected)
     signs = ((1, 1), (-1, 1), (1, -1))
     alone = [run_columns([output], given, 1, fused=True)[0] for output in outputs]
     # One product in three sums goes into all of them.

@@ -17,10 +17,10 @@ def graph():
 
 def terms_of(total, *others):
     """Terms of a sum as (sign, names or operations of its factors)."""
-    found = Sums(order([total, *others]), [total, *others]).terms[total.id]
+    terms = Sums(order([total, *others]), [total, *others]).terms[total.id]
     return [
         ("-" if term.is_negative else "+", *[f.data or f.operation for f in term.factors])
-        for term in found
+        for term in terms
     ]
 
 

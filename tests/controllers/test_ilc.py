@@ -98,8 +98,8 @@ def trials(controller, env, nominal=None, count=10, seed=50):
     left = []
     for trial in range(count):
         env.reset(seed=seed + trial)
-        told = env.station if nominal is None else replace(env.station, model=nominal)
-        controller.reset(env.reference, told)
+        information = env.station if nominal is None else replace(env.station, model=nominal)
+        controller.reset(env.reference, information)
         ended, info = False, {}
         while not ended:
             volts = controller.act(env.measurement, env.time)
@@ -127,11 +127,11 @@ def test_noise_floor_is_reached_in_ten_trials(loop, worse):
     """As well as the same controller that was told the true model, within a fifth."""
     env, nominal = drawn("displacement", 150, seed=300, **loop)
     learned = trials(ILC(Settings(3.0, 0.3, 0.3)), env, nominal)
-    told = trials(ILC(Settings(3.0, 0.3, 0.3)), env)
-    assert learned[0] > worse * told[0]
-    assert np.mean(learned[-3:]) < 1.2 * np.mean(told[-3:])
+    errors = trials(ILC(Settings(3.0, 0.3, 0.3)), env)
+    assert learned[0] > worse * errors[0]
+    assert np.mean(learned[-3:]) < 1.2 * np.mean(errors[-3:])
     # Nor does repeating make the noise grow.
-    assert np.mean(learned[-3:]) < 1.2 * np.mean(told[:3])
+    assert np.mean(learned[-3:]) < 1.2 * np.mean(errors[:3])
 
 
 def test_contraction_by_the_regulator_is_learned():

@@ -44,10 +44,10 @@ def test_filter_gain_makes_the_spread_stand_still():
     # Long iteration of the filter's own recursion, from a spread that is far off.
     spread = 1e-4 * np.eye(len(push))
     for _ in range(4000):
-        found = spread[:, 0] / (spread[0, 0] + motion.noise**2)
-        corrected = spread - np.outer(found, spread[0])
+        filter_gain = spread[:, 0] / (spread[0, 0] + motion.noise**2)
+        corrected = spread - np.outer(filter_gain, spread[0])
         spread = whole @ corrected @ whole.T + driven
-    assert gain == pytest.approx(found, rel=1e-6)
+    assert gain == pytest.approx(filter_gain, rel=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -106,13 +106,13 @@ def test_free_rotor_is_exact_under_held_voltage():
     a[:, 0] = columns[0]
     rotor, drive = (where.model.parameters[n] for n in ("rotor", "drive"))
     rate, push = rotor.damping / rotor.inertia, rotor.radius * drive.gain / rotor.inertia
-    x, found = np.zeros(3), []
+    x, computed = np.zeros(3), []
     for _ in range(50):
         x = a @ x + b * 0.1
-        found.append(x[0])
+        computed.append(x[0])
     times = 0.01 * np.arange(1, 51)
     exact = 0.1 * push / rate * (times + np.expm1(-rate * times) / rate)
-    assert found == pytest.approx(exact, rel=1e-9)
+    assert computed == pytest.approx(exact, rel=1e-9)
 
 
 def readings(where, ways_mm, loads_n, period=0.01):

@@ -23,8 +23,8 @@ def problem(seed, count=6):
 def test_without_limits_the_program_solves_the_normal_equations(seed):
     square, linear = problem(seed)
     program = BoundedProgram(6)
-    found = program.solve(square, linear, np.full(6, -1e6), np.full(6, 1e6))
-    assert np.allclose(square @ found, -linear, rtol=0, atol=1e-10)
+    solution = program.solve(square, linear, np.full(6, -1e6), np.full(6, 1e6))
+    assert np.allclose(square @ solution, -linear, rtol=0, atol=1e-10)
     assert program.limited == 0
 
 
@@ -33,15 +33,15 @@ def test_at_limits_the_program_keeps_the_optimality_conditions(seed):
     square, linear = problem(seed)
     program = BoundedProgram(6)
     low, high = np.full(6, -0.05), np.full(6, 0.02)
-    found = program.solve(square, linear, low, high)
-    slope = square @ found + linear
+    solution = program.solve(square, linear, low, high)
+    slope = square @ solution + linear
     assert program.limited == 1 and program.failures == 0
-    assert np.all((low <= found) & (found <= high))
+    assert np.all((low <= solution) & (solution <= high))
     near = 100.0 * ACCURACY
     # At a limit the slope pushes against it, elsewhere there is none (Karush, Kuhn, Tucker).
-    assert np.all(slope[found <= low + near] >= -near * np.abs(square).max())
-    assert np.all(slope[found >= high - near] <= near * np.abs(square).max())
-    inside = (found > low + near) & (found < high - near)
+    assert np.all(slope[solution <= low + near] >= -near * np.abs(square).max())
+    assert np.all(slope[solution >= high - near] <= near * np.abs(square).max())
+    inside = (solution > low + near) & (solution < high - near)
     assert np.abs(slope[inside]).max(initial=0.0) < near * np.abs(square).max()
 
 
@@ -56,12 +56,12 @@ def test_the_plan_is_the_least_squares_solution_of_the_stepped_model(station):
     weights, nominal = bank.weights, design.motion.volts
 
     def errors(plan):
-        x, found = start, []
+        x, residuals = start, []
         for k, volts in enumerate(plan):
             x = bank.moved(x, first + k, nominal[first + k] + volts)
             predicted = x @ design.ahead[0, first, 0]
-            found.append(design.motion.error[first + k + 1] + weights @ predicted)
-        return np.array(found)
+            residuals.append(design.motion.error[first + k + 1] + weights @ predicted)
+        return np.array(residuals)
 
     free = errors(np.zeros(count))
     effect = np.stack([errors(1e-3 * pulse) - free for pulse in np.eye(count)], axis=1) / 1e-3

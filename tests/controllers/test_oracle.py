@@ -53,10 +53,10 @@ def test_what_is_foreseen_depends_on_no_other_plan_and_leaves_the_plant_alone():
     plant = Plant("station")
     condition = plant.settle(3.0, pressure=300e3)
     before = condition.state.copy()
-    foresight = Prediction(plant, np.array([0.0, 0.01, 0.02]))
+    prediction = Prediction(plant, np.array([0.0, 0.01, 0.02]))
     volts = np.linspace(0.0, 10.0, PLANS)[:, None] * np.ones(2)
-    together = foresight(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
-    alone = foresight(condition, Commands(volts[7:8], 5.0), 1)["extension"]
+    together = prediction(condition, Commands(volts, 5.0), PLANS)["extension"].copy()
+    alone = prediction(condition, Commands(volts[7:8], 5.0), 1)["extension"]
     assert np.array_equal(alone[0], together[7])
     assert np.array_equal(condition.state, before)
 
@@ -70,12 +70,12 @@ def test_of_errors_linear_in_the_plan_it_finds_the_least_squares_within_limits(l
     generator, blocks = np.random.default_rng(1), np.array([0, 1, 2, 2, 3, 3, 3, 3])
     matrix, wanted = generator.normal(size=(20, 8)), 5.0 * generator.normal(size=20)
     plan, space = np.full(8, 5.0), Space(blocks, 5.0 - limit, 5.0 + limit)
-    found = best_plan(
+    optimum = best_plan(
         lambda plans: (plans - 5.0) @ matrix.T - wanted, plan, plan[None, :] + 0.5, space
     )
     by_block = matrix @ np.eye(4)[blocks]
     expected = lsq_linear(by_block, wanted, (-limit, limit)).x
-    assert found - 5.0 == pytest.approx(expected[blocks], abs=1e-5)
+    assert optimum - 5.0 == pytest.approx(expected[blocks], abs=1e-5)
 
 
 def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_number():
@@ -83,9 +83,9 @@ def test_the_plan_is_never_worse_than_any_start_and_passes_over_what_is_no_numbe
         return np.where(plans > 3.0, np.nan, np.cos(5.0 * plans) + 0.1 * plans**2)
 
     starts = np.array([[1.0], [4.0], [2.0]])
-    found = best_plan(errors, np.zeros(1), starts, Space(np.zeros(1, int), 0.0, 5.0))
+    optimum = best_plan(errors, np.zeros(1), starts, Space(np.zeros(1, int), 0.0, 5.0))
     best = min(float(errors(s) ** 2) for s in (0.0, *starts[:, 0]) if s <= 3.0)
-    assert float(errors(found)[0] ** 2) <= best
+    assert float(errors(optimum)[0] ** 2) <= best
 
 
 def test_a_plan_is_held_to_the_limits_period_by_period():
@@ -129,15 +129,15 @@ def test_it_beats_feedforward_and_feedback(task, pressure, options, drive):
 
 def test_it_knows_a_station_that_is_not_its_model(drive):
     got, _ = drive(Oracle(), "displacement", 300, randomisation="varied")
-    told, _ = drive(ImprovedFeedforward(), "displacement", 300, randomisation="varied")
-    assert got["displacement"] < 0.015 < 0.05 * told["displacement"]
+    feedforward, _ = drive(ImprovedFeedforward(), "displacement", 300, randomisation="varied")
+    assert got["displacement"] < 0.015 < 0.05 * feedforward["displacement"]
 
 
 def test_it_commands_the_regulator_where_that_is_the_actuator(drive):
     for options in ({}, LATE):
         got, _ = drive(Oracle(), "triangle_low", 150, **options)
-        told, _ = drive(ImprovedFeedforward(), "triangle_low", 150, **options)
-        assert all(got[phase] < 0.8 * told[phase] for phase in got)
+        feedforward, _ = drive(ImprovedFeedforward(), "triangle_low", 150, **options)
+        assert all(got[phase] < 0.8 * feedforward[phase] for phase in got)
 
 
 def test_no_noise_enters_it():

@@ -166,8 +166,8 @@ def test_gains_are_of_the_kind_of_task_and_of_the_loop(controller, station):
     slow = scheduled_gains(controller, late)
     assert slow.integral < 0.7 * scheduled_gains(controller, base).integral
     # Heard late is as bad as obeyed late.
-    heard = replace(base, period=0.02, observation_delay=0.02)
-    assert scheduled_gains(controller, heard) == slow
+    delayed = replace(base, period=0.02, observation_delay=0.02)
+    assert scheduled_gains(controller, delayed) == slow
     # What was not tuned takes the gains of what is nearest in dead time: 5 to 10 ms, 50 to 40 ms.
     quick = replace(base, period=0.005)
     assert scheduled_gains(controller, quick) == scheduled_gains(controller, base)
@@ -182,8 +182,8 @@ def test_a_reading_is_compared_with_the_reference_of_its_time(station, reading):
     controller = PID(Gains(400.0, 8000.0, 0.0, 0.005))
     controller.reset(lambda time: 5e-3 * time, late)
     for k in range(2, 50):
-        heard = reading(extension=5e-3 * (k * PERIOD - 0.02))
-        assert controller.act(heard, k * PERIOD) == pytest.approx(nominal_offset(late), abs=1e-9)
+        delayed = reading(extension=5e-3 * (k * PERIOD - 0.02))
+        assert controller.act(delayed, k * PERIOD) == pytest.approx(nominal_offset(late), abs=1e-9)
 
 
 def test_regulator_begins_at_the_voltage_that_holds_its_pressure(station, reading):

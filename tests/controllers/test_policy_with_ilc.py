@@ -26,18 +26,18 @@ def weaker():
 
 def trials(controller, seeds, env):
     """RMSE (mm) of each trial in turn."""
-    found = []
+    errors = []
     for seed in seeds:
         _, ended = env.reset(seed=seed), False
-        told = replace(env.station, model=load_model("station"))
-        controller.reset(env.reference, told)
+        information = replace(env.station, model=load_model("station"))
+        controller.reset(env.reference, information)
         while not ended:
             volts = controller.act(env.measurement, env.time)
             *_, terminated, truncated, info = env.step(env.action(volts))
             ended = terminated or truncated
         assert truncated
-        found.append(info["rmse_mm"])
-    return found
+        errors.append(info["rmse_mm"])
+    return errors
 
 
 def test_half_is_learned_at_the_corner_without_phase():

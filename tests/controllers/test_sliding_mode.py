@@ -52,8 +52,8 @@ def test_switching_asks_for_no_more_than_k(station, reading):
     begun(controller, station, ISOTONIC["isotonic"])
     generator, beyond = np.random.default_rng(0), 0
     for k in range(200):
-        heard = reading(extension=float(generator.normal(0.0, 1e-3)), load=200.0)
-        voltage = controller.act(heard, k * PERIOD)
+        measured = reading(extension=float(generator.normal(0.0, 1e-3)), load=200.0)
+        voltage = controller.act(measured, k * PERIOD)
         observer = controller._observer
         # What `update` returned, anew: it does not depend on what is sent afterwards.
         place = observer.places[observer.at]

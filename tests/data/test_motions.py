@@ -11,8 +11,8 @@ TIME = np.arange(3841) / 384.0
 
 
 def test_a_triangle_goes_up_and_down_at_one_speed():
-    found = triangle(6.0, 4.0, 3)(np.array([0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 11.0, 12.0]))
-    np.testing.assert_allclose(found, [0, 3, 6, 3, 0, 6, 3, 0], atol=1e-15)
+    positions = triangle(6.0, 4.0, 3)(np.array([0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 11.0, 12.0]))
+    np.testing.assert_allclose(positions, [0, 3, 6, 3, 0, 6, 3, 0], atol=1e-15)
 
 
 def test_a_piece_begins_at_its_time_although_times_are_rounded():

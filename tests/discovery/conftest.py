@@ -59,7 +59,7 @@ def record(name, trial, given, refitted, truth):
 
 
 @pytest.fixture(scope="session")
-def found():
+def example():
     """A diagnosis that names Coulomb friction, with every part that a page can show."""
     given = load_model("serres2008")
     truth = given.replace({"coulomb_friction.static_n": 25.0, "coulomb_friction.dynamic_n": 20.0})
@@ -155,7 +155,7 @@ def found():
     )
 
 
-def bare(found, verdict, sentence, **kept):
+def bare(example, verdict, sentence, **kept):
     """A diagnosis with nothing but what is given."""
     return Diagnosis(
         verdict=verdict,
@@ -166,14 +166,14 @@ def bare(found, verdict, sentence, **kept):
         gap=kept.pop("gap", {}),
         candidates=(),
         next_experiment=kept.pop("next_experiment", None),
-        model=found.given,
-        given=found.given,
+        model=example.given,
+        given=example.given,
         **kept,
     )
 
 
 @pytest.fixture(scope="session")
-def diagnoses(found):
+def diagnoses(example):
     """One of each verdict."""
     at = np.linspace(0, 40, 50)
     bump = 8.0 * np.exp(-(((at - 20) / 6) ** 2))
@@ -187,23 +187,26 @@ def diagnoses(found):
         "A bump of 8 N around 20 mm; no dependence on speed or pressure was found.",
     )
     parameters = replace(
-        found,
+        example,
         verdict="parameters",
         sentence="The drive pulls 3 % less than the model says; no effect is missing.",
         effects=(),
         next_experiment=None,
     )
     return {
-        "effect": found,
+        "effect": example,
         "parameters": parameters,
         "agrees": bare(
-            found, "agrees", "Model and data agree to within the noise.", not_detectable=("creep",)
+            example,
+            "agrees",
+            "Model and data agree to within the noise.",
+            not_detectable=("creep",),
         ),
-        "unknown": bare(found, "unknown", "A force is missing that no effect has.", law=law),
+        "unknown": bare(example, "unknown", "A force is missing that no effect has.", law=law),
         "undecidable": bare(
-            found,
+            example,
             "undecidable",
             "These trials hold still: they cannot tell one effect from another.",
-            next_experiment=found.next_experiment,
+            next_experiment=example.next_experiment,
         ),
     }

@@ -35,7 +35,7 @@ LEVELS = np.hypot(sensors.noise_levels(STATION), STEPS / np.sqrt(12.0))
 def commanded(number, rate=64.0, seconds=5.0, seed=3, kinds=(0, 1, 2), kpa=(220.0, 520.0)):
     """Triangles of load, steps of load and pressure, and sums of sines, in turn."""
     generator = np.random.default_rng(seed)
-    plant, found = Plant(STATION), []
+    plant, simulated = Plant(STATION), []
     time = np.arange(round(seconds * rate) + 1) / rate
     along = np.clip((time - 0.5) / (seconds - 1.5), 0.0, 1.0)
     moving = (time > 0.5) & (time < seconds - 1.0)
@@ -53,8 +53,8 @@ def commanded(number, rate=64.0, seconds=5.0, seed=3, kinds=(0, 1, 2), kpa=(220.
             ),
             (2.5 + 0.4 * np.where(moving, waves, 0.0), held),
         ][kinds[k % len(kinds)]]
-        found.append(Trial(time, {"motor_voltage": motor, "regulator_voltage": regulator}))
-    return found
+        simulated.append(Trial(time, {"motor_voltage": motor, "regulator_voltage": regulator}))
+    return simulated
 
 
 def measured(model, number=4, rate=64.0, seconds=5.0, seed=3, noise=True, **kinds):

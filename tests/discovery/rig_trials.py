@@ -59,11 +59,11 @@ def station(lanes=12, seconds=4.0, hidden="hysteresis"):
     """Knots, volts at them, and what noiseless sensors read at 2 kHz, shape (lanes, rows, 4)."""
     knots, motor, regulator = commands(lanes, seconds)
     time = np.arange(round(seconds * FASTEST) + 1) / FASTEST
-    told = [np.array([np.interp(time, knots, row) for row in rows]) for rows in (motor, regulator)]
+    volts = [np.array([np.interp(time, knots, row) for row in rows]) for rows in (motor, regulator)]
     rig = {name: np.full(lanes, OFF.get(name, 1.0) * value) for name, value in NOMINAL.items()}
     with mock.patch.multiple(simulation, RATE=FASTEST, SUBSTEPS=SUBSTEPS):
         read = simulation.simulate(
-            simulation.Commands(told[0], told[1], np.zeros(lanes)), rig, HIDDEN[hidden](lanes)
+            simulation.Commands(volts[0], volts[1], np.zeros(lanes)), rig, HIDDEN[hidden](lanes)
         )
     return knots, motor, regulator, time, read
 
@@ -75,11 +75,11 @@ def logged(lane, times, hidden="hysteresis", lanes=12, seconds=4.0, step=True):
     held = np.stack([np.interp(times, fine, read[lane, :, i]) for i in range(4)], axis=1)
     held = held + generator.standard_normal(held.shape) * np.array(NOISE) * np.array(UNITS)
     held = np.round(held / STEPS) * STEPS if step else held
-    told = {
+    commands = {
         "motor_voltage": np.interp(times, knots, motor[lane]),
         "regulator_voltage": np.interp(times, knots, regulator[lane]),
     }
-    return Trial(times, told, dict(zip(SIGNALS, held.T, strict=True)))
+    return Trial(times, commands, dict(zip(SIGNALS, held.T, strict=True)))
 
 
 def at(rate, seconds=4.0):
@@ -159,9 +159,9 @@ def hanging_load(hidden="nothing", seconds=4.5, rate=50):
     volts = (kpa * 1e3 - rig["regulator_offset"][:, None]) / rig["regulator_gain"][:, None]
     effects = [Dashpots(np.full(lanes, 3e3), (0.7,))] if hidden == "creep" else []
     time = np.arange(round(seconds * FASTEST) + 1) / FASTEST
-    told = np.array([np.interp(time, knots, row) for row in volts])
+    volts_of_lanes = np.array([np.interp(time, knots, row) for row in volts])
     with mock.patch.multiple(simulation, RATE=FASTEST, SUBSTEPS=SUBSTEPS):
-        commands = simulation.Commands(0.0 * told, told, np.zeros(lanes))
+        commands = simulation.Commands(0.0 * volts_of_lanes, volts_of_lanes, np.zeros(lanes))
         read = simulation.simulate(commands, rig, effects)
     rows = slice(None, None, FASTEST // rate)
     trials = []
@@ -173,7 +173,7 @@ def hanging_load(hidden="nothing", seconds=4.5, rate=50):
                 time[rows],
                 {
                     "load_command": np.full(len(held), weights[lane] * GRAVITY),
-                    "regulator_voltage": told[lane, rows],
+                    "regulator_voltage": volts_of_lanes[lane, rows],
                 },
                 {"contraction": held[:, 0], "pressure": held[:, 3]},
             )
@@ -195,13 +195,13 @@ def one_long_trial(seconds=120.0, rate=50, seed=9):
     motor = np.interp(knots, turns, pulls)
     regulator = (np.interp(knots, turns, kpa) + 20.4) / 59.9
     time = np.arange(round(seconds * FASTEST) + 1) / FASTEST
-    told = [np.interp(time, knots, row)[None] for row in (motor, regulator)]
+    commands = [np.interp(time, knots, row)[None] for row in (motor, regulator)]
     rig = {name: np.full(1, OFF.get(name, 1.0) * value) for name, value in NOMINAL.items()}
     with mock.patch.multiple(simulation, RATE=FASTEST, SUBSTEPS=SUBSTEPS):
-        given = simulation.Commands(told[0], told[1], np.zeros(1))
+        given = simulation.Commands(commands[0], commands[1], np.zeros(1))
         read = simulation.simulate(given, rig, HIDDEN["hysteresis"](1))
     rows = slice(None, None, FASTEST // rate)
     noise = generator.standard_normal((len(time[rows]), 4)) * np.array(NOISE) * np.array(UNITS)
     held = np.round((read[0, rows] + noise) / STEPS) * STEPS
-    volts = {"motor_voltage": told[0][0, rows], "regulator_voltage": told[1][0, rows]}
+    volts = {"motor_voltage": commands[0][0, rows], "regulator_voltage": commands[1][0, rows]}
     return Trial(time[rows], volts, {"contraction": held[:, 0], "load": held[:, 2]})

@@ -52,11 +52,13 @@ def test_a_log_with_friction_is_diagnosed_twice_alike(lab, tmp_path):
         assert done.returncode == 0, done.stderr
         texts.append((tmp_path / name / "diagnosis.json").read_text())
     assert texts[0] == texts[1]
-    found = json.loads(texts[0])
+    document = json.loads(texts[0])
     # serres2008 has 1.5 N of this friction: its size is a parameter, and the answer is its value.
-    assert found["verdict"] == "parameters"
-    assert found["parameters"]["coulomb_friction.dynamic_n"]["to"] == pytest.approx(20.0, rel=0.05)
-    assert all(gap["after"] < 1.2 * gap["floor"] for gap in found["gap"].values())
+    assert document["verdict"] == "parameters"
+    assert document["parameters"]["coulomb_friction.dynamic_n"]["to"] == pytest.approx(
+        20.0, rel=0.05
+    )
+    assert all(gap["after"] < 1.2 * gap["floor"] for gap in document["gap"].values())
     assert load_model(tmp_path / "one" / "model.toml").plant == "station"
     assert "<html" in (tmp_path / "one" / "report.html").read_text()
 
@@ -64,6 +66,6 @@ def test_a_log_with_friction_is_diagnosed_twice_alike(lab, tmp_path):
 def test_a_fit_finds_the_friction(lab, tmp_path):
     done = command("fit", lab, "--model", "serres2008", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    found = json.loads((tmp_path / "lab-fit" / "fit.json").read_text())
-    dynamic = found["parameters"]["coulomb_friction.dynamic_n"]
+    document = json.loads((tmp_path / "lab-fit" / "fit.json").read_text())
+    dynamic = document["parameters"]["coulomb_friction.dynamic_n"]
     assert dynamic["low"] <= 20.0 <= dynamic["high"]

@@ -28,16 +28,20 @@ def diagnosed(name):
 
 @pytest.mark.parametrize("name", EFFECTS)
 def test_a_hidden_effect_is_named(name):
-    found = diagnosed(name)
-    assert found.verdict == "effect", found.sentence
-    assert [effect.name for effect in found.effects if effect.name in group(name)], found.sentence
-    assert len(found.effects) == 1, found.sentence
+    diagnosis = diagnosed(name)
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    assert [effect.name for effect in diagnosis.effects if effect.name in group(name)], (
+        diagnosis.sentence
+    )
+    assert len(diagnosis.effects) == 1, diagnosis.sentence
 
 
 @pytest.mark.parametrize("name", QUIET)
 def test_where_nothing_is_hidden_nothing_is_claimed(name):
-    found = diagnosed(name)
-    assert found.verdict in ("parameters", "agrees") and not found.effects, found.sentence
+    diagnosis = diagnosed(name)
+    assert diagnosis.verdict in ("parameters", "agrees") and not diagnosis.effects, (
+        diagnosis.sentence
+    )
 
 
 MOVED = {
@@ -52,17 +56,17 @@ MOVED = {
 
 @pytest.mark.parametrize("name", [name for name in QUIET if TRUTH[name]["block"] == "parameters"])
 def test_parameters_that_were_off_are_named(name):
-    found = diagnosed(name)
-    assert found.verdict == "parameters"
+    diagnosis = diagnosed(name)
+    assert diagnosis.verdict == "parameters"
     off = {
         path: TRUTH[name]["base_factors"][factor]
         for factor, path in MOVED.items()
         if abs(TRUTH[name]["base_factors"].get(factor, 1.0) - 1.0) > 0.05
     }
-    told = {path for path in off if path not in found.not_identifiable}
-    assert told
-    for path in told:
-        moved = found.parameters[path]
+    identifiable = {path for path in off if path not in diagnosis.not_identifiable}
+    assert identifiable
+    for path in identifiable:
+        moved = diagnosis.parameters[path]
         assert moved.significant
         assert moved.now.value / moved.start == pytest.approx(off[path], rel=0.02)
 

@@ -29,8 +29,8 @@ ROOT = Path(__file__).resolve().parents[2]
 DRIVEN = FROZEN / "driven_slide" / "model.toml"
 
 
-def named(found):
-    return [effect.name for effect in found.effects]
+def named(diagnosis):
+    return [effect.name for effect in diagnosis.effects]
 
 
 @cache
@@ -66,13 +66,13 @@ QUICK = ("raw_volts", "one_long_trial")
 )
 def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     effect, size = HIDDEN[name]
-    found = diagnosed(name)
-    assert found.verdict == "effect", found.sentence
-    assert named(found) == [effect], found.sentence
-    assert set(found.effects[0].confused_with) <= group(effect), found.sentence
+    diagnosis = diagnosed(name)
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    assert named(diagnosis) == [effect], diagnosis.sentence
+    assert set(diagnosis.effects[0].confused_with) <= group(effect), diagnosis.sentence
     for parameter, (true, share) in size.items():
-        assert found.effects[0].parameters[parameter].value == pytest.approx(true, rel=share)
-    assert all(gap.held_out for gap in found.gap.values())
+        assert diagnosis.effects[0].parameters[parameter].value == pytest.approx(true, rel=share)
+    assert all(gap.held_out for gap in diagnosis.gap.values())
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -112,9 +112,9 @@ def test_no_sensor_of_the_frozen_trials_is_taken_for_one_that_ends():
 
 
 def test_of_one_long_trial_stretches_are_left_out():
-    found = diagnosed("one_long_trial")
-    assert found.sentence.startswith("In this trial model")
-    assert any("stretch of its time is left out" in words for words in found.warnings)
+    diagnosis = diagnosed("one_long_trial")
+    assert diagnosis.sentence.startswith("In this trial model")
+    assert any("stretch of its time is left out" in words for words in diagnosis.warnings)
 
 
 def test_a_driven_slide_moves_as_newton_says():
@@ -135,10 +135,10 @@ def test_nothing_is_claimed_of_a_driven_slide_whose_parameters_are_off():
     # Nothing rests and nothing repeats in these logs: a tolerance says what is good enough.
     named = [NamedTrial(f"run_{k}.csv", trial) for k, trial in enumerate(driven_slide())]
     logs = Dataset("slides", None, tuple(named), tolerance={"contraction": 3e-5})
-    found = diagnose(logs, DRIVEN, propose=False)
-    assert found.verdict == "parameters" and not found.effects, found.sentence
-    assert found.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.01)
-    viscous = found.model.parameters["symmetric_damping"].intercept
+    diagnosis = diagnose(logs, DRIVEN, propose=False)
+    assert diagnosis.verdict == "parameters" and not diagnosis.effects, diagnosis.sentence
+    assert diagnosis.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.01)
+    viscous = diagnosis.model.parameters["symmetric_damping"].intercept
     assert viscous == pytest.approx(SLIDE["viscous"], rel=0.03)
 
 
@@ -152,16 +152,16 @@ def one_long_drive():
 
 @pytest.mark.parametrize("log", [fifteen_pulls, one_long_drive])
 def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(log):
-    found = diagnose(log(), DRIVEN, propose=False)
-    assert found.verdict == "effect", found.sentence
-    assert named(found) == ["coulomb_friction"], found.sentence
+    diagnosis = diagnose(log(), DRIVEN, propose=False)
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    assert named(diagnosis) == ["coulomb_friction"], diagnosis.sentence
     # Without the friction the viscous damping comes out six times as large.
-    dynamic = found.effects[0].parameters["dynamic_n"].value
+    dynamic = diagnosis.effects[0].parameters["dynamic_n"].value
     assert dynamic == pytest.approx(12.0, rel=0.05)
-    viscous = found.model.parameters["symmetric_damping"].intercept
+    viscous = diagnosis.model.parameters["symmetric_damping"].intercept
     assert viscous == pytest.approx(SLIDE["viscous"], rel=0.15)
-    assert all(gap.held_out for gap in found.gap.values())
-    cut = any("nothing holds this slide" in words for words in found.warnings)
+    assert all(gap.held_out for gap in diagnosis.gap.values())
+    cut = any("nothing holds this slide" in words for words in diagnosis.warnings)
     assert cut == (log is one_long_drive)
 
 
@@ -180,25 +180,25 @@ def sixty_pulls():
 def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
     for k, trial in enumerate(sixty_pulls()):
         write_trial(trial, tmp_path / f"pull_{k + 1}.csv")
-    found = diagnose(read_dataset(tmp_path), DRIVEN, propose=False)
-    assert found.verdict == "effect" and len(found.trials) == 60
-    assert named(found) == ["drive_delay"], found.sentence
-    assert found.effects[0].parameters["delay_ms"].value == pytest.approx(10.0, rel=0.15)
-    assert found.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.02)
+    diagnosis = diagnose(read_dataset(tmp_path), DRIVEN, propose=False)
+    assert diagnosis.verdict == "effect" and len(diagnosis.trials) == 60
+    assert named(diagnosis) == ["drive_delay"], diagnosis.sentence
+    assert diagnosis.effects[0].parameters["delay_ms"].value == pytest.approx(10.0, rel=0.15)
+    assert diagnosis.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.02)
 
 
 def test_dry_friction_is_found_at_one_and_two_kilohertz():
     rates = enumerate((1000, 2000))
     # Half as long, they do not tell the force from the speed at which it falls.
     logs = [driven_slide(12.0, lanes=2, seconds=3.0, rate=rate)[k] for k, rate in rates]
-    found = diagnose(logs, DRIVEN, propose=False)
-    assert named(found) == ["coulomb_friction"], found.sentence
-    assert found.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.05)
+    diagnosis = diagnose(logs, DRIVEN, propose=False)
+    assert named(diagnosis) == ["coulomb_friction"], diagnosis.sentence
+    assert diagnosis.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.05)
 
 
 def test_nothing_is_claimed_of_a_muscle_that_lifts_weights():
-    found = diagnose(hanging_load(), FROZEN / "hanging_load" / "model.toml", propose=False)
-    assert found.verdict == "parameters" and not found.effects, found.sentence
+    diagnosis = diagnose(hanging_load(), FROZEN / "hanging_load" / "model.toml", propose=False)
+    assert diagnosis.verdict == "parameters" and not diagnosis.effects, diagnosis.sentence
 
 
 def test_a_push_on_a_cable_is_refused_with_what_to_do():

@@ -40,16 +40,16 @@ def test_the_seed_changes_chance_alone():
     assert one.text() == diagnosed("parameters").text()
     assert one.verdict == other.verdict
     assert one.parameters == other.parameters
-    drawn = [[each.p_value for each in found.candidates] for found in (one, other)]
+    drawn = [[each.p_value for each in diagnosis.candidates] for diagnosis in (one, other)]
     assert drawn[0] != drawn[1]
 
 
 def test_the_text_is_json_with_all_parts():
-    found = json.loads(diagnosed("hysteresis").text())
-    assert found["schema"] == 1
-    assert {"verdict", "where", "effects", "parameters", "gap", "candidates"} <= set(found)
-    assert found["effects"][0]["name"] == "hysteresis"
-    assert set(found["gap"]) == {"contraction_mm", "rotation_deg", "load_n", "pressure_kpa"}
+    document = json.loads(diagnosed("hysteresis").text())
+    assert document["schema"] == 1
+    assert {"verdict", "where", "effects", "parameters", "gap", "candidates"} <= set(document)
+    assert document["effects"][0]["name"] == "hysteresis"
+    assert set(document["gap"]) == {"contraction_mm", "rotation_deg", "load_n", "pressure_kpa"}
 
 
 def test_the_amended_model_drives_an_environment(amended):
@@ -79,39 +79,39 @@ def _rms(gap):
 
 
 def test_a_second_diagnosis_finds_nothing_more(amended):
-    found = diagnose(laboratory("hysteresis")[0], amended, propose=False)
-    assert found.verdict in ("agrees", "parameters")
-    assert not found.effects
+    diagnosis = diagnose(laboratory("hysteresis")[0], amended, propose=False)
+    assert diagnosis.verdict in ("agrees", "parameters")
+    assert not diagnosis.effects
 
 
 def test_other_trials_agree_with_the_amended_model(amended):
     truth = laboratory("hysteresis")[1]
-    found = diagnose(measured(truth, 3, seed=8), amended, propose=False)
-    assert found.verdict in ("agrees", "parameters")
-    assert not found.effects
+    diagnosis = diagnose(measured(truth, 3, seed=8), amended, propose=False)
+    assert diagnosis.verdict in ("agrees", "parameters")
+    assert not diagnosis.effects
 
 
 def test_one_trial_works_and_says_so():
-    found = diagnosed("nothing", 1)
-    assert found.verdict in ("agrees", "undecidable")
-    assert any("one trial" in warning for warning in found.warnings)
-    assert not any(gap.held_out for gap in found.gap.values())
+    diagnosis = diagnosed("nothing", 1)
+    assert diagnosis.verdict in ("agrees", "undecidable")
+    assert any("one trial" in warning for warning in diagnosis.warnings)
+    assert not any(gap.held_out for gap in diagnosis.gap.values())
 
 
 @pytest.mark.parametrize("kept", [("contraction",), EVERY[1:]])
 def test_some_sensors_are_enough(kept):
     trials = [only(trial, *kept) for trial in laboratory("hysteresis")[0]]
-    found = diagnose(trials, STATION)
-    assert [effect.name for effect in found.effects] == ["hysteresis"]
-    assert {signal.rpartition("_")[0] for signal in found.gap} == set(kept)
-    assert set(found.floors) == set(found.gap)
+    diagnosis = diagnose(trials, STATION)
+    assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
+    assert {signal.rpartition("_")[0] for signal in diagnosis.gap} == set(kept)
+    assert set(diagnosis.floors) == set(diagnosis.gap)
 
 
 def test_trials_may_have_different_sensors():
     trials = laboratory("hysteresis")[0]
     mixed = [only(trial, *EVERY[k % 2 : 3 + k % 2]) for k, trial in enumerate(trials)]
-    found = diagnose(mixed, STATION)
-    assert [effect.name for effect in found.effects] == ["hysteresis"]
+    diagnosis = diagnose(mixed, STATION)
+    assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
 
 
 def test_gaps_do_no_harm():
@@ -124,26 +124,26 @@ def test_gaps_do_no_harm():
         }
         rows["load"][40:90] = np.nan
         trials.append(Trial(trial.time, trial.commands, rows))
-    found = diagnose(trials, STATION)
-    assert [effect.name for effect in found.effects] == ["hysteresis"]
-    force = found.effects[0].parameters["force_n"]
+    diagnosis = diagnose(trials, STATION)
+    assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
+    force = diagnosis.effects[0].parameters["force_n"]
     assert force.low is not None and force.high is not None
     assert force.value == pytest.approx(6.0, abs=3 * (force.high - force.low) / 3.92)
-    assert np.isfinite([gap.after for gap in found.gap.values()]).all()
+    assert np.isfinite([gap.after for gap in diagnosis.gap.values()]).all()
 
 
 def test_names_of_a_data_set_are_kept():
     trials = laboratory("nothing", 2)[0]
     named = tuple(NamedTrial(f"run_{k}.csv", trial) for k, trial in enumerate(trials))
-    found = refit(Dataset("", None, named), STATION)
-    assert [trial.name for trial in found.trials] == ["run_0.csv", "run_1.csv"]
+    diagnosis = refit(Dataset("", None, named), STATION)
+    assert [trial.name for trial in diagnosis.trials] == ["run_0.csv", "run_1.csv"]
 
 
 def test_a_refit_looks_for_nothing():
-    found = refit(laboratory("hysteresis")[0], STATION)
-    assert found.verdict == "unknown"
-    assert found.candidates == () and found.effects == ()
-    assert found.parameters["drive.gain_n_per_v"].significant
+    diagnosis = refit(laboratory("hysteresis")[0], STATION)
+    assert diagnosis.verdict == "unknown"
+    assert diagnosis.candidates == () and diagnosis.effects == ()
+    assert diagnosis.parameters["drive.gain_n_per_v"].significant
 
 
 def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
@@ -164,24 +164,24 @@ def test_a_refit_that_fits_its_own_readings_worse_is_discarded(monkeypatch):
     monkeypatch.setattr(
         workflow, "_nothing", lambda problem, fit: Selection((), (), fit, problem, fit)
     )
-    found = refit(laboratory("nothing")[0], STATION)
-    assert found.model == STATION and found.parameters == {}
-    assert any("a refit was discarded: it raises" in words for words in found.warnings)
-    assert found.verdict == "agrees"
+    diagnosis = refit(laboratory("nothing")[0], STATION)
+    assert diagnosis.model == STATION and diagnosis.parameters == {}
+    assert any("a refit was discarded: it raises" in words for words in diagnosis.warnings)
+    assert diagnosis.verdict == "agrees"
 
 
 def test_progress_is_told():
-    told = []
+    messages = []
     diagnose(
         laboratory("parameters")[0],
         STATION,
-        progress=lambda *each: told.append(each),
+        progress=lambda *each: messages.append(each),
         propose=False,
     )
-    steps = [step for step, _, _ in told]
+    steps = [step for step, _, _ in messages]
     assert steps[0] == "refitting parameters"
     assert steps[-1] == "putting the answer together"
-    assert all(0 <= done <= total for _, done, total in told)
+    assert all(0 <= done <= total for _, done, total in messages)
 
 
 def test_nothing_cannot_be_diagnosed():

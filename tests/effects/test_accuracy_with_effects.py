@@ -31,8 +31,8 @@ PRESSURES = (200e3, 550e3)
 
 def integrated(plant, trial, pressure):
     """States at every command, and attempts at steps."""
-    start, told = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
-    columns = (told.time, told.motor, told.regulator)
+    start, commands = plant.settle(0.0, pressure), TRIALS[trial](plant, pressure)
+    columns = (commands.time, commands.motor, commands.regulator)
     run = Run(*columns, "zoh", plant.table, start.state, start.zero_contraction)
     attempts = simulate_all(plant.program, [run])
     return run.states, attempts
@@ -45,9 +45,9 @@ def test_positions_keep_their_limit_with_an_effect(name, trial, station_with, st
     positions = [plant.states.index(state) for state in ("contraction", "angle")]
     made = plain = 0
     for pressure in PRESSURES:
-        found, attempts = integrated(plant, trial, pressure)
+        ends, attempts = integrated(plant, trial, pressure)
         truth, _ = integrated(fine, trial, pressure)
-        error = np.abs(found - truth)[:, positions].max(axis=0)
+        error = np.abs(ends - truth)[:, positions].max(axis=0)
         assert np.all(error <= 1e-6 * np.ptp(truth[:, positions], axis=0))
         made, plain = made + attempts, plain + integrated(station, trial, pressure)[1]
     # Nothing bends as sharply as damping whose factor follows a cable that whips.

@@ -99,9 +99,9 @@ def drawn(generator, effect, name, rows):
     return generator.uniform(*SIGNALS[name], rows)
 
 
-def flat(found):
+def flat(outputs):
     """What a law returns, as one list: a number, a pair, or pairs for several memories."""
-    parts = found if isinstance(found, tuple) else (found,)
+    parts = outputs if isinstance(outputs, tuple) else (outputs,)
     return [number for part in parts for number in (part if isinstance(part, tuple) else (part,))]
 
 
@@ -131,8 +131,8 @@ def traced(law, given):
         else:
             arguments.append(graph.input(name, CHANGING))
             numbers[name] = value
-    found = trace(law, *arguments)
-    return evaluate([graph.value(part) for part in flat(found)], numbers)
+    traced_values = trace(law, *arguments)
+    return evaluate([graph.value(part) for part in flat(traced_values)], numbers)
 
 
 @pytest.mark.parametrize(("effect", "law"), LAWS)
@@ -141,11 +141,11 @@ def test_one_text_gives_one_number(effect, law):
     plain = [flat(law(*one_row(given, row))) for row in range(64)]
     parts = flat(as_numpy(law)(*given))
     # Compiled code has the bits of the graph: `tests/kernels`.
-    for part, found, expected in zip(
+    for part, computed, expected in zip(
         parts, traced(law, given), np.reshape(plain, (64, -1)).T, strict=True
     ):
         scale = np.abs(expected).max()
-        for value in (part, found):
+        for value in (part, computed):
             np.testing.assert_allclose(
                 np.broadcast_to(value, 64), expected, rtol=1e-12, atol=1e-12 * scale
             )
@@ -197,12 +197,12 @@ def test_names_are_unique_and_are_their_keys():
 
 
 def test_a_signature_sets_every_phenomenon_apart():
-    told = [
+    signatures = [
         effect.signature
         for effect in CATALOGUE.values()
         if effect.port in PHENOMENA or (effect.port.startswith("sensor:") and effect.law)
     ]
-    assert all(told)
+    assert all(signatures)
 
 
 ADDED = [effect for effect in CATALOGUE.values() if effect.port in PHENOMENA]
@@ -217,13 +217,13 @@ SENSORS = ("lvdt", "load_cell", "pressure_transducer", "potentiometer")
 def rates(model, states):
     """Rates by name at states given by name; states that only this model has are at zero."""
     plant = Plant(model)
-    found = {name: [] for name in plant.states}
+    by_state = {name: [] for name in plant.states}
     for state in states:
         values = np.array([state.get(name, 0.0) for name in plant.states])
         rate = plant.derivative(values, state["motor"], state["regulator"], 0.04)
         for name, value in zip(plant.states, rate, strict=True):
-            found[name].append(value)
-    return found
+            by_state[name].append(value)
+    return by_state
 
 
 def some_states(plant):
@@ -254,10 +254,10 @@ def without():
     return trajectory(BASE)
 
 
-def assert_near(found, expected):
+def assert_near(computed, expected):
     """Trajectories equal but for the steps, which an effect's own states may choose otherwise."""
     for name, values in expected.items():
-        assert np.abs(found[name] - values).max() < 2e-5 * np.ptp(values), name
+        assert np.abs(computed[name] - values).max() < 2e-5 * np.ptp(values), name
 
 
 @pytest.mark.parametrize("effect", ADDED, ids=lambda effect: effect.name)
@@ -265,9 +265,9 @@ def test_an_effect_at_its_neutral_value_is_exactly_absent(effect, without):
     less = Model("less", "", "station", {n: p for n, p in KEPT.items() if n != effect.name})
     more = Model("with", "", "station", {**less.parameters, effect.name: effect.neutral})
     states = list(some_states(Plant(BASE)))
-    expected, found = rates(less, states), rates(more, states)
+    expected, slopes = rates(less, states), rates(more, states)
     for name, values in expected.items():
-        np.testing.assert_array_equal(found[name], values, err_msg=name)
+        np.testing.assert_array_equal(slopes[name], values, err_msg=name)
     assert_near(trajectory(more), trajectory(less) if effect.name in KEPT else without)
 
 
@@ -304,11 +304,12 @@ def test_usual_values_are_a_parameter_set_that_is_there(effect):
 
 
 def test_what_a_file_need_not_name_is_usual_and_the_same_as_when_added():
-    found = [effect for effect in CATALOGUE.values() if effect.defaults]
-    assert [(effect.name, dict(effect.defaults)) for effect in found] == [
-        ("drive_dead_zone", {"slope": 2.0})
+    with_defaults = [effect for effect in CATALOGUE.values() if effect.defaults]
+    assert [(effect.name, dict(effect.defaults)) for effect in with_defaults] == [
+        ("hysteresis", {"memory_at_start": 0.0}),
+        ("drive_dead_zone", {"slope": 2.0}),
     ]
-    for effect in found:
+    for effect in with_defaults:
         for door, value in effect.defaults.items():
             assert effect.quantities[effect.names_at_the_door()[door]].usual == value
     given = {"width_n": 15.0}

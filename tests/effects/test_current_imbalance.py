@@ -53,9 +53,9 @@ def test_it_swings_in_proportion_to_the_load_and_about_it():
 
 def fitted(columns, loads, chosen):
     """Rms (N) of loads about their fit on some rows, at the other rows."""
-    found, *_ = np.linalg.lstsq(columns[chosen], loads[chosen], rcond=None)
-    off = (loads - columns @ found)[~chosen]
-    return float(np.sqrt(np.mean(off**2))), found
+    coefficients, *_ = np.linalg.lstsq(columns[chosen], loads[chosen], rcond=None)
+    off = (loads - columns @ coefficients)[~chosen]
+    return float(np.sqrt(np.mean(off**2))), coefficients
 
 
 def test_table_i3_has_it_on_pressures_that_were_not_fitted_to():
@@ -71,11 +71,11 @@ def test_table_i3_has_it_on_pressures_that_were_not_fitted_to():
         return [volts * np.cos(periods * angle), volts * np.sin(periods * angle)]
 
     plain, _ = fitted(line, loads, seen)
-    by_stand, found = fitted(np.column_stack([line, *wave(stands, 5.9)]), loads, seen)
+    by_stand, coefficients = fitted(np.column_stack([line, *wave(stands, 5.9)]), loads, seen)
     from_rest, _ = fitted(np.column_stack([line, *wave(from_no_load, 5.9)]), loads, seen)
     assert plain > 12.0 and from_rest > 11.5
     assert by_stand < 6.5
-    assert np.hypot(*found[2:]) / found[0] == pytest.approx(0.027, abs=0.002)
+    assert np.hypot(*coefficients[2:]) / coefficients[0] == pytest.approx(0.027, abs=0.002)
     tried = np.arange(2.0, 12.05, 0.1)
     errors = [fitted(np.column_stack([line, *wave(stands, n)]), loads, ~seen)[0] for n in tried]
     assert tried[int(np.argmin(errors))] == pytest.approx(6.0, abs=0.25)

@@ -37,17 +37,17 @@ def test_a_delayed_drive_asks_for_what_was_asked_before(station_with, share):
     drive, p = (plant.model.parameters[name] for name in ("drive", "drive_delay"))
     columns = [plant.states.index(name) for name in CATALOGUE["drive_delay"].memory_names]
     asked = drive.gain * motor + drive.offset
-    found = np.array(
+    loads = np.array(
         [delayed_load(a, tuple(m), p) for a, m in zip(asked, states[:, columns], strict=True)]
     )
     # The first while still knows the command at rest, which stood still.
     late = np.interp(time - DELAY_S, time, asked)
     expected = asked + share * (late - asked)
     later = time > 0.2
-    error = np.abs(found - expected)[later].max() / np.ptp(asked)
+    error = np.abs(loads - expected)[later].max() / np.ptp(asked)
     # At 3 Hz, w = 0.38: amplitude 1 % low, a third of the swing.
     assert error < 0.006
-    assert np.abs(found - asked)[later].max() / np.ptp(asked) > 0.1 * share
+    assert np.abs(loads - asked)[later].max() / np.ptp(asked) > 0.1 * share
 
 
 def test_a_delayed_regulator_fills_a_while_later(station_with, station):
@@ -56,15 +56,15 @@ def test_a_delayed_regulator_fills_a_while_later(station_with, station):
 
     def pressures(plant):
         line = plant.model.parameters["regulator_line"]
-        told = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
-        states, zero = plant.run(time, np.full(len(time), 1.0), told)
+        volts = (multisine(time, 300e3, 50e3) - line.offset) / line.gain
+        states, zero = plant.run(time, np.full(len(time), 1.0), volts)
         return plant.observe(states, zero)["pressure"]
 
-    plain, found = pressures(station), pressures(late)
+    plain, late_pressures = pressures(station), pressures(late)
     expected = np.interp(time - DELAY_S, time, plain)
     later = time > 0.5
-    assert np.abs(found - expected)[later].max() < 0.005 * np.ptp(plain)
-    assert np.abs(found - plain)[later].max() > 0.05 * np.ptp(plain)
+    assert np.abs(late_pressures - expected)[later].max() < 0.005 * np.ptp(plain)
+    assert np.abs(late_pressures - plain)[later].max() > 0.05 * np.ptp(plain)
 
 
 @pytest.mark.parametrize("name", ["drive_delay", "regulator_delay"])
@@ -108,10 +108,10 @@ def test_a_cascade_has_a_delayed_regulator_too():
         load_model("cascade").with_effects({"regulator_delay": {"share": 1.0, "delay_ms": 20}})
     )
     time = np.arange(0.0, 0.5, 0.001)
-    told = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
+    volts = np.where(time > 0.0, *(plain.regulator_voltage(p) for p in (350e3, 300e3)))
 
     def half(plant):
-        states, zero = plant.run(time, np.full(len(time), 2.0), told)
+        states, zero = plant.run(time, np.full(len(time), 2.0), volts)
         return time[np.argmax(plant.observe(states, zero)["pressure"] > 325e3)]
 
     assert half(late) - half(plain) == pytest.approx(0.02, abs=0.002)

@@ -26,11 +26,11 @@ def asked(plant, voltages=VOLTAGES):
 
 def test_a_dead_zone_misses_the_start_and_catches_up(station_with):
     plant = station_with("drive_dead_zone", width_n=15.0)
-    plain, found = asked(plant), held_loads(plant)
+    plain, loads = asked(plant), held_loads(plant)
     expected = np.where(plain < 15.0, 0.0, np.minimum(plain, 2.0 * (plain - 15.0)))
-    np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-7)
-    assert found[1] == pytest.approx(0.0, abs=1e-9) and plain[1] > 5.0
-    np.testing.assert_allclose(found[-3:], plain[-3:], rtol=1e-9)
+    np.testing.assert_allclose(loads, expected, rtol=1e-8, atol=1e-7)
+    assert loads[1] == pytest.approx(0.0, abs=1e-9) and plain[1] > 5.0
+    np.testing.assert_allclose(loads[-3:], plain[-3:], rtol=1e-9)
 
 
 @pytest.mark.parametrize("slope", [1.2, 2.0, 4.0])

@@ -58,9 +58,9 @@ def test_play_is_lost_at_every_turn(station_with, width):
 
 
 def test_play_is_nowhere_but_in_the_potentiometer(station_with, station):
-    found, expected = slowly(station_with("potentiometer_backlash")), slowly(station)
+    readings, expected = slowly(station_with("potentiometer_backlash")), slowly(station)
     for name, values in expected[1].items():
-        np.testing.assert_allclose(found[1][name], values, atol=1e-5 * np.ptp(values) + 1e-12)
+        np.testing.assert_allclose(readings[1][name], values, atol=1e-5 * np.ptp(values) + 1e-12)
 
 
 def test_the_reading_never_runs_backwards():

@@ -109,7 +109,7 @@ def test_without_a_regulator_filling_is_polytropic(exponent):
     )
     start, end, speed, pressure = 0.05, 0.01, -0.02, 300e3
     duration = (end - start) / speed
-    found = solve_ivp(
+    solution = solve_ivp(
         lambda t, y: [filling_rate(y[0], start + speed * t, speed, p)],
         (0.0, duration),
         [pressure],
@@ -117,8 +117,10 @@ def test_without_a_regulator_filling_is_polytropic(exponent):
         atol=1e-3,
     ).y[0, -1]
     ratio = braid_volume(start, p) / braid_volume(end, p)
-    assert found + ATMOSPHERE == pytest.approx((pressure + ATMOSPHERE) * ratio**exponent, rel=1e-8)
-    assert found > pressure
+    assert solution + ATMOSPHERE == pytest.approx(
+        (pressure + ATMOSPHERE) * ratio**exponent, rel=1e-8
+    )
+    assert solution > pressure
 
 
 def test_pressure_rises_while_the_motor_pulls_and_falls_while_it_lets_go(station_with, station):
@@ -146,8 +148,8 @@ def test_pressure_rises_while_the_motor_pulls_and_falls_while_it_lets_go(station
 
 def test_passive_stretch_has_its_four_forces_and_none_in_contraction():
     p = CATALOGUE["passive_stretch"].parse({"factor": 1.0, "resting_length_mm": 250.0})
-    found = [stretch_force(-2.5e-3 * percent, p) for percent in (1, 2, 3, 4)]
-    assert found == pytest.approx([96.0, 229.0, 416.0, 684.0], rel=1e-12)
+    forces = [stretch_force(-2.5e-3 * percent, p) for percent in (1, 2, 3, 4)]
+    assert forces == pytest.approx([96.0, 229.0, 416.0, 684.0], rel=1e-12)
     assert stretch_force(0.0, p) == 0.0 and stretch_force(0.03, p) == 0.0
     rising = np.diff([stretch_force(-x, p) for x in np.linspace(0.0, 0.012, 30)])
     assert np.all(np.diff(rising) > 0.0)

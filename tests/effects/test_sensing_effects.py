@@ -83,5 +83,7 @@ def test_many_wrong_sensors_begin_at_rest(name, quantity, gain, offset, station_
 def test_the_truth_knows_nothing_of_a_wrong_sensor(station_with, station):
     dense = np.arange(0.0, 0.2, 0.01)
     for name, *_ in LINES:
-        found, expected = (pressures(p, 50e3, dense) for p in (station_with(name), station))
-        np.testing.assert_allclose(found, expected, atol=0.01)
+        late_pressures, expected = (
+            pressures(p, 50e3, dense) for p in (station_with(name), station)
+        )
+        np.testing.assert_allclose(late_pressures, expected, atol=0.01)

@@ -188,9 +188,9 @@ BROKEN = {
 def test_what_cannot_be_used_is_refused_with_its_mend(name, write):
     text, message = BROKEN[name]
     path, before = write(text), dict(CATALOGUE)
-    with pytest.raises(OwnEffectError, match=message) as told:
+    with pytest.raises(OwnEffectError, match=message) as raised:
         load_effects(path)
-    assert str(path) in str(told.value)
+    assert str(path) in str(raised.value)
     assert before == CATALOGUE
 
 

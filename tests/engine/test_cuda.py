@@ -102,8 +102,8 @@ def test_threads_have_the_bits_of_the_processor(task, options, steps, rough, thr
     pair = Pair(task, options, 13, threads=threads)
     generator = np.random.default_rng(1)
     for step in range(steps):
-        found = pair.step(actions_of(generator, pair, step, rough)) | pair.states()
-        for name, (one, other) in found.items():
+        stepped = pair.step(actions_of(generator, pair, step, rough)) | pair.states()
+        for name, (one, other) in stepped.items():
             assert np.array_equal(one, other), (name, step)
     assert pair.other.attempts.sum() > 13
 
@@ -114,15 +114,15 @@ def test_single_precision_stays_near_double(rate, rough):
     pair = Pair("displacement", {"control_rate_hz": rate}, 16, "single", threads=6)
     generator, seen, ends = np.random.default_rng(2), [], 0
     for step in range(pair.task.steps(rate) + 5):
-        found = pair.step(actions_of(generator, pair, step, rough))
-        seen.append(np.abs(np.subtract(*found["observations"])))
-        assert np.allclose(*found["rewards"], atol=1e-3)
-        assert np.allclose(*found["scores"], rtol=1e-4)
+        stepped = pair.step(actions_of(generator, pair, step, rough))
+        seen.append(np.abs(np.subtract(*stepped["observations"])))
+        assert np.allclose(*stepped["rewards"], atol=1e-3)
+        assert np.allclose(*stepped["scores"], rtol=1e-4)
         states = pair.states()
         assert np.allclose(*states["contraction"], atol=1e-5 * 25e-3, rtol=0.0)
         assert np.allclose(*states["angle"], atol=1e-5 * np.pi / 2, rtol=0.0)
         assert np.allclose(*states["pressure"], atol=0.1, rtol=0.0)
-        ends += found["last"][0].shape[0]
+        ends += stepped["last"][0].shape[0]
     assert ends == 16
     # One step of the converter is 0.2 % of the range of what is read, or less.
     assert np.max(seen) < 5e-3
@@ -154,8 +154,8 @@ def test_some_environments_begin_anew():
     pair.own.reset(np.flatnonzero(mask))
     assert np.array_equal(pair.other.reset(mask=mask), pair.own.observations)
     assert pair.other.numbers("episode").tolist() == [1, 0, 0, 1, 0, 0]
-    found = pair.step(actions)
-    assert np.array_equal(*found["observations"])
+    stepped = pair.step(actions)
+    assert np.array_equal(*stepped["observations"])
     unseeded = DeviceEngine(pair.task, Options(), 3, "single", CpuDevice())
     first = unseeded.reset().copy()
     assert len({row.tobytes() for row in first}) == 3
@@ -193,9 +193,9 @@ def test_gpu_text_needs_nothing_else(kernel):
 def test_gpu_text_rounds_as_the_processor(kernel):
     step = kernel.ptx().split(".entry begin")[0]
     kind = "f32" if kernel.single else "f64"
-    found = set(re.findall(rf"\b((?:add|sub|mul|fma|div|rcp|sqrt)\S*\.{kind})\b", step))
-    assert {f"fma.rn.{kind}", f"div.rn.{kind}", f"sqrt.rn.{kind}"} <= found
-    assert all(".rn" in name and ".ftz" not in name and "approx" not in name for name in found)
+    matches = set(re.findall(rf"\b((?:add|sub|mul|fma|div|rcp|sqrt)\S*\.{kind})\b", step))
+    assert {f"fma.rn.{kind}", f"div.rn.{kind}", f"sqrt.rn.{kind}"} <= matches
+    assert all(".rn" in name and ".ftz" not in name and "approx" not in name for name in matches)
     # What is wide in single precision: times since the trial began.
     wide = len(re.findall(r"(?:add|sub|mul|fma|div)\.rn\.f64", step))
     assert wide <= 7 if kernel.single else wide > 500
@@ -215,9 +215,9 @@ def test_a_warp_marches_what_its_threads_command_and_sense():
     job = Library(module).function("job", [ctypes.c_int64] * 3, ctypes.c_int64)
     threads = 4 * 32
     for first in range(0, threads, 32):
-        found = [job(turn, first, threads) for turn in range(3 * 32)]
-        assert found == sorted(found)
-        assert set(found) == {k * threads + first + i for k in range(3) for i in range(32)}
+        jobs = [job(turn, first, threads) for turn in range(3 * 32)]
+        assert jobs == sorted(jobs)
+        assert set(jobs) == {k * threads + first + i for k in range(3) for i in range(32)}
 
 
 def test_blocks_share_the_environments_evenly():

@@ -101,15 +101,15 @@ def test_compiled_beginnings_are_those_of_a_search_bit_for_bit(task, options):
         assert engine._settling == engine.task.starts
         if search:
             engine._settling = np.inf, -np.inf
-        found = []
+        states = []
         for seed in (5, None, None, 6):
             envs.reset(seed=seed)
             names = [
                 n for n in engine.state_layout.offsets if engine.state_layout.kind(n) == "real"
             ]
-            found.append([engine.pressures.copy(), *map(engine.numbers, names)])
+            states.append([engine.pressures.copy(), *map(engine.numbers, names)])
         envs.close()
-        return np.array(found)
+        return np.array(states)
 
     for count in (1, 7):
         np.testing.assert_array_equal(begun(count, search=False), begun(count, search=True))

@@ -276,8 +276,8 @@ def test_another_process_goes_on_with_the_same_bits(randomisation, same):
     env = PMAEnv("displacement", model="serres2008", randomisation=randomisation)
     env.reset(seed=1)
     env.step([0.3])
-    found = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", ELSEWHERE], input=pickle.dumps(env), capture_output=True, check=True
     )
     seen = [env.step(np.full(1, 0.1 * k)) for k in range(5)] + [env.reset()]
-    assert same(pickle.loads(found.stdout), seen)
+    assert same(pickle.loads(process.stdout), seen)

@@ -65,12 +65,12 @@ def test_all_passes_of_the_compiler_give_the_bits_of_few(make, monkeypatch, tmp_
 
 
 def test_one_computed_as_a_pair_has_the_bits_of_one_alone(make, monkeypatch):
-    found = []
+    rows = []
     for paired in (False, True):
-        for module in ("kernel", "kernel_writer"):
-            monkeypatch.setattr(f"pma_gym.envs.{module}.pairs", lambda width, p=paired: p)
-        found.append(bits(make(preview=1, pressure_kpa=300), 7))
-    assert found[0] == found[1]
+        for module in ("kernel", "step_writer"):
+            monkeypatch.setattr(f"pma_gym.engine.cpu.{module}.pairs", lambda width, p=paired: p)
+        rows.append(bits(make(preview=1, pressure_kpa=300), 7))
+    assert rows[0] == rows[1]
 
 
 def test_without_noise_the_seed_does_not_matter(make):

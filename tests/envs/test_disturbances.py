@@ -21,8 +21,8 @@ def disturbed(env: PMAEnv, seed: int, volts: float) -> tuple[np.ndarray, np.ndar
     rows, states, over = [], [], False
     while not over:
         *_, terminated, truncated, info = env.step(env.action(volts))
-        told = [info[name] for name in ("regulator_voltage_v", "pressure_kpa", "load_n")]
-        rows.append([*env.disturbance, *told])
+        signals = [info[name] for name in ("regulator_voltage_v", "pressure_kpa", "load_n")]
+        rows.append([*env.disturbance, *signals])
         states.append(env.condition.state)
         over = terminated or truncated
     return np.array(rows), np.array(states)
@@ -130,8 +130,8 @@ def _first_event(env: PMAEnv, seed: int) -> float:
 
 def test_the_regulator_hears_no_more_than_10_volts(make):
     env = make(disturbances="regulator", pressure_kpa=575.0)
-    heard = [disturbed(env, seed, 3.0)[0][:, 2].max() for seed in range(4)]
-    assert max(heard) == 10.0 and env.ended_by == ""
+    highest = [disturbed(env, seed, 3.0)[0][:, 2].max() for seed in range(4)]
+    assert max(highest) == 10.0 and env.ended_by == ""
 
 
 def test_controllers_are_told_the_station_without_the_operator(make):
@@ -197,14 +197,14 @@ def test_a_memory_without_a_rate_is_no_obstacle(tool):
     with_hand = Plant(load_model("station").with_effects({"operator": {"share": 1.0}}))
     bare = Plant("station")
     if tool == "settle":
-        found, expected = (p.settle(3.0, pressure=300e3) for p in (with_hand, bare))
+        with_memory, expected = (p.settle(3.0, pressure=300e3) for p in (with_hand, bare))
         kept = [with_hand.states.index(name) for name in bare.states]
-        np.testing.assert_allclose(found.state[kept], expected.state, rtol=1e-12, atol=1e-15)
-        assert found.state[with_hand.states.index("memory_operator")] == 0.0
+        np.testing.assert_allclose(with_memory.state[kept], expected.state, rtol=1e-12, atol=1e-15)
+        assert with_memory.state[with_hand.states.index("memory_operator")] == 0.0
     elif tool == "linearize":
-        found, expected = (p.linearize(300e3, 0.03) for p in (with_hand, bare))
-        np.testing.assert_allclose(found.A, expected.A, rtol=1e-9, atol=1e-12)
-        assert found.state_labels == expected.state_labels
+        with_memory, expected = (p.linearize(300e3, 0.03) for p in (with_hand, bare))
+        np.testing.assert_allclose(with_memory.A, expected.A, rtol=1e-9, atol=1e-12)
+        assert with_memory.state_labels == expected.state_labels
     else:
         condition = with_hand.settle(3.0, pressure=300e3)
         condition.state[with_hand.states.index("memory_operator")] = -50.0

@@ -193,10 +193,10 @@ def test_batches_truncate_after_their_number_of_steps(mode):
         assert not terminated.any() and truncated.all() == truncated.any()
         if truncated.any():
             ends.append(step)
-            told = info["final_info"] if mode == "SameStep" else info
+            final = info["final_info"] if mode == "SameStep" else info
             if len(ends) == 1:
-                assert told["rmse_mm"][0] == expected["rmse_mm"]
-            assert told["_rmse_mm"].all() and told["ended_by"].tolist() == [""] * 3
+                assert final["rmse_mm"][0] == expected["rmse_mm"]
+            assert final["_rmse_mm"].all() and final["ended_by"].tolist() == [""] * 3
         if truncated.any() and mode == "Disabled":
             envs.reset(options={"reset_mask": truncated})
     assert ends == ([4, 9] if mode == "NextStep" else [4, 8, 12])

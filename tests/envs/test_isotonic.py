@@ -98,10 +98,10 @@ def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
     env = make("isotonic", history=2, preview=1)
     env.reset(seed=2)
     start = env.truth["contraction"]
-    heard = [env.measurement] * 2
+    delayed = [env.measurement] * 2
     for _ in range(80):
         observation, *_, info = env.step(env.action(7.0))
-        heard.append(env.measurement)
+        delayed.append(env.measurement)
     position = env.station.position(env.measurement)
     assert position == -env.measurement.extension > 5e-3
     assert 1e-3 * info["measured_contraction_mm"] == pytest.approx(position)
@@ -109,7 +109,7 @@ def test_contraction_is_positive_and_extension_negative_while_it_shortens(make):
     assert env.position == pytest.approx(-env.truth["extension"])
     # The LVDT lags by 1.6 ms, has 0.02 mm of noise and steps of 0.05 mm.
     assert position == pytest.approx(env.position, abs=0.2e-3)
-    past = [env.station.position(reading) / env.task.protocol.span for reading in heard[-2:-4:-1]]
+    past = [env.station.position(reading) / env.task.protocol.span for reading in delayed[-2:-4:-1]]
     np.testing.assert_allclose(observation[[8, 9]], past, rtol=1e-6)
     off = env.reference(env.time) / env.task.protocol.span - position / env.task.protocol.span
     assert observation[5] == pytest.approx(off, rel=1e-5)
@@ -124,10 +124,10 @@ def test_rmse_is_that_of_the_trajectory(name):
         volts = rest + 0.3e2 * env.reference(env.time)
         *_, terminated, truncated, info = env.step(env.action(volts))
         ended = terminated or truncated
-    found = phase_rmse(env.task.protocol, env.trajectory())
-    assert info["rmse_mm"] == pytest.approx(1e3 * found.pop("all"), rel=1e-12)
-    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in found.items()}
-    assert info["rmse_by_phase_mm"] == by_phase and list(found) == ["I", "II", "III"]
+    errors = phase_rmse(env.task.protocol, env.trajectory())
+    assert info["rmse_mm"] == pytest.approx(1e3 * errors.pop("all"), rel=1e-12)
+    by_phase = {phase: pytest.approx(1e3 * value, rel=1e-12) for phase, value in errors.items()}
+    assert info["rmse_by_phase_mm"] == by_phase and list(errors) == ["I", "II", "III"]
     share = 100.0 * info["rmse_mm"] / (1e3 * env.task.protocol.span)
     assert info["percent_of_range"] == pytest.approx(share)
 

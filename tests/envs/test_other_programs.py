@@ -36,8 +36,8 @@ def test_ended_by_is_a_text_wherever_an_episode_ends(mode, kind, fragile):
         *_, terminated, truncated, info = envs.step(volts.astype(np.float32))
         over = terminated | truncated
         if over.any():
-            told = info["final_info"] if mode == "SameStep" else info
-            words = told["ended_by"]
+            final = info["final_info"] if mode == "SameStep" else info
+            words = final["ended_by"]
             assert all(type(words[i]) is str for i in np.flatnonzero(over))
             if kind == "own":
                 assert all(type(one) is str for one in words)

@@ -45,8 +45,8 @@ def test_rmse_is_that_of_the_trajectory(make, name, rate):
     expected = rmse(error) / FACTORS[unit]
     assert info[f"rmse_{unit}"] == pytest.approx(expected, rel=1e-12)
     assert info[f"rmse_by_phase_{unit}"] == {"whole": pytest.approx(expected, rel=1e-12)}
-    found = phase_rmse(env.task.protocol, env.trajectory())
-    assert found["all"] / FACTORS[unit] == pytest.approx(expected, rel=1e-12)
+    errors = phase_rmse(env.task.protocol, env.trajectory())
+    assert errors["all"] / FACTORS[unit] == pytest.approx(expected, rel=1e-12)
 
 
 def test_a_motion_that_is_a_line_scores_as_the_line(make):

@@ -28,15 +28,15 @@ def rewards_of(env, seed=3, high=1.0) -> list[float]:
     """Rewards of an episode under random actions."""
     generator = np.random.default_rng(seed)
     env.reset(seed=seed)
-    found = []
+    collected = []
     for _ in range(STEPS):
         action = generator.uniform(-1.0, high, env.action_space.shape).astype(np.float32)
         _, reward, terminated, truncated, _ = env.step(action)
         assert type(reward) is float
-        found.append(reward)
+        collected.append(reward)
         if terminated or truncated:
             break
-    return found
+    return collected
 
 
 @pytest.mark.parametrize("task", ["displacement", "rotation", "isotonic", "isotonic_exercise"])

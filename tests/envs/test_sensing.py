@@ -17,14 +17,14 @@ def test_entries_are_those_of_the_table(make, task, regulator):
     env.reset(seed=0)
     at = TASKS[task].protocol.quantity
     span = {"extension": 25e-3, "rotation": np.pi / 2}[at]
-    heard = [env.measurement]
+    delayed = [env.measurement]
     for k in range(30):
         action = env.action(0.1 * k)
         observation, *_ = env.step(action)
-        heard.append(env.measurement)
+        delayed.append(env.measurement)
         reading = env.measurement
         references = [env.reference(env.time + 0.01 * ahead) / span for ahead in range(3)]
-        past = [getattr(heard[max(-1 - back, -len(heard))], at) / span for back in (1, 2, 3)]
+        past = [getattr(delayed[max(-1 - back, -len(delayed))], at) / span for back in (1, 2, 3)]
         expected = [
             reading.extension / 25e-3,
             reading.rotation / (np.pi / 2),
@@ -77,8 +77,8 @@ def test_spread_of_readings_at_rest_is_the_models_noise_and_the_quantisation(mak
     levels = noise_levels(env.plant.model)
     # Rounding to steps that are wide against the noise adds between 0 and 1/2 step, by where the
     # value lies; a fine step adds its step^2 / 12.
-    for level, step, found in zip(levels, steps, spread, strict=True):
-        assert level - 0.5 * step <= found <= np.hypot(level, 0.5 * step) * 1.05
+    for level, step, measured in zip(levels, steps, spread, strict=True):
+        assert level - 0.5 * step <= measured <= np.hypot(level, 0.5 * step) * 1.05
 
 
 def test_noise_is_the_models_where_no_step_of_the_daq_hides_it(make):

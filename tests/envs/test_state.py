@@ -353,7 +353,8 @@ def test_a_planner_finds_what_a_search_by_hand_finds(single):
 def test_a_state_that_an_earlier_version_saved_goes_on():
     """It names `Human`, `Plan` and `Guard`; it was taken after five steps."""
     options = {"human": "typical", "disturbances": "regulator_and_operator"}
-    options |= {"control_rate_hz": 50.0, "pressure_kpa": 550.0}
+    # A shipped model whose numbers are printed ones, so that they stay.
+    options |= {"control_rate_hz": 50.0, "pressure_kpa": 550.0, "model": "serres2008"}
     env, other = PMAEnv("isotonic_exercise", **options), PMAEnv("isotonic_exercise", **options)
     env.reset(seed=3)
     for _ in range(5):

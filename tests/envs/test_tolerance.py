@@ -24,10 +24,10 @@ def driven(env, steps=150):
 
 def test_the_error_follows_the_tolerance_and_costs_steps(make):
     true, _ = driven(make(noise=False, tolerance=1e-8))
-    found = [driven(make(noise=False, tolerance=value)) for value in TOLERANCES]
-    errors = [np.abs(positions - true).max() / np.ptp(true) for positions, _ in found]
+    rows = [driven(make(noise=False, tolerance=value)) for value in TOLERANCES]
+    errors = [np.abs(positions - true).max() / np.ptp(true) for positions, _ in rows]
     assert errors == sorted(errors, reverse=True) and errors[0] > 30.0 * errors[-1] > 0.0
-    attempts = [made for _, made in found]
+    attempts = [made for _, made in rows]
     assert attempts == sorted(attempts) and attempts[0] < 0.9 * attempts[2]
 
 

@@ -169,8 +169,8 @@ def test_pressures_of_one_reset_may_differ_too():
     assert envs.station_info()["pressure_kpa"] == pytest.approx([200.0, 300.0, 400.0])
     mask = np.array([False, True, True])
     envs.reset(options={"pressures_kpa": [500, 350, "random"], "reset_mask": mask})
-    found = envs.station_info()["pressure_kpa"]
-    assert found[:2] == pytest.approx([200.0, 350.0]) and found[2] != pytest.approx(400.0)
+    pressures = envs.station_info()["pressure_kpa"]
+    assert pressures[:2] == pytest.approx([200.0, 350.0]) and pressures[2] != pytest.approx(400.0)
 
 
 @pytest.mark.parametrize("task", TASKS)
@@ -193,16 +193,16 @@ def test_single_precision_is_near(model, task):
 
 def test_single_precision_gives_the_same_bits_in_any_batch():
     actions = np.random.default_rng(0).uniform(-1.0, 0.0, (60, 33, 1))
-    found = []
+    batches = []
     for count, threads in ((33, 1), (33, 2), (17, 1)):
         envs = PMAVectorEnv(count, model="station", precision="single", threads=threads)
         envs.reset(seed=3)
         steps = [envs.step(actions[k, :count]) for k in range(60)]
-        found.append((np.array([s[0] for s in steps]), np.array([s[1] for s in steps])))
-    for observations, rewards in found[1:]:
+        batches.append((np.array([s[0] for s in steps]), np.array([s[1] for s in steps])))
+    for observations, rewards in batches[1:]:
         count = observations.shape[1]
-        np.testing.assert_array_equal(observations, found[0][0][:, :count])
-        np.testing.assert_array_equal(rewards, found[0][1][:, :count])
+        np.testing.assert_array_equal(observations, batches[0][0][:, :count])
+        np.testing.assert_array_equal(rewards, batches[0][1][:, :count])
 
 
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])

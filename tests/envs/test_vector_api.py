@@ -92,7 +92,7 @@ def test_the_same_seed_gives_the_same_bits(batch):
 
 
 def test_without_a_seed_environments_and_episodes_differ(batch):
-    def heard(envs):
+    def measured_by(envs):
         """What the sensors say in an episode's first steps, shape (8, 4, 40)."""
         first, _ = envs.reset()
         later = [envs.step(np.full((8, 1), -1.0))[0] for _ in range(39)]
@@ -100,9 +100,9 @@ def test_without_a_seed_environments_and_episodes_differ(batch):
 
     # Readings are coarse, and one of two environments may well be alike.
     envs = batch(8)
-    first = heard(envs)
+    first = measured_by(envs)
     assert len(np.unique(first.reshape(8, -1), axis=0)) == 8
-    for other in (heard(envs), heard(batch(8))):
+    for other in (measured_by(envs), measured_by(batch(8))):
         assert all(np.any(one != another) for one, another in zip(first, other, strict=True))
 
 

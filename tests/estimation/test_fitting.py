@@ -73,7 +73,7 @@ def test_a_fit_recovers_the_parameters_within_their_standard_errors(fitted, meas
     for path, share in zip(FREE, (1e-3, 2e-2, 5e-2, 1e-2), strict=True):
         assert 0.0 < fitted.errors[path] < share * TRUE[path]
     again = Residuals(fitted.model, measured, FREE).each(np.array(list(fitted.values.values())))
-    assert sum(np.sum(found**2) for found in again) == pytest.approx(fitted.chi_square, rel=1e-12)
+    assert sum(np.sum(each**2) for each in again) == pytest.approx(fitted.chi_square, rel=1e-12)
 
 
 def test_errors_cover_what_noise_does_to_the_parameters():
@@ -83,9 +83,9 @@ def test_errors_cover_what_noise_does_to_the_parameters():
     wave = np.sin(3.0 * when)
     for seed in range(40):
         commands = {"motor_voltage": 2.0 + wave, "regulator_voltage": 5.0 + wave}
-        found = fit(plant.model, [plant.simulate(Trial(when, commands), seed=seed)], free)
-        errors = np.array(list(found.errors.values()))
-        shares.append((np.array(list(found.values.values())) - truth) / errors)
+        fitted = fit(plant.model, [plant.simulate(Trial(when, commands), seed=seed)], free)
+        errors = np.array(list(fitted.errors.values()))
+        shares.append((np.array(list(fitted.values.values())) - truth) / errors)
     spread = np.std(shares, axis=0)
     assert np.all((spread > 0.7) & (spread < 1.35))
     assert np.all(np.abs(np.mean(shares, axis=0)) < 3.5 / math.sqrt(40))
@@ -98,37 +98,37 @@ def test_the_jacobian_is_that_of_a_tight_tolerance(measured, central):
     tight = Residuals(OFF, measured[:3], FREE, tolerance=1e-8)
     curvature = loose.sums(values, 1e-3 * values).curvature
     moves = fitting.SHOWN / np.sqrt(np.diag(curvature) / loose.count)
-    found = np.concatenate([j.reshape(4, -1) for j in loose.jacobian(values, moves, central)], 1)
+    slopes = np.concatenate([j.reshape(4, -1) for j in loose.jacobian(values, moves, central)], 1)
     truth = np.concatenate([j.reshape(4, -1) for j in tight.jacobian(values, 0.1 * moves, True)], 1)
     size = np.linalg.norm(truth, axis=1)
-    assert np.all(np.linalg.norm(found - truth, axis=1) < 0.02 * size)
-    assert np.all(np.sum(found * truth, axis=1) / size / np.linalg.norm(found, axis=1) > 0.9998)
+    assert np.all(np.linalg.norm(slopes - truth, axis=1) < 0.02 * size)
+    assert np.all(np.sum(slopes * truth, axis=1) / size / np.linalg.norm(slopes, axis=1) > 0.9998)
 
 
 def test_sums_are_those_of_residuals_and_their_derivatives(measured):
     some = Residuals(OFF, measured[:3], FREE)
     values, moves = some.start, 1e-3 * some.start
     sums = some.sums(values, moves)
-    r = np.concatenate([found.ravel() for found in some.each(values)])
-    j = np.concatenate([found.reshape(4, -1) for found in some.jacobian(values, moves)], axis=1)
+    r = np.concatenate([residuals.ravel() for residuals in some.each(values)])
+    j = np.concatenate([slopes.reshape(4, -1) for slopes in some.jacobian(values, moves)], axis=1)
     assert sums.chi_square == pytest.approx(r @ r, rel=1e-12)
     np.testing.assert_allclose(sums.gradient, j @ r, rtol=1e-9)
     np.testing.assert_allclose(sums.curvature, j @ j.T, rtol=1e-9)
 
 
 def test_bits_depend_neither_on_threads_nor_on_blocks(fitted, measured, monkeypatch):
-    found = fit(OFF, measured, FREE, threads=3)
-    assert found.values == fitted.values and found.chi_square == fitted.chi_square
-    np.testing.assert_array_equal(found.covariance, fitted.covariance)
+    estimate = fit(OFF, measured, FREE, threads=3)
+    assert estimate.values == fitted.values and estimate.chi_square == fitted.chi_square
+    np.testing.assert_array_equal(estimate.covariance, fitted.covariance)
     monkeypatch.setattr(residuals, "MOST_BYTES", 1 << 20)
     assert fit(OFF, measured, FREE, threads=2).values == fitted.values
 
 
 def test_linear_algebra_has_one_thread_in_a_fit_and_its_own_number_after_it(measured):
     def threads(_=None):
-        found = [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
-        seen.extend(found)
-        return found
+        numbers = [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+        seen.extend(numbers)
+        return numbers
 
     seen = []
     with threadpool_limits(2, user_api="blas"):
@@ -141,13 +141,13 @@ def test_linear_algebra_has_one_thread_in_a_fit_and_its_own_number_after_it(meas
 
 def test_many_trials_are_fitted_to_a_few_of_them_first():
     rounds = []
-    found = fit(OFF, trials(Plant("station"), 16, 1.0), FREE, progress=rounds.append)
-    assert found.converged
+    data = fit(OFF, trials(Plant("station"), 16, 1.0), FREE, progress=rounds.append)
+    assert data.converged
     assert {entry.trials for entry in rounds} == {fitting.FEW, 16}
     assert [entry.number for entry in rounds] == sorted(entry.number for entry in rounds)
     assert set(rounds[0].values) == set(FREE)
     for path in FREE:
-        assert abs(found.values[path] - TRUE[path]) < 4.0 * found.errors[path]
+        assert abs(data.values[path] - TRUE[path]) < 4.0 * data.errors[path]
 
 
 def test_what_was_not_measured_counts_for_nothing(fitted, measured):
@@ -161,11 +161,11 @@ def test_what_was_not_measured_counts_for_nothing(fitted, measured):
         poor.append(Trial(trial.time, trial.commands, kept))
     some = Residuals(OFF, poor, FREE)
     assert some.count == 6 * (2 * 1152 - 101)
-    for found in some.each(some.start):
-        assert np.all(found[:, [1, 3]] == 0.0) and np.all(found[100:200, 2] == 0.0)
-        assert found[300, 2] == 0.0
-    found = fit(OFF, poor, FREE[:3])
-    assert found.converged
+    for estimate in some.each(some.start):
+        assert np.all(estimate[:, [1, 3]] == 0.0) and np.all(estimate[100:200, 2] == 0.0)
+        assert estimate[300, 2] == 0.0
+    estimate = fit(OFF, poor, FREE[:3])
+    assert estimate.converged
 
 
 def test_sensors_without_a_lag_are_fitted_too():
@@ -173,25 +173,25 @@ def test_sensors_without_a_lag_are_fitted_too():
     kept = {n: p for n, p in base.parameters.items() if n not in ("load_cell", "lvdt")}
     bare = Model("bare", "bare", "station", kept)
     made = trials(Plant(bare), 2, 1.0)
-    found = fit(bare.replace({FREE[0]: 300.0}), made, FREE[:1])
-    assert abs(found.values[FREE[0]] - TRUE[FREE[0]]) < 4.0 * found.errors[FREE[0]]
+    fitted = fit(bare.replace({FREE[0]: 300.0}), made, FREE[:1])
+    assert abs(fitted.values[FREE[0]] - TRUE[FREE[0]]) < 4.0 * fitted.errors[FREE[0]]
 
 
 def test_a_bound_holds(measured):
     # Much more friction than there was leaves nothing to hysteresis.
     friction = {"coulomb_friction.static_n": 60.0, "coulomb_friction.dynamic_n": 50.0}
     start = load_model("station").replace(friction | {"hysteresis.force_n": 5.0})
-    found = fit(start, measured[:2], ("hysteresis.force_n", "regulator_lag.time_constant_s"))
-    assert found.at_bounds == ("hysteresis.force_n",) and found.converged
-    assert found.values["hysteresis.force_n"] == 0.0
-    assert math.isnan(found.errors["hysteresis.force_n"])
-    assert 0.0 < found.errors["regulator_lag.time_constant_s"] < 0.1
+    fitted = fit(start, measured[:2], ("hysteresis.force_n", "regulator_lag.time_constant_s"))
+    assert fitted.at_bounds == ("hysteresis.force_n",) and fitted.converged
+    assert fitted.values["hysteresis.force_n"] == 0.0
+    assert math.isnan(fitted.errors["hysteresis.force_n"])
+    assert 0.0 < fitted.errors["regulator_lag.time_constant_s"] < 0.1
 
 
 def test_what_the_trials_do_not_determine_has_no_error(measured):
-    found = fit(load_model("station"), measured[:1], ("limits.tension_n", FREE[0]))
-    assert found.values["limits.tension_n"] == load_model("station").parameters["limits"].tension
-    assert math.isinf(found.errors["limits.tension_n"]) and found.errors[FREE[0]] < 1.0
+    fitted = fit(load_model("station"), measured[:1], ("limits.tension_n", FREE[0]))
+    assert fitted.values["limits.tension_n"] == load_model("station").parameters["limits"].tension
+    assert math.isinf(fitted.errors["limits.tension_n"]) and fitted.errors[FREE[0]] < 1.0
     alike = np.array([[4.0, 2.0, 0.0], [2.0, 1.0, 0.0], [0.0, 0.0, 2.0]])
     assert np.diag(inverse(alike)).tolist() == [math.inf, math.inf, 0.5]
 

@@ -28,18 +28,18 @@ def course(rows, central, seed=0, parameters=3):
 @pytest.mark.parametrize("rows", [1, 7, 8, 9, 500])
 def test_they_are_those_of_the_differences(rows, central):
     signals, differences = course(rows, central)
-    (found,) = products([signals])
+    (sums,) = products([signals])
     truth = differences @ differences.T
-    np.testing.assert_allclose(found, truth, rtol=1e-12, atol=1e-14 * np.abs(truth).max())
-    np.testing.assert_array_equal(found, found.T)
+    np.testing.assert_allclose(sums, truth, rtol=1e-12, atol=1e-14 * np.abs(truth).max())
+    np.testing.assert_array_equal(sums, sums.T)
 
 
 def test_neither_other_trials_nor_threads_change_a_bit():
     several = [course(rows, False, rows)[0] for rows in (5, 60, 700, 8, 33)]
     alone = [products([one])[0] for one in several]
     for threads in (1, 2, 3, 7):
-        for found, truth in zip(products(several, threads), alone, strict=True):
-            np.testing.assert_array_equal(found, truth)
+        for sums, truth in zip(products(several, threads), alone, strict=True):
+            np.testing.assert_array_equal(sums, truth)
 
 
 def test_what_counts_for_nothing_may_be_no_number():
@@ -49,9 +49,9 @@ def test_what_counts_for_nothing_may_be_no_number():
     ):
         weights[13] = 0.0
         simulated[:, 13], measured[13] = np.nan, np.inf
-    (found,) = products([signals])
+    (sums,) = products([signals])
     left = np.delete(differences, [13, 33, 53], axis=1)
-    np.testing.assert_allclose(found, left @ left.T, rtol=1e-12)
+    np.testing.assert_allclose(sums, left @ left.T, rtol=1e-12)
     signals.weights[0][12] = 1.0
     signals.simulated[0][:, 12] = np.nan
     assert np.isnan(products([signals])[0]).all()

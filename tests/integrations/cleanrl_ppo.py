@@ -43,12 +43,12 @@ class Agent(nn.Module):
 
 def advantages(rewards, values, over, last):
     """Generalised advantage estimates, shape (steps, environments)."""
-    found, running = torch.zeros_like(rewards), torch.zeros(rewards.shape[1])
+    estimates, running = torch.zeros_like(rewards), torch.zeros(rewards.shape[1])
     for t in reversed(range(len(rewards))):
         after = values[t + 1] if t + 1 < len(rewards) else last
         running = rewards[t] - values[t] + (~over[t]) * GAMMA * (after + LAMBDA * running)
-        found[t] = running
-    return found
+        estimates[t] = running
+    return estimates
 
 
 def update(agent, optimiser, seen, actions, logs, gains, targets) -> None:

@@ -61,8 +61,8 @@ def test_a_step_is_of_order_four(decay):
     value = swing()
     sizes = 0.2 * 0.5 ** np.arange(4) / max(1.0, 0.2 * decay)
     errors = [abs(stepped(value, h, decay, 0.3) - exact(h, decay, 0.3)) for h in sizes]
-    found = np.log2(np.divide(errors[:-1], errors[1:]))
-    assert found[-1] == pytest.approx(5.0, abs=0.3)
+    orders_seen = np.log2(np.divide(errors[:-1], errors[1:]))
+    assert orders_seen[-1] == pytest.approx(5.0, abs=0.3)
 
 
 @pytest.mark.parametrize("decay", [1e2, 1e4, 1e8])

@@ -25,5 +25,5 @@ def test_elimination_solves_what_numpy_solves():
         given |= {f"{i}": values[i] for i in range(count)} | {"part": part}
         matrix = np.eye(count) - part * np.where(full, numbers, 0.0)
         expected = np.linalg.solve(matrix, np.where(np.arange(count) % 3 > 0, values, 0.0))
-        found = [float(v) for v in evaluate(solution, given)]
-        np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-14)
+        computed = [float(v) for v in evaluate(solution, given)]
+        np.testing.assert_allclose(computed, expected, rtol=1e-12, atol=1e-14)

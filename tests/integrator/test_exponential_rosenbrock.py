@@ -80,8 +80,8 @@ def test_the_stage_overshoots_nothing_that_is_fast():
 
 
 def test_order_four_on_predator_and_prey():
-    found = smooth.orders(smooth.predator_and_prey(step))
-    assert np.all((3.7 < found) & (found < 4.5))
+    orders_seen = smooth.orders(smooth.predator_and_prey(step))
+    assert np.all((3.7 < orders_seen) & (orders_seen < 4.5))
 
 
 def test_the_estimate_is_of_order_two_and_larger_than_the_error():
@@ -133,8 +133,8 @@ def test_an_oscillation_is_exact_to_order_six():
 def test_order_four_on_the_plant(damping):
     # 14.5 N s/mm is 29 000 1/s of damping over mass: 116 times these steps, and no loss of order.
     # Most of the plant is linear, and of order 6.
-    errors, found = orders(damping, np.array([4e-3, 2e-3, 1e-3]))
-    assert np.all(3.8 < found)
+    errors, orders_seen = orders(damping, np.array([4e-3, 2e-3, 1e-3]))
+    assert np.all(3.8 < orders_seen)
     assert errors[0].max() < 1e-6
 
 
@@ -146,5 +146,5 @@ def test_the_plants_estimate_is_of_order_two():
     for size in 4e-4 * 0.5 ** np.arange(4):
         _, errors = fixed(rest.state, (4.5, 0.0), (regulator, 0.0), rest.zero_contraction, size)
         estimates.append(abs(errors[plant.states.index("spin")]))
-    found = np.log2(np.divide(estimates[:-1], estimates[1:]))
-    assert np.all(2.8 < found)
+    orders_seen = np.log2(np.divide(estimates[:-1], estimates[1:]))
+    assert np.all(2.8 < orders_seen)

@@ -165,8 +165,8 @@ class Train(Command):
 
     def finished(self) -> dict[str, Any]:
         """Checkpoints that are whole, with the moment of their writing."""
-        found = (self.out / "checkpoints").glob("[0-9]*/state.json")
-        return {path.parent.name: path.stat().st_mtime_ns for path in found}
+        paths = (self.out / "checkpoints").glob("[0-9]*/state.json")
+        return {path.parent.name: path.stat().st_mtime_ns for path in paths}
 
     def may_go(self, name: str, now: dict[str, Any]) -> bool:
         """The last two are kept."""
@@ -174,15 +174,15 @@ class Train(Command):
 
     def final(self) -> dict[str, Any]:
         """The policy: its weights, and its words without times."""
-        found: dict[str, Any] = {}
+        contents: dict[str, Any] = {}
         for path in sorted(self.out.glob("*.safetensors")):
-            found[path.name] = path.read_bytes()
+            contents[path.name] = path.read_bytes()
         for path in sorted(self.out.glob("*.json")):
-            policy = found[path.name] = timeless(json.loads(path.read_text()))
+            policy = contents[path.name] = timeless(json.loads(path.read_text()))
             # Steps, wall time and error.
             curve = policy["training"]["curve"]
             policy["training"]["curve"] = [(steps, error) for steps, _, error in curve]
-        return found
+        return contents
 
 
 class HiddenEffects(Command):
@@ -200,8 +200,8 @@ class HiddenEffects(Command):
 
     def finished(self) -> dict[str, Any]:
         """Records, with the moment of their writing."""
-        found = (self.out / "cases").glob("case_*.json")
-        return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+        paths = (self.out / "cases").glob("case_*.json")
+        return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in paths}
 
     def final(self) -> dict[str, Any]:
         """All records and figures."""
@@ -238,8 +238,8 @@ class Diagnose(Command):
 
     def finished(self) -> dict[str, Any]:
         """Fits that are kept, with the moment of their writing; results once all is done."""
-        found = (self.out / "unfinished").glob("*.json")
-        return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+        paths = (self.out / "unfinished").glob("*.json")
+        return {path.name: (path.stat().st_mtime_ns, path.read_bytes()) for path in paths}
 
     def may_go(self, name: str, now: dict[str, Any]) -> bool:
         """All of them once the results are there."""
@@ -251,14 +251,14 @@ class Diagnose(Command):
 
     def final(self) -> dict[str, Any]:
         """Verdict, models and the next experiment."""
-        found: dict[str, Any] = {
+        contents: dict[str, Any] = {
             name: (self.out / name).read_bytes()
             for name in ("model.toml", "next.csv")
             if (self.out / name).exists()
         }
-        found["diagnosis.json"] = timeless(json.loads((self.out / "diagnosis.json").read_text()))
-        found["journal is gone"] = not (self.out / "unfinished").exists()
-        return found
+        contents["diagnosis.json"] = timeless(json.loads((self.out / "diagnosis.json").read_text()))
+        contents["journal is gone"] = not (self.out / "unfinished").exists()
+        return contents
 
 
 def timeless(value: Any) -> Any:  # noqa: ANN401

@@ -58,8 +58,8 @@ def test_the_map_passes_through_table_18_and_is_linear_between_its_rows():
     for row in range(len(p.pressure)):
         for voltage in (1.0, 3.0):
             parabola = (p.square[row] * voltage + p.linear[row]) * voltage + p.constant[row]
-            found = mapped_displacement(voltage, p.pressure[row], p)
-            assert found == pytest.approx(max(0.0, parabola), rel=1e-12)
+            displacements = mapped_displacement(voltage, p.pressure[row], p)
+            assert displacements == pytest.approx(max(0.0, parabola), rel=1e-12)
     printed = load_table("18")
     assert set(np.asarray(printed["pressure_kpa"]) * 1e3) <= set(p.pressure)
     ends = [mapped_displacement(2.0, pressure, p) for pressure in (500e3, 550e3)]

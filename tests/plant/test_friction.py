@@ -198,8 +198,8 @@ def ramped_attempts(plant, state, zero, motor, slope, size, most):
     known |= {"size": size, "left": 1.0 / 128.0}
     for _ in range(most):
         with np.errstate(all="ignore"):
-            found = module["attempt"](*(np.float64(known[one.data]) for one in inputs))
-        *after, known["size"], known["left"], taken, length = found
+            attempt = module["attempt"](*(np.float64(known[one.data]) for one in inputs))
+        *after, known["size"], known["left"], taken, length = attempt
         known |= dict(zip(names, after, strict=True))
         yield bool(taken), float(length), float(known["size"])
         if known["left"] <= 0.0:

@@ -6,10 +6,10 @@ import pytest
 import sympy
 
 from benchmarks.accuracy.limits import with_effect
-from pma_gym.plant.linear import linearize, operating_point
+from pma_gym.plant.forms.linear import linearize, operating_point
+from pma_gym.plant.forms.symbolic import symbolic
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.symbolic import symbolic
 
 
 @pytest.mark.parametrize(
@@ -66,8 +66,8 @@ def test_the_stations_matrix_is_its_springs_dampers_and_masses():
     mass, inertia, radius = part["slide"].mass, part["rotor"].inertia, part["rotor"].radius
     stiffness, cable = (32.7 - 0.0321 * 300.0) * 1e3, part["cable"].stiffness
     assert system.A[at["contraction"], at["velocity"]] == pytest.approx(1.0)
-    found = system.A[at["velocity"], at["contraction"]]
-    assert found == pytest.approx(-(stiffness + cable) / mass, rel=1e-4)
+    entry = system.A[at["velocity"], at["contraction"]]
+    assert entry == pytest.approx(-(stiffness + cable) / mass, rel=1e-4)
     assert system.A[at["spin"], at["angle"]] == pytest.approx(
         -radius * radius * cable / inertia, rel=1e-4
     )
@@ -139,10 +139,10 @@ def test_the_equations_are_what_is_simulated(model):
         state = rest.state * (1.0 + 0.05 * generator.standard_normal(rest.state.shape))
         state += 1e-3 * generator.standard_normal(rest.state.shape)
         commands = 3.0 + generator.standard_normal(), 6.0 + generator.standard_normal()
-        found = evaluate(state, *commands, rest.zero_contraction)
+        computed = evaluate(state, *commands, rest.zero_contraction)
         expected = plant.derivative(state, *commands, rest.zero_contraction)
         # The law's own exponential is exact to 1e-11.
-        np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-7)
+        np.testing.assert_allclose(computed, expected, rtol=1e-9, atol=1e-7)
 
 
 def test_the_equations_read_well():

@@ -103,9 +103,9 @@ def test_a_fit_leaves_the_start_free_in_every_trial():
     unsaid = [Trial(each.time, each.commands, each.measurements) for each in measured]
     start = AT_ZERO.replace({"hysteresis.force_n": 12.0})
     free = ("hysteresis.force_n", "hysteresis.distance_mm")
-    found = fit(start, unsaid, free)
+    fitted = fit(start, unsaid, free)
     said = fit(start, measured, free)
-    for each in (found, said):
+    for each in (fitted, said):
         assert each.values["hysteresis.force_n"] == pytest.approx(FORCE, abs=0.3)
         assert each.values["hysteresis.distance_mm"] == pytest.approx(DISTANCE, abs=0.05)
     # Held at 0, all three, it finds something else: the starts matter.
@@ -114,7 +114,7 @@ def test_a_fit_leaves_the_start_free_in_every_trial():
         [Trial(e.time, e.commands, e.measurements, memory_at_start=0.0) for e in unsaid],
         free,
     )
-    assert held.chi_square > 1.2 * found.chi_square
+    assert held.chi_square > 1.2 * fitted.chi_square
 
 
 def test_shares_stay_within_their_reach():

@@ -6,7 +6,7 @@ import pytest
 from benchmarks.accuracy.reference import demanding_commands
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.plant.condition import Condition
-from pma_gym.plant.plain import PlainPlant
+from pma_gym.plant.forms.plain import PlainPlant
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.program import FIRST_S
 

@@ -125,13 +125,13 @@ def test_changed_networks_are_left_to_theirs(change):
 
 
 def test_actions_that_are_drawn_have_theirs_derivatives():
-    found = []
+    gradients = []
     for policy in pair():
         torch.manual_seed(8)
         actions, _, likelihood = policy(torch.ones(5, 7))
         (actions.sum() + 0.1 * likelihood.square().sum()).backward()
-        found.append([parameter.grad for parameter in policy.parameters()])
-    for its, mine in zip(*found, strict=True):
+        gradients.append([parameter.grad for parameter in policy.parameters()])
+    for its, mine in zip(*gradients, strict=True):
         assert (its is None) == (mine is None)
         if its is not None:
             np.testing.assert_allclose(mine, its, rtol=1e-4, atol=1e-5)
@@ -188,8 +188,8 @@ def test_its_network_is_the_layers_in_double_precision(sizes):
     def said(*_):
         return network(seen, layers_of(net))
 
-    for found in (said(), torch.no_grad()(said)()):
-        np.testing.assert_allclose(found.detach(), expected, rtol=1e-13, atol=1e-14)
+    for outputs in (said(), torch.no_grad()(said)()):
+        np.testing.assert_allclose(outputs.detach(), expected, rtol=1e-13, atol=1e-14)
     assert torch.autograd.gradcheck(said, [seen, *net.parameters()])
 
 
@@ -255,6 +255,6 @@ def test_minibatches_whose_graphs_live_together_have_memory_of_their_own(times):
     for policy in pair():
         expected = [learned(policy, 50, seed, times)() for seed in (1, 2)]
         waiting = [learned(policy, 50, seed, times) for seed in (1, 2)]
-        for found, own in zip(waiting, expected, strict=True):
-            for one, other in zip(found(), own, strict=True):
+        for gradient, own in zip(waiting, expected, strict=True):
+            for one, other in zip(gradient(), own, strict=True):
                 assert torch.equal(one, other)

@@ -109,7 +109,7 @@ def test_clipping_counts_in_what_is_compared():
 
 
 def test_one_thread_and_two_learn_the_same_bits(monkeypatch):
-    had, before, found = [], torch.get_num_threads(), []
+    had, before, parameters = [], torch.get_num_threads(), []
 
     def watched(*args):
         had.append(torch.get_num_threads())
@@ -134,14 +134,14 @@ def test_one_thread_and_two_learn_the_same_bits(monkeypatch):
 
     try:
         for settings in ((1, 0, 1), (2, 0, 1), (5, 0, 4), (2, 1 << 40, 1)):
-            found.append(trained(*settings, env=Mass(actions=1)))
+            parameters.append(trained(*settings, env=Mass(actions=1)))
         trained(2, 0, 1, env=Mass(actions=2))
     finally:
         torch.set_num_threads(before)
     assert had[:24] == [1] * 6 + [1] + [2] * 5 + [1] * 4 + [2] * 2 + [1] * 6
     # Those of other shapes are not shared: their bits do depend on the number of threads.
     assert had[24:] == [1] * 12
-    for same in zip(*found, strict=True):
+    for same in zip(*parameters, strict=True):
         assert all(torch.equal(same[0], one) for one in same)
 
 
@@ -219,9 +219,9 @@ def test_actions_drawn_while_parameters_are_held_are_the_same():
     with torch.no_grad():
         expected = drawn()
         with policy.held():
-            found = drawn()
+            laws = drawn()
             mode, *_ = policy(seen, deterministic=True)
-            for mine, its in zip(found, expected, strict=True):
+            for mine, its in zip(laws, expected, strict=True):
                 np.testing.assert_allclose(mine, its, rtol=1e-5, atol=1e-6)
             usual = policy.get_distribution(seen).mode()
             np.testing.assert_allclose(mode, usual, rtol=1e-5, atol=1e-6)
@@ -246,10 +246,10 @@ def test_a_callback_that_changes_parameters_during_a_rollout_is_heard():
                     self.model.policy.value_net.bias.fill_(50.0)
             return True
 
-    found = []
+    values = []
     for kind in (PPO, LeanPPO):
         model = kind("MlpPolicy", Mass(), device="cpu", **SETTINGS)
         model.learn(64, callback=Moving())
-        found.append(model.rollout_buffer.values.copy())
-    np.testing.assert_allclose(found[1], found[0], rtol=1e-4, atol=1e-4)
-    assert found[1].max() > 40.0
+        values.append(model.rollout_buffer.values.copy())
+    np.testing.assert_allclose(values[1], values[0], rtol=1e-4, atol=1e-4)
+    assert values[1].max() > 40.0

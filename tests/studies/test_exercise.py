@@ -156,11 +156,11 @@ def test_of_two_pressures_the_higher_is_taken(model, tested):
 def test_a_moment_that_no_pressure_gives_is_refused_with_range_and_angle(model, tested, moment):
     with pytest.raises(UnreachableError) as refused:
         hold(model, tested, moment)
-    found = span(model, tested)
+    limits = span(model, tested)
     assert str(refused.value).startswith(
-        f"moment must lie in {found.low:.2f} to {found.high:.2f} N m at 90 deg, the range of 1 "
-        f"muscle of 20 mm x 250 mm on a pulley of 25.89 mm at {1e-3 * found.lowest:g} to "
-        f"{1e-3 * found.highest:g} kPa, got {moment:g}; "
+        f"moment must lie in {limits.low:.2f} to {limits.high:.2f} N m at 90 deg, the range of 1 "
+        f"muscle of 20 mm x 250 mm on a pulley of 25.89 mm at {1e-3 * limits.lowest:g} to "
+        f"{1e-3 * limits.highest:g} kPa, got {moment:g}; "
     )
     assert refused.value.miss.angle == FULL_ANGLE
 
@@ -172,10 +172,10 @@ def test_a_muscle_too_short_for_the_pulley_is_refused(model):
 
 def test_the_pressures_of_a_schedule_give_the_profile(model, tested):
     moment = np.full(len(ANGLES), 8.0)
-    found = follow(model, tested, ANGLES, moment)
-    given = resistive_moment(model, tested, found.pressure, ANGLES, found.rest_pressure)
+    schedule = follow(model, tested, ANGLES, moment)
+    given = resistive_moment(model, tested, schedule.pressure, ANGLES, schedule.rest_pressure)
     assert given.moment == pytest.approx(moment, rel=0.01) and given.allowed.all()
-    assert np.all(np.diff(found.pressure) < 0.0)
+    assert np.all(np.diff(schedule.pressure) < 0.0)
 
 
 def test_a_profile_is_refused_at_the_angle_where_it_fails(model, tested):
@@ -190,10 +190,10 @@ def test_a_profile_is_refused_at_the_angle_where_it_fails(model, tested):
 
 def test_the_smallest_has_fewest_muscles_then_diameter_then_length(model):
     choice = [device(model, n, d, le) for n in (3, 2, 1) for d in (20, 10) for le in (300, 250)]
-    found, held = smallest(choice, lambda each: hold(model, each, 15.0))
-    assert found == device(model, 1, 20, 250) and 275e3 < held.pressure < 575e3
-    found, _ = smallest(choice, lambda each: hold(model, each, 30.0))
-    assert found == device(model, 2, 20, 250)
+    answer, held = smallest(choice, lambda each: hold(model, each, 15.0))
+    assert answer == device(model, 1, 20, 250) and 275e3 < held.pressure < 575e3
+    answer, _ = smallest(choice, lambda each: hold(model, each, 30.0))
+    assert answer == device(model, 2, 20, 250)
 
 
 def test_if_none_serves_the_nearest_is_named(model):

@@ -9,7 +9,7 @@ from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.options import nominal_model
 from pma_gym.plant.exercise_device.device import own_device, resistive_moment
 from pma_gym.plant.exercise_device.prescription import follow_from
-from pma_gym.plant.linear import linearize
+from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.plant.sensors import SENSORS, noise_levels

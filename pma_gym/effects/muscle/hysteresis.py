@@ -18,7 +18,9 @@ class Hysteresis(NamedTuple):
     ]
     memory_at_start: Annotated[
         float,
-        Quantity("1", -1, 1, "1: the muscle was filled and contracted; fitted by trial", 0.0),
+        Quantity(
+            "1", -1, 1, "1: the muscle was filled and contracted; fitted by trial", 0.0, usual=0
+        ),
     ] = 0.0
 
 

@@ -160,11 +160,11 @@ def test_shares_of_causes_that_do_not_interact_are_their_own():
 def test_improved_is_better_on_the_nominal_station_and_on_most_others():
     drawn = drawn_stations()
     for task, pressure in (("displacement", 200.0), ("rotation", 450.0)):
-        found = contest(task, pressure, drawn)
-        serres, improved = (found.drawn[name] for name in CONTROLLERS)
-        assert found.nominal[CONTROLLERS[1]] < 0.02 * found.nominal[CONTROLLERS[0]]
+        outcome = contest(task, pressure, drawn)
+        serres, improved = (outcome.drawn[name] for name in CONTROLLERS)
+        assert outcome.nominal[CONTROLLERS[1]] < 0.02 * outcome.nominal[CONTROLLERS[0]]
         assert np.median(improved) < np.median(serres)
-        assert found.better > len(drawn) / 2
+        assert outcome.better > len(drawn) / 2
 
 
 def test_command_writes_tables_and_pictures(tmp_path, monkeypatch):
@@ -201,8 +201,8 @@ def test_the_documentation_has_the_commands_figures(budgets, task, words, make):
         for title, lines in re.findall(r"\*\*(.+?)\*\*\n\n((?:\|.*\n)+)", page)
         if title.startswith(task.capitalize()) and words in title
     )
-    column, found = table[0].index("300"), make([budgets[task]], budgets[task].phases[-1])
-    assert [row[0] for row in table if row[0] != "---"] == [row[0] for row in found]
+    column, rows = table[0].index("300"), make([budgets[task]], budgets[task].phases[-1])
+    assert [row[0] for row in table if row[0] != "---"] == [row[0] for row in rows]
     printed = [float(row[column]) for row in table[2:]]
     # Another machine may round the last digit otherwise.
-    assert printed == pytest.approx([float(row[1]) for row in found[1:]], abs=0.011, rel=0.01)
+    assert printed == pytest.approx([float(row[1]) for row in rows[1:]], abs=0.011, rel=0.01)

@@ -161,7 +161,7 @@ class Spy:
         kinds.append(type(getattr(reference, "__self__", None)).__name__)
         Path(__file__).with_suffix(".json").write_text(json.dumps(sorted(set(kinds))))
     def act(self, observation, now):
-        return 11.0 if now < 1.0 else -0.5 if now < 1.5 else 2.0
+        return -0.5 if now < 0.1 else 11.0 if now < 0.2 else 3.0
 """
 
 
@@ -171,11 +171,11 @@ def test_a_controller_from_a_file_finds_no_environment_and_its_clipping_is_count
     row = guarded(ControllerSpec("Spy", path=str(path)))
     kinds = json.loads(path.with_suffix(".json").read_text())
     assert "StationInfo" in kinds and not {"PMAEnv", "PMAVectorEnv", "Engine"} & set(kinds)
-    assert row["clipped_share"] == pytest.approx(150 / 501) and row["clipped_v"] == 1.0
+    assert row["clipped_share"] == pytest.approx(20 / 501) and row["clipped_v"] == 1.0
     with (tmp_path / "terminal.txt").open("w") as terminal:
         print_clipping([row], Console(file=terminal, width=200))
     assert (
-        "Spy: 30 % of its commands were below 0 V or above 10 V, by up to 1 V, in 1 of 1"
+        "Spy: 4 % of its commands were below 0 V or above 10 V, by up to 1 V, in 1 of 1"
         in (tmp_path / "terminal.txt").read_text()
     )
 

@@ -209,9 +209,9 @@ def test_what_fails_is_a_row_with_its_reason(suite, tmp_path):
     assert code == 1
     rows = list(read_rows(tmp_path / "out" / JOURNAL))
     assert len(rows) == 6 and len({row["failure"] for row in rows}) == 1
-    told = "act raised ZeroDivisionError: division by zero (line 9 of fails.py, at 0 s)"
-    assert rows[0]["failure"] == f"ControllerError: {told}"
-    assert f"Fails/-1/displacement/200/0 and 5 more: {told}" in words
+    reason = "act raised ZeroDivisionError: division by zero (line 9 of fails.py, at 0 s)"
+    assert rows[0]["failure"] == f"ControllerError: {reason}"
+    assert f"Fails/-1/displacement/200/0 and 5 more: {reason}" in words
 
 
 def test_a_case_whose_process_died_is_run_again(suite, tmp_path):

@@ -66,13 +66,13 @@ def test_the_figures_in_the_file_are_the_studys(tmp_path):
     ("moment", "device"), [(17.0, (1, 20, 250)), (24.0, (1, 20, 200)), (150.0, (2, 40, 250))]
 )
 def test_the_smallest_configuration_for_a_moment(tmp_path, moment, device):
-    found = run_exercise(Choice(), held(moment), tmp_path, Console(quiet=True))
+    answer = run_exercise(Choice(), held(moment), tmp_path, Console(quiet=True))
     model = load_model("station")
-    assert found.device == Device(muscles(*device), own_device(model).radius)
-    given = resistive_moment(model, found.device, found.given.pressure, FULL_ANGLE).moment
+    assert answer.device == Device(muscles(*device), own_device(model).radius)
+    given = resistive_moment(model, answer.device, answer.given.pressure, FULL_ANGLE).moment
     assert given == pytest.approx(moment, rel=1e-3)
-    assert ("extrapolation" in found.how) == (device != (1, 20, 250))
-    assert found.words in (tmp_path / "report.md").read_text()
+    assert ("extrapolation" in answer.how) == (device != (1, 20, 250))
+    assert answer.words in (tmp_path / "report.md").read_text()
 
 
 def test_the_smallest_configuration_for_a_profile(tmp_path, profile):
@@ -86,14 +86,14 @@ def test_the_smallest_configuration_for_a_profile(tmp_path, profile):
 def test_a_short_muscle_serves_a_profile_that_ends_early(tmp_path):
     path = tmp_path / "profile.csv"
     path.write_text("angle_deg,moment_nm\n10,4\n30,10\n")
-    found = run_exercise(
+    answer = run_exercise(
         Choice("1", "20", "150"), read_profile(path), tmp_path, Console(quiet=True)
     )
-    assert found.device.muscles == muscles(1, 20, 150)
-    device, given = found.device, found.given
-    angle, model = found.wanted.angle, load_model("station")
+    assert answer.device.muscles == muscles(1, 20, 150)
+    device, given = answer.device, answer.given
+    angle, model = answer.wanted.angle, load_model("station")
     held_there = resistive_moment(model, device, given.pressure, angle, given.rest_pressure)
-    assert held_there.moment == pytest.approx(found.wanted.moment, rel=0.01)
+    assert held_there.moment == pytest.approx(answer.wanted.moment, rel=0.01)
 
 
 def test_a_given_size_narrows_the_choice(tmp_path):
@@ -101,8 +101,8 @@ def test_a_given_size_narrows_the_choice(tmp_path):
     assert {device.muscles.diameter for device in choice.searched(model)} == {0.020}
     assert len(choice.searched(model)) == len(SEARCHED["muscles"]) * len(SEARCHED["length"])
     # Six muscles of 20 mm give 148.57 N m at most.
-    found = run_exercise(choice, held(145.0), tmp_path, Console(quiet=True))
-    assert found.device.muscles.number > 2
+    answer = run_exercise(choice, held(145.0), tmp_path, Console(quiet=True))
+    assert answer.device.muscles.number > 2
 
 
 # -- what it refuses -------------------------------------------------------------------------------

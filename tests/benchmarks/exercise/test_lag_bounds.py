@@ -45,9 +45,9 @@ def foreknown():
 
 def test_of_an_exact_operator_only_what_he_is_late_is_left(foreknown):
     floor = own_floor(exertion(NO_LAG, pressure_kpa=300.0))
-    found = foreknown[NO_LAG].by_phase
-    assert floor <= found["I"] < 1.02 * floor
-    assert found["II"] < 0.1 and found["III"] < 0.1
+    course = foreknown[NO_LAG].by_phase
+    assert floor <= course["I"] < 1.02 * floor
+    assert course["II"] < 0.1 and course["III"] < 0.1
     # Before he reacts nothing moves: the line alone, 18 deg/s for 0.15 s of the phase's 5 s.
     assert floor > 18.0 * math.sqrt(0.15**3 / (3.0 * 5.0))
 
@@ -68,8 +68,8 @@ def test_a_moment_is_held_by_who_knows_the_course():
     task = "isotonic_exercise"
     start = Rehearsals(exertion(0.055, task=task), 1)
     before = start.course(np.full(start.steps, start.start_voltage()))
-    found = foreknown_course(exertion(0.055, task=task), blocks=(16,))
-    assert max(found.by_phase.values()) < 0.05 * max(before.by_phase.values())
+    course = foreknown_course(exertion(0.055, task=task), blocks=(16,))
+    assert max(course.by_phase.values()) < 0.05 * max(before.by_phase.values())
 
 
 def test_an_exercise_that_ends_early_is_no_beginning():
@@ -89,22 +89,22 @@ def test_retimed_voltages_give_the_same_pressure():
 
 
 def test_the_causal_bound_grows_with_lag_delay_and_noise():
-    found = causal_bounds("isokinetic_exercise", STATION, (0.0, 1.0, 4.0), (0, 1))
+    bounds = causal_bounds("isokinetic_exercise", STATION, (0.0, 1.0, 4.0), (0, 1))
     for sensed in (False, True):
         by_lag = {
             lag: [
-                row.least for row in found if (row.lag, row.delay, row.sensed) == (lag, 1, sensed)
+                row.least for row in bounds if (row.lag, row.delay, row.sensed) == (lag, 1, sensed)
             ]
-            for lag in sorted({row.lag for row in found})
+            for lag in sorted({row.lag for row in bounds})
         }
         none, own, slow = (np.array(least) for least in by_lag.values())
         assert (none < own).all() and (own < slow).all()
-    least = {(row.point, row.lag, row.delay, row.sensed): row.least for row in found}
+    least = {(row.point, row.lag, row.delay, row.sensed): row.least for row in bounds}
     for where, lag, delay, sensed in least:
         assert least[where, lag, delay, True] > least[where, lag, delay, False]
         assert least[where, lag, 1, sensed] >= 0.999 * least[where, lag, 0, sensed]
-    assert all(row.least < row.uncontrolled for row in found)
-    assert all(row.voltage < 1.01 * row.point.room / DEVIATIONS for row in found)
+    assert all(row.least < row.uncontrolled for row in bounds)
+    assert all(row.voltage < 1.01 * row.point.room / DEVIATIONS for row in bounds)
 
 
 def test_simulated_spread_is_the_one_of_lyapunovs_equation(point):
@@ -201,11 +201,11 @@ def test_tremor_is_within_reach_and_the_leg_hardly_feels_it(point):
 def test_tables_and_picture_name_every_point():
     task = "isokinetic_exercise"
     rows = Foreknown(task, 3, 300.0, 0.055, False, {"I": 3.1, "II": 0.01, "III": 0.01}, 3.0, 0.0, 9)
-    found = LagBounds([rows], causal_bounds(task, STATION, (1.0,)), swings(task, STATION))
-    foreknown, causal, reach = bound_tables(found)
+    bounds = LagBounds([rows], causal_bounds(task, STATION, (1.0,)), swings(task, STATION))
+    foreknown, causal, reach = bound_tables(bounds)
     assert "| 0.055 | off | 1 | 3.100 | 0.010 | 0.010 |" in foreknown
     assert "30 deg, 300 kPa" in causal and "85 deg, 575 kPa" in reach
-    assert len(bound_plot(found.causal, found.swings)) > 20_000
+    assert len(bound_plot(bounds.causal, bounds.swings)) > 20_000
 
 
 def test_only_exercises_have_such_bounds():

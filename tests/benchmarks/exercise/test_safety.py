@@ -39,21 +39,21 @@ def test_pumping_pulls_on_the_way_back_and_lets_go_on_the_way_out():
 def test_the_layer_saves_operators_from_wild_commands(tmp_path):
     said = io.StringIO()
     console = Console(file=said, width=120)
-    found = run_safety(
+    safety = run_safety(
         episodes=42, bare=42, seed=0, out=tmp_path, console=console, executor=ThisProcess()
     )
-    assert found.total(True)[:2] == (42, 0)
-    episodes, broken, _ = found.total(False)
+    assert safety.total(True)[:2] == (42, 0)
+    episodes, broken, _ = safety.total(False)
     assert episodes == 42 and broken > 21
     rows = {(task, stations, kind) for task in EXERCISES for stations in SETS for kind in KINDS}
-    assert {(t.task, t.stations, t.agent) for t in found.tallies} == rows
-    assert all(t.episodes == 1 for t in found.tallies)
-    for tally in found.tallies:
+    assert {(t.task, t.stations, t.agent) for t in safety.tallies} == rows
+    assert all(t.episodes == 1 for t in safety.tallies)
+    for tally in safety.tallies:
         if tally.safety:
             assert tally.peak_moment_nm <= SAFE_MOMENT
-    assert read_safety(tmp_path / "safety.json") == found
+    assert read_safety(tmp_path / "safety.json") == safety
     assert "0 of 42 episodes were unsafe" in said.getvalue()
-    assert safety_words(found) in (tmp_path / "safety.md").read_text()
+    assert safety_words(safety) in (tmp_path / "safety.md").read_text()
 
 
 def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():

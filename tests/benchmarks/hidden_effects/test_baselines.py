@@ -88,10 +88,10 @@ def test_sparse_regression_recovers_a_planted_law():
     terms = {name: term - term.mean() for name, term in terms.items()}
     target = 5.0 * x + 0.6 * x**2 + 0.2 * g.standard_normal(4000)
     target = target - target.mean()
-    found = kept_terms(balances.Balance(target, base, terms))
+    terms_left = kept_terms(balances.Balance(target, base, terms))
     # What the model's own parameters make up is no term, and what explains little goes.
-    assert set(found) == {"bend:x2"}
-    assert found["bend:x2"] == pytest.approx(0.36 * 2 / (0.36 * 2 + 0.04), abs=0.03)
+    assert set(terms_left) == {"bend:x2"}
+    assert terms_left["bend:x2"] == pytest.approx(0.36 * 2 / (0.36 * 2 + 0.04), abs=0.03)
 
 
 def test_balances_of_a_true_model_leave_little(ready):
@@ -107,14 +107,14 @@ def test_balances_of_a_true_model_leave_little(ready):
 
 
 def test_a_signature_says_where_the_residual_is(ready):
-    found = signature(ready)
-    assert all(np.isfinite(list(found.values())))
-    assert found["size of contraction"] > found["size of pressure"]
+    features = signature(ready)
+    assert all(np.isfinite(list(features.values())))
+    assert features["size of contraction"] > features["size of pressure"]
     louder = replace(ready, left=[2.0 * part for part in ready.left])
     again = signature(louder)
-    assert again["size of contraction"] > found["size of contraction"]
+    assert again["size of contraction"] > features["size of contraction"]
     assert again["contraction along creep 2 s"] == pytest.approx(
-        found["contraction along creep 2 s"]
+        features["contraction along creep 2 s"]
     )
 
 
@@ -178,8 +178,8 @@ def test_each_part_is_off_while_a_diagnosis_runs_and_on_again(monkeypatch, datas
 
         return Nothing()
 
-    found = forward_selection.ScreeningScore(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
-    monkeypatch.setattr(forward_selection, "screen", lambda: [found])
+    score = forward_selection.ScreeningScore(ready.catalogue[0], 7.9, 0.3, 0, 1.0, 1.0, None, ())
+    monkeypatch.setattr(forward_selection, "screen", lambda: [score])
     monkeypatch.setattr(ablations, "diagnose", spied)
     ablations.ours(dataset, 0, 1)
     prior, memory = seen["prior"], seen["noise"].coefficients
@@ -277,9 +277,9 @@ def test_the_ideal_test_is_that_of_neyman_and_pearson():
 def test_curves_scale_with_the_size():
     case = {"effect": "creep", "r": 0.5, "nothing": 10.0, "likeness": 1.0, "rival": "slow_creep",
             "to_rival": 2.0, "to_rival_outside": 4.0}  # fmt: skip
-    found = bound.curves([case])
-    assert found["d_nothing"] == 20.0 and found["d_rival"] == 4.0
-    at = found["r"].index(1.0)
-    assert found["told"][at] == pytest.approx(norm.cdf(2.0))
-    assert found["told_outside"][at] == pytest.approx(norm.cdf(4.0))
-    assert np.all(np.diff(found["told"]) > 0.0)
+    bounds = bound.curves([case])
+    assert bounds["d_nothing"] == 20.0 and bounds["d_rival"] == 4.0
+    at = bounds["r"].index(1.0)
+    assert bounds["told"][at] == pytest.approx(norm.cdf(2.0))
+    assert bounds["told_outside"][at] == pytest.approx(norm.cdf(4.0))
+    assert np.all(np.diff(bounds["told"]) > 0.0)

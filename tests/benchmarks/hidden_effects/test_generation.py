@@ -154,7 +154,8 @@ def model_with(lab, name):
         "force_intercept_n": 44.6,
         "stiffness_n_per_mm": 20.0,
     }
-    return lab.with_effects({name: {d: values.get(d, defaults.get(d)) for d in doors}})
+    given = {**defaults, **values}
+    return lab.with_effects({name: {d: given[d] for d in doors if d in given}})
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -237,9 +238,9 @@ def test_what_is_taken_of_a_block_is_what_the_block_draws(tmp_path, monkeypatch)
     block = Block("nothing", trials=3, seconds=3.0)
     monkeypatch.setattr(drawing, "EVERY", {"nothing": block, "again": block})
     drawing.take({"nothing": 1, "again": 1}, 3, tmp_path, 1)
-    found = [(tmp_path / "truth" / f"case_000{k}.json").read_text("utf-8") for k in (1, 2)]
-    assert found[0] == found[1]
-    assert json.loads(found[0]) == json.loads(json.dumps(block.draw(3, 1).truth))
+    truths = [(tmp_path / "truth" / f"case_000{k}.json").read_text("utf-8") for k in (1, 2)]
+    assert truths[0] == truths[1]
+    assert json.loads(truths[0]) == json.loads(json.dumps(block.draw(3, 1).truth))
 
 
 def test_the_truth_is_not_in_the_case(drawn):

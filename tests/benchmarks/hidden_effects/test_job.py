@@ -79,8 +79,8 @@ def test_an_interrupted_run_keeps_its_cases_and_goes_on_to_the_same_figures(
 
 
 def test_two_processes_find_what_one_finds(whole, tmp_path):
-    found = run_block(order(tmp_path, executor=local(2)))
-    assert found is not None and timeless(found) == timeless(whole[1])
+    records = run_block(order(tmp_path, executor=local(2)))
+    assert records is not None and timeless(records) == timeless(whole[1])
 
 
 def test_a_larger_set_has_the_same_first_cases(whole, tmp_path):
@@ -109,11 +109,11 @@ def test_records_of_other_code_are_used_unless_made_anew(tmp_path, monkeypatch, 
     monkeypatch.setattr(job, "fingerprint", lambda: "older")
     run_block(order(tmp_path, count=1))
     monkeypatch.setattr(job, "fingerprint", lambda: "newer")
-    found = run_block(order(tmp_path, count=1))
-    assert found is not None and found["code"] == {"older": 1}
+    records = run_block(order(tmp_path, count=1))
+    assert records is not None and records["code"] == {"older": 1}
     assert "1 of them by other code" in capsys.readouterr().err
-    found = run_block(order(tmp_path, count=1, recompute=True))
-    assert found is not None and found["code"] == {"newer": 1}
+    records = run_block(order(tmp_path, count=1, recompute=True))
+    assert records is not None and records["code"] == {"newer": 1}
 
 
 def test_cases_without_the_rounds_that_are_asked_for_are_made_anew(tmp_path, capsys):
@@ -181,8 +181,8 @@ def test_parameters_count_as_named_only_where_they_moved():
     off = truth("parameters", base_factors={"radius": 1.12})
     named = document("parameters") | {"parameters": {"rotor.radius_mm": {"significant": True}}}
     other = document("parameters") | {"parameters": {"slide.mass_kg": {"significant": True}}}
-    told = document("parameters") | {"not_identifiable": {"rotor.radius_mm": "constant"}}
-    first, second, third = (compare(off, each) for each in (named, other, told))
+    answer = document("parameters") | {"not_identifiable": {"rotor.radius_mm": "constant"}}
+    first, second, third = (compare(off, each) for each in (named, other, answer))
     assert first.parameters and not first.parameters_spurious
     assert second.parameters is False and second.parameters_spurious
     assert third.parameters is False and third.parameters_told

@@ -55,8 +55,8 @@ def test_odds_of_a_parameter_grow_with_the_square_of_what_it_is_off_by():
 
 
 def test_a_light_slide_is_not_told_beside_a_rotor_and_a_radius_is():
-    found = off(radius=1.1, mass=1.2)
-    assert found["mass"] < UNTOLD and found["radius"] > 1000.0
+    truth = off(radius=1.1, mass=1.2)
+    assert truth["mass"] < UNTOLD and truth["radius"] > 1000.0
 
 
 def test_cases_tell_of_their_parameters_whether_data_do():
@@ -65,9 +65,9 @@ def test_cases_tell_of_their_parameters_whether_data_do():
     assert off and set(case.truth["log_odds"]) == off
     assert draw_case(5, 2, "nothing", trials=2, seconds=2.0).truth["log_odds"] == {}
     truth = case.truth | {"log_odds": {"radius": UNTOLD + 0.1}}
-    told = compare(truth, document("agrees"))
+    outcome = compare(truth, document("agrees"))
     untold = compare(truth | {"log_odds": {"radius": UNTOLD}}, document("agrees"))
-    assert told.parameters_tellable and not untold.parameters_tellable
+    assert outcome.parameters_tellable and not untold.parameters_tellable
     # What raises counts against the diagnosis, not for it.
     failed = unanswered(truth, "ValueError")
     assert failed.parameters_tellable and not failed.parameters

@@ -86,10 +86,10 @@ def test_the_three_element_model_misses_extension_by_a_centimetre(every):
 
 def test_a_smooth_function_says_what_a_model_should_at_least_reach():
     """Beyond repeats, held-out extension is 0.2 mm off by the commands, none by the load."""
-    found = smooth_errors(judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA))
-    assert found["extension_mm"] == pytest.approx(0.77, abs=0.05)
-    assert found["extension_at_load_mm"] == pytest.approx(0.59, abs=0.05)
-    assert found["rotation_deg"] == pytest.approx(2.2, abs=0.2)
+    errors = smooth_errors(judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA))
+    assert errors["extension_mm"] == pytest.approx(0.77, abs=0.05)
+    assert errors["extension_at_load_mm"] == pytest.approx(0.59, abs=0.05)
+    assert errors["rotation_deg"] == pytest.approx(2.2, abs=0.2)
 
 
 def test_what_is_diagnosed_holds_no_pressure_that_it_is_judged_on():
@@ -129,7 +129,7 @@ def answer(model, effect=None, verdict="effect"):
         sentence="",
         effects=[],
         candidates=[candidate("creep", "chance")] + ([candidate(effect)] if effect else []),
-        blind=("creep",),
+        not_detectable=("creep",),
         next_experiment=None,
         gap={},
         seconds={},
@@ -160,33 +160,37 @@ def diagnose_small(folder, code="this", recompute=False):
 
     data = measured_dataset((150.0,), (75.0,), steps=0)
     stages = Stages(folder, recompute, code)
-    told = stages.others()
-    return *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent), stages, told
+    messages = stages.others()
+    return (
+        *rounds((data,), load_model("serres2008"), stages, 0, 1, lambda _: silent),
+        stages,
+        messages,
+    )
 
 
 def test_each_round_begins_with_what_the_one_before_amended(tmp_path, asked):
-    found, model, _, told = diagnose_small(tmp_path)
-    assert [each.effects for each in found] == [("cable_slack",), ()]
+    rounds, model, _, messages = diagnose_small(tmp_path)
+    assert [each.effects for each in rounds] == [("cable_slack",), ()]
     assert model.parameters["cable"].slack == pytest.approx(1e-3)
-    assert len(asked) == 2 and not told
-    again, same, stages, told = diagnose_small(tmp_path)
+    assert len(asked) == 2 and not messages
+    again, same, stages, messages = diagnose_small(tmp_path)
     assert len(asked) == 2, "a finished round is not asked again"
     assert (again[0].effects, again[1].verdict) == (["cable_slack"], "agrees")
     assert same.parameters == model.parameters
-    assert stages.codes == {"this": 2} and not told
+    assert stages.codes == {"this": 2} and not messages
 
 
 def test_rounds_of_other_code_are_told_and_used_unless_made_anew(tmp_path, asked):
     diagnose_small(tmp_path, "older")
-    *_, stages, told = diagnose_small(tmp_path, "newer")
+    *_, stages, messages = diagnose_small(tmp_path, "newer")
     assert len(asked) == 2 and stages.codes == {"older": 2}
-    assert told == (
+    assert messages == (
         f"2 of 2 stages kept in {tmp_path} are by other code than this "
         "(--recompute makes those anew)"
     )
-    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
-    assert len(asked) == 4 and stages.codes == {"newer": 2} and not told
-    *_, stages, told = diagnose_small(tmp_path, "newer", recompute=True)
+    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
+    assert len(asked) == 4 and stages.codes == {"newer": 2} and not messages
+    *_, stages, messages = diagnose_small(tmp_path, "newer", recompute=True)
     assert len(asked) == 4 and stages.codes == {"newer": 2}, "an interrupted --recompute goes on"
 
 
@@ -256,9 +260,9 @@ def test_a_pulley_of_another_size_is_found_in_the_summaries():
     noise = tuple(white_noise(1.0) for _ in range(4))
     whitened = WhitenedResiduals(model, parts[0], (path,), noise, np.array([np.inf]))
     made = Summary(*parts, np.zeros(chosen.sum())).residuals(whitened, np.array([28.0]))
-    found = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
-    assert found.values[path] == pytest.approx(28.0, abs=0.05)
-    assert found.left_out_mm < 0.05
+    explained = Summary(*parts, made).explained(path, model, (path,), np.array([[26.5]]))
+    assert explained.values[path] == pytest.approx(28.0, abs=0.05)
+    assert explained.left_out_mm < 0.05
 
 
 def test_strokes_of_the_printed_validation():
@@ -290,7 +294,7 @@ def test_the_page_and_the_tables_say_what_was_found():
         Explanation("creep", {}, 1.1, 1.2, 0.9, 1.3),
         Explanation(NOTHING, {}, 2.4, 2.4, 0.5, 2.8),
     ]
-    found = Measured(
+    result = Measured(
         rounds=[
             Round(47, "effect", "It is creep.", ("creep",), {"creep": 0.001},
                   [("hysteresis", 5.0, 0.001, "explains these data as well as creep")],
@@ -309,13 +313,13 @@ def test_the_page_and_the_tables_say_what_was_found():
         settings={"model": "serres2008"},
     )  # fmt: skip
     said = StringIO()
-    print_measured(found, Console(file=said))
-    page = measured_page(found)
+    print_measured(result, Console(file=said))
+    page = measured_page(result)
     for text in (said.getvalue(), page):
         assert "target 1 mm: met" in text
         assert "regulator delay" in text
         assert "undecidable" in text
         assert "hysteresis" in text
-    words = " ".join(reverse_words(found))
+    words = " ".join(reverse_words(result))
     assert "rotor.radius mm leaves 1.10 mm" in words
     assert "creep (but worse in displacement)" in words

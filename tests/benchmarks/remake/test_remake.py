@@ -81,9 +81,9 @@ def test_the_chain_names_files_that_are_there_and_shipped_figures():
     assert [step.name for step in steps][:4] == ["identify", "suites", "gains", "designs"]
     assert all(content(path) for step in steps[:5] for path in step.depends)
     assert MODEL in steps[2].depends and steps[2].digest != steps[3].digest
-    found = figures()
-    assert found["station: hysteresis.memory_at_start"] == pytest.approx(0.733, abs=0.01)
-    assert any(name.startswith("policy displacement-100hz-ppo") for name in found)
+    scores = figures()
+    assert scores["station: hysteresis.memory_at_start"] == pytest.approx(0.733, abs=0.01)
+    assert any(name.startswith("policy displacement-100hz-ppo") for name in scores)
 
 
 def test_another_model_gives_every_suite_a_new_version_once(tmp_path):

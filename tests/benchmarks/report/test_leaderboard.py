@@ -59,18 +59,18 @@ def board(suite, rows):
 
 
 def test_measures_keep_the_way_back_and_unseen_references_apart():
-    found = measures(["displacement", "rotation", "rotation_sine", "isotonic", "triangle_low"])
-    assert [(m.name, m.tasks, m.unit) for m in found] == [
+    named = measures(["displacement", "rotation", "rotation_sine", "isotonic", "triangle_low"])
+    assert [(m.name, m.tasks, m.unit) for m in named] == [
         ("displacement", ("displacement",), "mm"),
         ("rotation I, II", ("rotation",), "deg"),
         ("rotation III", ("rotation",), "deg"),
         ("unseen rotation", ("rotation_sine",), "deg"),
         ("contraction", ("isotonic", "triangle_low"), "mm"),
     ]
-    assert found[1].phases("rotation") == ["I", "II"]
-    assert found[2].phases("rotation") == ["III"]
+    assert named[1].phases("rotation") == ["I", "II"]
+    assert named[2].phases("rotation") == ["III"]
     # A regulator vents: its way back is like any other phase.
-    assert found[4].phases("isotonic") == ["I", "II", "III"]
+    assert named[4].phases("isotonic") == ["I", "II", "III"]
 
 
 def test_error_of_a_row_is_the_rmse_of_its_phases_together():
@@ -100,16 +100,16 @@ def test_figures_do_not_depend_on_the_order_of_the_rows():
     assert len({numbers_csv(each) for each in boards}) == 1
     assert len({pairs_csv(each) for each in boards}) == 1
     styles = styles_of(boards[0].labels)
-    found = [list(each.standings.values()) for each in boards]
-    assert profile_plot(found[0], styles) == profile_plot(found[1], styles)
+    standings = [list(each.standings.values()) for each in boards]
+    assert profile_plot(standings[0], styles) == profile_plot(standings[1], styles)
 
 
 def test_standings_find_who_is_better_and_by_how_much():
     suite = simulated_suite(stations=48)
-    found = board(suite, simulated_rows(suite)).standings["displacement"]
-    by_name = {row.name: row for row in found.rows}
+    ranking = board(suite, simulated_rows(suite)).standings["displacement"]
+    by_name = {row.name: row for row in ranking.rows}
     # The bound is last and has no rank; 0.9 and 1.0 are told apart, equals are not.
-    assert found.rows[-1].name == "oracle"
+    assert ranking.rows[-1].name == "oracle"
     assert by_name["oracle"].rank is None
     assert by_name["mpc"].rank == (1, 1)
     assert by_name["pid"].rank == by_name["feedforward_pid"].rank == (2, 3)
@@ -137,13 +137,13 @@ def test_missing_and_incomplete_controllers_are_named_and_not_ranked():
     rows = [row for row in simulated_rows(suite) if row["controller"] != "mpc"]
     half = [row for row in rows if row["controller"] == "pid"][::2]
     kept = [row for row in rows if row["controller"] != "pid"] + half
-    found = board(suite, kept)
-    assert [entry.spec.name for entry in found.missing] == ["mpc"]
-    ((entry, done, wanted),) = found.incomplete
+    ranking = board(suite, kept)
+    assert [entry.spec.name for entry in ranking.missing] == ["mpc"]
+    ((entry, done, wanted),) = ranking.incomplete
     assert (entry.spec.name, done, wanted) == ("pid", len(half), len(suite.episodes))
-    names = found.standings["displacement"].errors.names
+    names = ranking.standings["displacement"].errors.names
     assert names == ("oracle", "feedforward_pid", "improved_feedforward")
-    text = to_markdown(page_blocks(found), {}, "plots")
+    text = to_markdown(page_blocks(ranking), {}, "plots")
     assert "**Not run: MPC.**" in text
     assert f"PID ({len(half)} of {wanted} cases)" in text
 
@@ -151,12 +151,12 @@ def test_missing_and_incomplete_controllers_are_named_and_not_ranked():
 def test_an_interrupted_run_compares_the_cases_that_all_have():
     suite = simulated_suite(targets=[{"figure": "best", "measure": "displacement", "most": 9.0}])
     rows = simulated_rows(suite)
-    found = board(suite, rows[: len(rows) // 2 + 2])
-    standings = found.standings["displacement"]
+    ranking = board(suite, rows[: len(rows) // 2 + 2])
+    standings = ranking.standings["displacement"]
     assert standings.errors.names == tuple(LEVELS)
     assert 0 < len(standings.errors.episodes) < len(suite.episodes)
     # No verdict rests on a part of the cases.
-    assert [check.word for check in found.verdicts] == ["no figure"]
+    assert [check.word for check in ranking.verdicts] == ["no figure"]
 
 
 def test_rows_of_other_versions_and_unknown_episodes_do_not_count():
@@ -170,9 +170,9 @@ def test_rows_of_other_versions_and_unknown_episodes_do_not_count():
 def test_somebody_s_own_controller_is_ranked_with_the_others():
     suite = simulated_suite()
     mine = [simulated_row(suite, "Mine", episode, 0.01) for episode in suite.episodes]
-    found = board(suite, simulated_rows(suite) + mine)
-    assert found.standings["rotation III"].rows[0].name == "Mine"
-    assert found.labels["Mine"] == "Mine"
+    ranking = board(suite, simulated_rows(suite) + mine)
+    assert ranking.standings["rotation III"].rows[0].name == "Mine"
+    assert ranking.labels["Mine"] == "Mine"
 
 
 def test_verdicts_say_what_was_asked_and_got():
@@ -187,21 +187,21 @@ def test_verdicts_say_what_was_asked_and_got():
         {"figure": "ratio_half_width", "measure": "displacement", "most": 20.0},
     ]
     suite = simulated_suite(targets=targets)
-    found = board(suite, simulated_rows(suite))
-    words = [check.word for check in found.verdicts]
+    ranking = board(suite, simulated_rows(suite))
+    words = [check.word for check in ranking.verdicts]
     assert words == ["met", "missed", "met", "—", "met", "missed", "no figure", "met"]
-    assert "MPC" in found.verdicts[0].what
-    ratio = found.verdicts[3].got
+    assert "MPC" in ranking.verdicts[0].what
+    ratio = ranking.verdicts[3].got
     assert ratio.low < 2.0 < ratio.high
     # Of those up to twice the best alone: not the feed-forward, which is far off.
-    assert not found.verdicts[7].what.endswith("IMPROVED_FEEDFORWARD")
-    assert [check.unit for check in found.verdicts[4:]] == ["deg", "%", "", "%"]
+    assert not ranking.verdicts[7].what.endswith("IMPROVED_FEEDFORWARD")
+    assert [check.unit for check in ranking.verdicts[4:]] == ["deg", "%", "", "%"]
     # The bound is taken off at every pressure.
     largest = max(
-        np.mean(found.standings["rotation III"].errors.of("pid")[at])
-        for at in _by_pressure(found.standings["rotation III"].errors.episodes)
+        np.mean(ranking.standings["rotation III"].errors.of("pid")[at])
+        for at in _by_pressure(ranking.standings["rotation III"].errors.episodes)
     )
-    assert found.verdicts[4].got.estimate == pytest.approx(largest - 0.02)
+    assert ranking.verdicts[4].got.estimate == pytest.approx(largest - 0.02)
 
 
 def _by_pressure(episodes):
@@ -230,12 +230,12 @@ def test_spending_leaves_failed_cases_out_and_counts_them():
     first = next(row for row in ours if row["task"] == "displacement")
     first["failure"] = "it broke"
     first["act_us"] = 1e9
-    (found,) = spending(Record.of(suite, rows), Measure("", ("displacement",), "mm"), ["pid"])
-    assert found.failures == 1
-    assert found.act_us == 10.0
+    (spent,) = spending(Record.of(suite, rows), Measure("", ("displacement",), "mm"), ["pid"])
+    assert spent.failures == 1
+    assert spent.act_us == 10.0
     # 10 ms of control period, 20 us of computing.
-    assert found.real_time_factor == pytest.approx(500.0)
-    assert found.saturated_percent == pytest.approx(1.0)
+    assert spent.real_time_factor == pytest.approx(500.0)
+    assert spent.saturated_percent == pytest.approx(1.0)
 
 
 def test_a_bound_is_who_may_see():

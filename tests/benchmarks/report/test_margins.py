@@ -47,15 +47,15 @@ def test_integrator_has_the_margins_of_the_textbook():
     # |L| = 1 where 2 sin(w T / 2) = g T; the phase there is -90 deg - w T / 2. At half the control
     # rate the response is -g T / 2.
     gain = 20.0
-    found = margins(sampled_integrator(gain), unit())
+    margin = margins(sampled_integrator(gain), unit())
     crossing = 2.0 / PERIOD * math.asin(gain * PERIOD / 2.0)
     phase = math.pi / 2.0 - crossing * PERIOD / 2.0
-    assert found.stable
-    assert found.gain == pytest.approx(2.0 / (gain * PERIOD), rel=1e-6)
-    assert found.phase == pytest.approx(phase, rel=1e-4)
-    assert found.crossover == pytest.approx(crossing, rel=1e-4)
-    assert found.delay == pytest.approx(phase / crossing, rel=1e-4)
-    assert found.sensitivity == pytest.approx(1.0 / (1.0 - gain * PERIOD / 2.0), rel=1e-6)
+    assert margin.stable
+    assert margin.gain == pytest.approx(2.0 / (gain * PERIOD), rel=1e-6)
+    assert margin.phase == pytest.approx(phase, rel=1e-4)
+    assert margin.crossover == pytest.approx(crossing, rel=1e-4)
+    assert margin.delay == pytest.approx(phase / crossing, rel=1e-4)
+    assert margin.sensitivity == pytest.approx(1.0 / (1.0 - gain * PERIOD / 2.0), rel=1e-6)
 
 
 def test_gain_margin_is_where_the_closed_loop_becomes_unstable():
@@ -69,8 +69,8 @@ def test_gain_margin_is_where_the_closed_loop_becomes_unstable():
 
 def test_delay_margin_is_the_delay_that_the_loop_bears():
     plant, law = _displacement_loop()
-    found = margins(plant, law)
-    whole = math.floor(found.delay / PERIOD)
+    margin = margins(plant, law)
+    whole = math.floor(margin.delay / PERIOD)
 
     def late(steps):
         chain = control.ss(
@@ -82,7 +82,7 @@ def test_delay_margin_is_the_delay_that_the_loop_bears():
     assert late(whole).stable
     assert not late(whole + 1).stable
     # A period of delay takes a period from the margin.
-    assert late(whole).delay == pytest.approx(found.delay - whole * PERIOD, rel=1e-3)
+    assert late(whole).delay == pytest.approx(margin.delay - whole * PERIOD, rel=1e-3)
 
 
 def test_station_delays_are_part_of_the_plant():
@@ -133,9 +133,9 @@ def test_closed_loop_follows_and_rejects():
 
 
 def test_margins_over_the_stroke_are_the_least():
-    found = loops([PID(), FeedforwardPID(), ImprovedFeedforward()], station("rotation"))
-    assert {loop.name for loop in found} == {"pid", "feedforward_pid"}
-    mine = [loop for loop in found if loop.name == "pid"]
+    loops_there = loops([PID(), FeedforwardPID(), ImprovedFeedforward()], station("rotation"))
+    assert {loop.name for loop in loops_there} == {"pid", "feedforward_pid"}
+    mine = [loop for loop in loops_there if loop.name == "pid"]
     least = worst(mine)
     assert [loop.share for loop in mine] == [0.05, 0.5, 0.95]
     assert least.gain == min(loop.margins.gain for loop in mine)

@@ -57,10 +57,10 @@ def test_a_unit_without_like_is_exchanged_on_the_coarser_level():
 
 def test_one_case_alone_has_no_interval():
     draws = resample([np.zeros(1, dtype=int)], np.zeros(1, dtype=int))
-    found = interval(3.0, np.full(2000, 3.0), draws)
-    assert found.estimate == 3.0
-    assert np.isnan(found.low)
-    assert np.isnan(found.high)
+    estimate = interval(3.0, np.full(2000, 3.0), draws)
+    assert estimate.estimate == 3.0
+    assert np.isnan(estimate.low)
+    assert np.isnan(estimate.high)
 
 
 def test_same_seed_same_bits_and_another_seed_others():
@@ -86,8 +86,8 @@ def test_intervals_hold_the_truth_as_often_as_they_say(stations, each, strata):
         shared = generator.normal(3.0, 1.0, (stations, 1))
         values = (shared + generator.normal(0.0, 0.3, (stations, each))).ravel()
         drawn = replicated(values[None], draws, interquartile_mean)[0]
-        found = interval(float(interquartile_mean(values)), drawn, draws)
-        held += found.low <= 3.0 <= found.high
+        estimate = interval(float(interquartile_mean(values)), drawn, draws)
+        held += estimate.low <= 3.0 <= estimate.high
     # Three standard deviations of 300 throws at 95 % are 3.8 %.
     assert 0.912 <= held / trials <= 0.988
 
@@ -118,9 +118,9 @@ def test_paired_ratio_resolves_what_single_intervals_do_not():
     means = [float(interquartile_mean(v)) for v in values]
     single = [interval(m, d, draws) for m, d in zip(means, drawn, strict=True)]
     assert single[0].high > single[1].low
-    found = ratio((means[0], means[1]), (drawn[0], drawn[1]), draws)
-    assert found.estimate == pytest.approx(means[0] / means[1])
-    assert 0.93 < found.low < 0.95 < found.high < 0.97
+    estimate = ratio((means[0], means[1]), (drawn[0], drawn[1]), draws)
+    assert estimate.estimate == pytest.approx(means[0] / means[1])
+    assert 0.93 < estimate.low < 0.95 < estimate.high < 0.97
 
 
 def simulated(generator, shift, controllers=6, cases=60):
@@ -146,19 +146,19 @@ def test_equal_controllers_are_seldom_ranked_apart():
 
 def test_a_better_controller_is_ranked_first_and_the_rest_share_the_others():
     values = simulated(np.random.default_rng(6), 0.5)
-    found = ranked(values, apart(60))
-    assert found.ranks[0] == Rank(1, 1)
-    assert all(rank == Rank(2, 6) for rank in found.ranks[1:])
-    assert str(found.ranks[1]) == "2–6"
-    assert found.separated[0, 1:].all()
-    assert not found.separated[1:].any()
+    ranks = ranked(values, apart(60))
+    assert ranks.ranks[0] == Rank(1, 1)
+    assert all(rank == Rank(2, 6) for rank in ranks.ranks[1:])
+    assert str(ranks.ranks[1]) == "2–6"
+    assert ranks.separated[0, 1:].all()
+    assert not ranks.separated[1:].any()
 
 
 def test_ranks_of_one_controller_and_of_single_cases_claim_nothing():
     assert ranked(np.ones((1, 10)), apart(10)).ranks == (Rank(1, 1),)
     alone = resample([np.zeros(1, dtype=int)], np.zeros(1, dtype=int))
-    found = ranked(np.array([[1.0], [2.0]]), alone)
-    assert found.ranks == (Rank(1, 2), Rank(1, 2))
+    ranks = ranked(np.array([[1.0], [2.0]]), alone)
+    assert ranks.ranks == (Rank(1, 2), Rank(1, 2))
 
 
 def test_profile_is_the_distribution_of_the_errors():

@@ -126,10 +126,10 @@ def test_rows_of_another_schema_count_as_not_run(tmp_path, capsys):
 @pytest.mark.parametrize("rubbish", RUBBISH)
 def test_damaged_stages_are_made_anew(tmp_path, rubbish, capsys):
     stages = Stages(tmp_path, code="now")
-    stages.keep("one", "asked", {"found": [1]})
-    assert stages.kept("one", "asked", lambda found: found) == [1]
+    stages.keep("one", "asked", {"numbers": [1]})
+    assert stages.kept("one", "asked", lambda numbers: numbers) == [1]
     (tmp_path / "one.json").write_bytes(RUBBISH[rubbish])
-    assert stages.kept("one", "asked", lambda found: found) is None
+    assert stages.kept("one", "asked", lambda numbers: numbers) is None
     assert stages.others() == ""
     assert len(warnings_in(capsys.readouterr().err)) == (rubbish not in ("object", "types", "NaN"))
 

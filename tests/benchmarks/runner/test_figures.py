@@ -42,21 +42,21 @@ def figures_of(task, *given, **named):
 
 
 def test_constant_error_is_every_rmse():
-    found = figures_of("displacement", lambda time: 0.25e-3 + 0.0 * time)
+    scores = figures_of("displacement", lambda time: 0.25e-3 + 0.0 * time)
     wanted = pytest.approx(0.25, rel=1e-12)
-    assert found.unit == "mm"
-    assert (found.rmse, found.start_rmse, found.steady_rmse) == (wanted, wanted, wanted)
-    phase = found.phases["displacement"]
+    assert scores.unit == "mm"
+    assert (scores.rmse, scores.start_rmse, scores.steady_rmse) == (wanted, wanted, wanted)
+    phase = scores.phases["displacement"]
     assert (phase.rmse, phase.largest_error) == (wanted, wanted)
     assert phase.percent_of_range == pytest.approx(1.0, rel=1e-12)
 
 
 def test_start_is_the_first_half_second_and_the_rest_is_steady():
-    found = figures_of("displacement", lambda time: np.where(time < 0.5, 2e-3, 1e-3))
-    assert found.start_rmse == pytest.approx(2.0, rel=1e-12)
-    assert found.steady_rmse == pytest.approx(1.0, rel=1e-12)
+    scores = figures_of("displacement", lambda time: np.where(time < 0.5, 2e-3, 1e-3))
+    assert scores.start_rmse == pytest.approx(2.0, rel=1e-12)
+    assert scores.steady_rmse == pytest.approx(1.0, rel=1e-12)
     # 192 of the 1923 samples lie before 0.5 s.
-    assert found.rmse == pytest.approx(math.sqrt((192 * 4.0 + 1731) / 1923), rel=1e-12)
+    assert scores.rmse == pytest.approx(math.sqrt((192 * 4.0 + 1731) / 1923), rel=1e-12)
 
 
 def test_phases_are_those_of_the_environment():
@@ -69,32 +69,32 @@ def test_phases_are_those_of_the_environment():
         volts.append(env.motor_voltage)
         for name in truth:
             truth[name].append(env.truth[name])
-    found = figures(env.task, Episode(env.trajectory(), volts, truth, [1e-5]), 0.01, LIMITS)
-    assert {n: p.rmse for n, p in found.phases.items()} == pytest.approx(
+    scores = figures(env.task, Episode(env.trajectory(), volts, truth, [1e-5]), 0.01, LIMITS)
+    assert {n: p.rmse for n, p in scores.phases.items()} == pytest.approx(
         info["rmse_by_phase_deg"], rel=1e-9
     )
-    assert found.rmse == pytest.approx(info["rmse_deg"], rel=1e-9)
+    assert scores.rmse == pytest.approx(info["rmse_deg"], rel=1e-9)
 
 
 def test_effort_is_that_of_a_known_voltage():
     # A square wave between 4 and 6 V: standard deviation 1 V, a jump of 2 V every 10 ms.
     volts = np.tile([4.0, 6.0], 250)
-    found = figures_of("displacement", lambda time: 0.0 * time, voltages=volts)
-    assert found.effort_v == pytest.approx(1.0, rel=1e-12)
-    assert found.variation_v_per_s == pytest.approx(499 * 2.0 / 5.0, rel=1e-12)
-    assert found.saturation_share == 0.0
+    scores = figures_of("displacement", lambda time: 0.0 * time, voltages=volts)
+    assert scores.effort_v == pytest.approx(1.0, rel=1e-12)
+    assert scores.variation_v_per_s == pytest.approx(499 * 2.0 / 5.0, rel=1e-12)
+    assert scores.saturation_share == 0.0
 
 
 def test_saturation_counts_steps_at_either_limit():
-    found = figures_of("displacement", lambda time: 0.0 * time, voltages=[0.0, 10.0, 9.99, 5.0])
-    assert found.saturation_share == 0.5
+    scores = figures_of("displacement", lambda time: 0.0 * time, voltages=[0.0, 10.0, 9.99, 5.0])
+    assert scores.saturation_share == 0.5
 
 
 def test_times_are_the_median_and_the_99th_percentile():
     seconds = np.arange(1, 101) * 1e-6
-    found = figures_of("displacement", lambda time: 0.0 * time, act_seconds=seconds)
-    assert found.act_us == pytest.approx(50.5)
-    assert found.act_us_worst == pytest.approx(99.01)
+    scores = figures_of("displacement", lambda time: 0.0 * time, act_seconds=seconds)
+    assert scores.act_us == pytest.approx(50.5)
+    assert scores.act_us_worst == pytest.approx(99.01)
 
 
 def test_soft_limits_are_the_reach_of_table_i3():
@@ -129,10 +129,10 @@ def test_a_controller_of_the_motor_is_not_blamed_for_the_pressure():
 
 
 def test_rows_keep_every_bit():
-    found = figures_of("rotation", lambda time: 1e-3 * np.sin(time) / 3.0)
-    row = {"controller": "pid", **json.loads(json.dumps(found.to_json()))}
-    assert Figures.from_json(row) == found
-    assert list(found.to_json()["phases"]) == ["I", "II", "III"]
+    scores = figures_of("rotation", lambda time: 1e-3 * np.sin(time) / 3.0)
+    row = {"controller": "pid", **json.loads(json.dumps(scores.to_json()))}
+    assert Figures.from_json(row) == scores
+    assert list(scores.to_json()["phases"]) == ["I", "II", "III"]
 
 
 def test_a_trial_that_ended_early_has_no_figures():

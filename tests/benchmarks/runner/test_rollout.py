@@ -197,17 +197,17 @@ class Learns(Returns):
 
     def __init__(self):
         super().__init__(2.0)
-        self.told, self.heard = [], []
+        self.begun, self.observed = [], []
 
     def receive(self, environment):
-        self.told.append((environment.time, environment.condition.zero_contraction))
+        self.begun.append((environment.time, environment.condition.zero_contraction))
 
     def reset(self, reference, station):
-        self.told.append(station.model.name)
-        self.heard.append([])
+        self.begun.append(station.model.name)
+        self.observed.append([])
 
     def act(self, observation, time):
-        self.heard[-1].append(observation)
+        self.observed[-1].append(observation)
         return 2.0
 
 
@@ -215,11 +215,11 @@ def test_a_controller_that_learns_practises_and_its_last_episode_counts():
     environment, learns = make_environment("displacement", MODEL, 300), Learns()
     nominal = load_model("station")
     done = rollout(environment, learns, seed=5, nominal=nominal, reveal=True)
-    shown, models = learns.told[::2], learns.told[1::2]
+    shown, models = learns.begun[::2], learns.begun[1::2]
     assert len(set(shown)) == 1 and shown[0][0] == 0.0
     assert models == ["station"] * 3
     # Each episode has a noise of its own.
-    assert len({tuple(heard) for heard in learns.heard}) == 3
+    assert len({tuple(each) for each in learns.observed}) == 3
     plain = rollout(environment, Returns(2.0), seed=5)
     assert np.array_equal(done.readings, plain.readings)
     assert np.array_equal(done.position, plain.position)

@@ -49,14 +49,16 @@ def test_the_instructions_are_the_graphs_operations():
     writer = Writer(env.unwrapped.engine.kernel)
     outputs = [*writer.layout.outputs, *writer.extra]
     sorts = [v.operation for v in order(outputs) if v.level == CHANGING]
-    found, flops = counted()
-    assert found["divide"] == sorts.count("divide")
-    assert found["square_root"] == sorts.count("square_root")
+    instructions, flops = counted()
+    assert instructions["divide"] == sorts.count("divide")
+    assert instructions["square_root"] == sorts.count("square_root")
     real = [v for v in order(outputs) if v.level == CHANGING and v.kind == "real"]
     sums = sum(v.operation in ("add", "subtract", "multiply") for v in real)
     # A multiply-add is one instruction and two operations, whatever was put together.
-    assert found["multiply_add"] < sums
-    assert found["multiply_add"] + found["divide"] + found["square_root"] < flops
+    assert instructions["multiply_add"] < sums
+    assert (
+        instructions["multiply_add"] + instructions["divide"] + instructions["square_root"] < flops
+    )
     env.close()
 
 

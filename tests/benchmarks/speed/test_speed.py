@@ -75,16 +75,16 @@ def test_rows_that_belong_together_are_measured_one_after_the_other():
     made = CpuDevice(dict.fromkeys(keys, 1.0))
     Measurement(rows, Repetition(20, 0.0), lambda peer: made, groups).run()
     rounds = [made.calls[i : i + 8] for i in range(0, 160, 8)]
-    found = set()
+    neighbours = set()
     for calls in rounds:
         assert sorted(calls) == keys
         for group in groups:
             first = min(map(calls.index, group))
             beside = calls[first : first + len(group)]
             assert sorted(beside) == group
-            found.add(tuple(beside))
+            neighbours.add(tuple(beside))
     # In any order among themselves.
-    assert len(found) == 2 + 6
+    assert len(neighbours) == 2 + 6
 
 
 def test_single_environments_are_measured_in_a_new_process_each_round():
@@ -108,8 +108,8 @@ def test_missing_peers_are_named(tmp_path, monkeypatch):
     rows = select("single/pcgym,plant/dompc,batch/gymnax_CartPole", all_rows())
     measurement = Measurement(rows, Repetition(1, 0.0), lambda peer: None)
     measurement.run()
-    found = run.document(measurement, [], {"git": {}}, 0.0)
-    (absent,) = (table for table in speed_tables(found) if table.name == "absent")
+    report = run.document(measurement, [], {"git": {}}, 0.0)
+    (absent,) = (table for table in speed_tables(report) if table.name == "absent")
     what, why = zip(*absent.rows, strict=True)
     assert set(why) == {"not installed; `make peers` installs it"}
     assert "PC-gym reactor" in what and "do-mpc simulator (CVODES)" in what
@@ -202,13 +202,13 @@ def wait_for_workers(process):
     while time.monotonic() < deadline and process.poll() is None:
         tasks = Path(f"/proc/{process.pid}/task").glob("*/children")
         children = [child for task in tasks for child in task.read_text().split()]
-        found = [
+        contents = [
             child
             for child in children
             if b"serve_classic" in Path(f"/proc/{child}/cmdline").read_bytes()
         ]
-        if found:
-            return found
+        if contents:
+            return contents
         time.sleep(0.05)
     return []
 
@@ -241,8 +241,8 @@ def test_the_page_takes_its_figures_from_a_whole_run(tmp_path, monkeypatch):
     with pytest.raises(page.RunError, match="there is no file"):
         page.load_run(tmp_path / "none.json")
     text = page.PAGE.read_text(encoding="utf-8")
-    found = page.refreshed(text, json.loads(path.read_text()))
-    assert "| CartPole-v1 | 20 ms; 4 states, one Euler step | 100 | 0 % |" in found
-    assert f"<!-- figures: batches -->\n\n{page.ABSENT}" in found
-    assert page.refreshed(found, json.loads(path.read_text())) == found
+    refreshed_text = page.refreshed(text, json.loads(path.read_text()))
+    assert "| CartPole-v1 | 20 ms; 4 states, one Euler step | 100 | 0 % |" in refreshed_text
+    assert f"<!-- figures: batches -->\n\n{page.ABSENT}" in refreshed_text
+    assert page.refreshed(refreshed_text, json.loads(path.read_text())) == refreshed_text
     assert set(re.findall(r"figures: (\w+)", text)) >= {"setting", "ratios", "tolerances", "absent"}

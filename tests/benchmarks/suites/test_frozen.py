@@ -70,8 +70,8 @@ def acting(model):
         if not neutral or any(getattr(values, stem) != zero for stem, zero in neutral.items()):
             # A parameter that the catalogue got later is as if it were not there.
             later = effect.defaults.items()
-            told = model.at_the_door(name)
-            yield name, dict(pair for pair in told.items() if pair not in later)
+            parameters = model.at_the_door(name)
+            yield name, dict(pair for pair in parameters.items() if pair not in later)
 
 
 def test_no_drawn_station_moves_without_a_new_version():

@@ -85,9 +85,9 @@ def test_a_training_leaves_a_policy_that_drives_an_exercise(
     order = Order(asked, seed=3)
     trained = train(order, tmp_path, lambda steps, point: None)
     assert 0.0 < trained.final.error < 90.0
-    found = policy_of(order, trained)
-    assert found.task == "isokinetic" and found.name == f"isokinetic-50hz-{algorithm}"
-    driven = Policy(save_policy_file(found, tmp_path / found.name))
+    policy = policy_of(order, trained)
+    assert policy.task == "isokinetic" and policy.name == f"isokinetic-50hz-{algorithm}"
+    driven = Policy(save_policy_file(policy, tmp_path / policy.name))
     env = PMAEnv("isokinetic_exercise", **options)
     env.reset(seed=1)
     driven.reset(env.reference, env.station)
@@ -113,8 +113,8 @@ def test_exercises_are_trained_by_name():
 
 def test_rewards_are_bounded_before_they_are_scaled():
     rewards = np.array([-0.5, -30.0, -30.0])
-    found = bounded(rewards, np.array([False, False, True]), 0.01)
-    np.testing.assert_allclose(found, [-0.005, 0.01 * LEAST_REWARD, 0.01 * -30.0])
+    limited = bounded(rewards, np.array([False, False, True]), 0.01)
+    np.testing.assert_allclose(limited, [-0.005, 0.01 * LEAST_REWARD, 0.01 * -30.0])
     assert bounded(-1e4, True) == BROKEN_REWARD
 
 

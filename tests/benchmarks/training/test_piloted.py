@@ -88,22 +88,22 @@ def ends_of(envs, steps):
     """By environment: when its episodes ended and what was told of them; actions of zero."""
     envs.seed(5)
     envs.reset()
-    found = [[] for _ in range(envs.num_envs)]
+    ends = [[] for _ in range(envs.num_envs)]
     for step in range(1, steps + 1):
         _, _, over, infos = envs.step(np.zeros((envs.num_envs, 1), np.float32))
         for i in np.flatnonzero(over):
-            found[i].append((step, infos[i]))
-    return found
+            ends[i].append((step, infos[i]))
+    return ends
 
 
 def test_only_first_episodes_are_cut_and_at_different_times():
     view, form, options = CASES["increment"]
     envs = batch(view, form, options, staggered=True)
     whole = envs.envs.task.steps(20.0)
-    found = ends_of(envs, 2 * whole)
-    firsts = {ends[0][0] for ends in found}
+    endings = ends_of(envs, 2 * whole)
+    firsts = {ends[0][0] for ends in endings}
     assert len(firsts) == COUNT and max(firsts) <= whole
-    for (first, cut), (second, last) in (ends[:2] for ends in found):
+    for (first, cut), (second, last) in (ends[:2] for ends in endings):
         assert second - first == whole
         # Cut, not failed: what would have come after counts.
         assert cut["TimeLimit.truncated"] and last["TimeLimit.truncated"]

@@ -114,9 +114,9 @@ preset = Preset("small", "ppo", "pma_gym/IsokineticDisplacement-v0", Observation
     0.5, {"n_steps": 32, "batch_size": 32, "n_epochs": 2, "learning_rate": "lin_0.003"},
     {"net_arch": [16]})
 run.EPISODES = run.EVALUATIONS = 2
-found = run.train(run.Order(preset, 3), pathlib.Path(sys.argv[1]), lambda steps, point: None)
+trained = run.train(run.Order(preset, 3), pathlib.Path(sys.argv[1]), lambda steps, point: None)
 sums = hashlib.sha256()
-for tensor in found.model.policy.state_dict().values():
+for tensor in trained.model.policy.state_dict().values():
     sums.update(tensor.numpy().tobytes())
 print(sums.hexdigest())
 """

@@ -42,9 +42,9 @@ def test_training_and_validation_have_other_stations(monkeypatch):
 @pytest.mark.parametrize("suite", ["robust", "hard"])
 def test_never_the_suites_own_seed(suite):
     own = frozen_suite(suite).recipe
-    found = training_recipe(suite)
-    assert found.seed == own.training_seed != own.seed
-    assert Stations(suite).recipe is found
+    recipe = training_recipe(suite)
+    assert recipe.seed == own.training_seed != own.seed
+    assert Stations(suite).recipe is recipe
 
 
 def test_the_draws_differ_in_their_parameters():
@@ -70,5 +70,5 @@ def test_episodes_are_on_drawn_stations_with_an_operator():
     names = {model.name for model in envs.engine.models}
     assert names == {"station-0", "station-1"}
     # What controllers are told is the nominal one.
-    assert envs.engine.nominal.name == "station"
+    assert envs.engine.nominal_model.name == "station"
     envs.close()

@@ -41,10 +41,10 @@ def pool(values):
 
 def test_seeds_that_agree_give_the_mean_of_one():
     one = np.random.default_rng(0).uniform(0.02, 0.04, 64)
-    found = pool(np.tile(one, (4, 1)))
-    assert found.mean.estimate == pytest.approx(float(interquartile_mean(one)))
-    assert found.mean.low < found.mean.estimate < found.mean.high
-    assert found.by_seed.tolist() == pytest.approx([float(interquartile_mean(one))] * 4)
+    pooled = pool(np.tile(one, (4, 1)))
+    assert pooled.mean.estimate == pytest.approx(float(interquartile_mean(one)))
+    assert pooled.mean.low < pooled.mean.estimate < pooled.mean.high
+    assert pooled.by_seed.tolist() == pytest.approx([float(interquartile_mean(one))] * 4)
 
 
 def test_seeds_that_differ_widen_the_interval():
@@ -57,8 +57,8 @@ def test_seeds_that_differ_widen_the_interval():
 
 
 def test_a_seed_counts_within_twice_the_best():
-    found = pool(np.array([0.02, 0.04, 0.0401])[:, None] * np.ones((3, 8)))
-    assert found.reliable == 2
+    pooled = pool(np.array([0.02, 0.04, 0.0401])[:, None] * np.ones((3, 8)))
+    assert pooled.reliable == 2
 
 
 def test_a_curve_is_below_an_error_when_it_first_is():
@@ -68,12 +68,12 @@ def test_a_curve_is_below_an_error_when_it_first_is():
 
 
 def test_cells_are_told_apart_and_change_what_they_say():
-    found = cells()
-    assert len({(c.group, c.preset, c.task) for c in found}) == len(found)
-    for cell in found:
+    every = cells()
+    assert len({(c.group, c.preset, c.task) for c in every}) == len(every)
+    for cell in every:
         whole = cell._replace(change="").resolved
         assert (cell.resolved != whole) == bool(cell.change)
-    assert set(CHANGES) == {c.change for c in found if c.change}
+    assert set(CHANGES) == {c.change for c in every if c.change}
 
 
 def test_the_seed_with_the_least_validation_error_ships(station, tmp_path):

@@ -42,9 +42,9 @@ def shipped(tmp_path):
 
 
 def test_every_controller_with_settings_is_designed_for_every_loop():
-    found = problems_of(["lqg", "mpc", "lqg"], 0)
-    assert len(found) == 2 * len(TABLES)
-    assert {problem.name for problem in found} == {
+    problems = problems_of(["lqg", "mpc", "lqg"], 0)
+    assert len(problems) == 2 * len(TABLES)
+    assert {problem.name for problem in problems} == {
         f"{c}/{t}" for c in ("lqg", "mpc") for t in TABLES
     }
 

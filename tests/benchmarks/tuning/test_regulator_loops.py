@@ -101,15 +101,17 @@ def test_report_of_suite_pressure_has_every_loop_at_low_middle_and_high_pressure
     suite = frozen_suite("pressure")
     two = tuple(e for e in suite.entries if e.spec.name in ("pid", "improved_feedforward"))
     leaderboard = Leaderboard(Record.of(replace(suite, entries=two), []), {})
-    found = leaderboard.loops
-    pressures = {task: [each.pressure_kpa for each in row] for task, row in found.items()}
+    loops_there = leaderboard.loops
+    pressures = {task: [each.pressure_kpa for each in row] for task, row in loops_there.items()}
     assert pressures == {
         "isotonic": [150.0, 250.0, 300.0],
         "triangle_low": [150.0],
         "triangle_high": [450.0],
     }
-    table = margin_table(found["triangle_low"], leaderboard.labels)
+    table = margin_table(loops_there["triangle_low"], leaderboard.labels)
     assert table.title.startswith("Triangle low, against 150 N: least margins")
     assert [row[0] for row in table.rows] == ["PID"]
     assert table.rows[0][-1] == "stable"
-    assert loop_plot(found["triangle_low"], styles_of(leaderboard.labels)).startswith(b"\x89PNG")
+    assert loop_plot(loops_there["triangle_low"], styles_of(leaderboard.labels)).startswith(
+        b"\x89PNG"
+    )

@@ -15,7 +15,7 @@ from benchmarks.tuning.job import Job
 from benchmarks.tuning.loop import Loop, lambda_tuning
 from benchmarks.tuning.tune import TuneError, gains_from, run_tune
 from controllers.design.gains import GAINS_FILE, Gains, scheduled_gains
-from pma_gym.plant.linear import linearize
+from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 
@@ -93,9 +93,9 @@ def test_shipped_gains_are_stable_on_stations_of_other_force_and_damping():
     for task, pressure in (("displacement", 225.0), ("rotation", 400.0), ("isotonic", 225.0)):
         for force, damping in itertools.product(factors, factors):
             job = Job(scaled_model(known, force, damping), task, "pid", pressure, 0, 50.0, 0.02)
-            loop, told = Loop(job), replace(job.station, model=known)
+            loop, information = Loop(job), replace(job.station, model=known)
             for controller in tune.CONTROLLERS:
-                sensitivity = loop.sensitivity(scheduled_gains(controller, told))
+                sensitivity = loop.sensitivity(scheduled_gains(controller, information))
                 assert sensitivity < 3.0, (controller, task, force, damping)
 
 

@@ -85,11 +85,11 @@ def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercised):
 
 
 def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(exercised):
-    for off, found in ((-5e3, -5e3), (-200e3, -AWAY_PA)):
+    for off, estimated in ((-5e3, -5e3), (-200e3, -AWAY_PA)):
         observer = PressureObserver(exercised, ProcessNoise())
         for _ in range(500):
             observer.update(300e3 + off, 300e3)
-        assert observer.offset == pytest.approx(found, abs=1.0)
+        assert observer.offset == pytest.approx(estimated, abs=1.0)
 
 
 def test_what_is_foreseen_is_what_the_equations_give():

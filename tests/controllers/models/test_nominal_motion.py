@@ -11,7 +11,7 @@ from controllers.models.local_model import SENSORS, step_response
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.operating_range import rest_voltages
 from pma_gym.envs import PMAEnv, StationInfo
-from pma_gym.plant.linear import linearize
+from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import EVERY_TASK

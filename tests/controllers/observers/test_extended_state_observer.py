@@ -96,8 +96,8 @@ def test_observer_foresees_a_plant_of_its_own_kind(constants, station, reading):
     # No cable that could be slack.
     observer._loose = -math.inf
     for k, voltage in enumerate(voltages):
-        heard = truth[k * PARTS - late][0] if k * PARTS >= late else 0.0
-        predicted = observer.update(reading(extension=heard), k * PERIOD)
+        delayed = truth[k * PARTS - late][0] if k * PARTS >= late else 0.0
+        predicted = observer.update(reading(extension=delayed), k * PERIOD)
         observer.send(voltage)
     assert predicted == pytest.approx(truth[(len(voltages) - 1) * PARTS], rel=1e-4, abs=1e-7)
     assert predicted[-2] == pytest.approx(0.2 + slope * (len(voltages) - 1) * PERIOD, rel=1e-5)

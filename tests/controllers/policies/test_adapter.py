@@ -71,8 +71,8 @@ def test_every_tracking_entry_says_what_the_table_says():
     radius = radius.radius
     pilot = PolicyAdapter(ObservationSpec("tracking", 2, 1), ActionMapping("increment", 0.5))
     pilot.reset(line, station)
-    see = seen(pilot, station)
-    first = see(Measurement(0.0, 0.1e-3, 0.0, 20.0, 305e3), 0.0)
+    observe = seen(pilot, station)
+    first = observe(Measurement(0.0, 0.1e-3, 0.0, 20.0, 305e3), 0.0)
     fine = 0.25e-3
     assert first == pytest.approx(
         {
@@ -101,7 +101,7 @@ def test_every_tracking_entry_says_what_the_table_says():
         volts = pilot.volts(1.0)
     assert volts == pytest.approx(1.95)
     pulled = max(drive.gain * 1.95 + drive.offset, 0.0)
-    second = see(Measurement(0.4, 0.3e-3, 0.2e-3 / radius, pulled - 10.0, 300e3), 0.4)
+    second = observe(Measurement(0.4, 0.3e-3, 0.2e-3 / radius, pulled - 10.0, 300e3), 0.4)
     assert second["reference now"] == pytest.approx(0.4e-3 / 25e-3)
     assert second["reference less measured position"] == pytest.approx(0.1e-3 / fine, abs=1e-6)
     assert second["reference less position by the other sensor"] == pytest.approx(0.2e-3 / fine)
@@ -116,13 +116,15 @@ def test_late_loops_compare_what_belongs_together():
     drive = station.model.parameters["drive"]
     pilot = PolicyAdapter(ObservationSpec("tracking", 0, 0), ActionMapping("direct", 5.0))
     pilot.reset(line, station)
-    see = seen(pilot, station)
+    observe = seen(pilot, station)
     commanded = []
     for step in range(6):
         taken = max(step - 2, 0)
         # Of a reading taken two steps ago, before which a command takes one to arrive.
         asked = drive.gain * commanded[step - 4] + drive.offset if step >= 4 else 0.0
-        now = see(Measurement(0.1 * taken, 1e-4 * taken, 0.0, max(asked, 0.0), 300e3), 0.1 * step)
+        now = observe(
+            Measurement(0.1 * taken, 1e-4 * taken, 0.0, max(asked, 0.0), 300e3), 0.1 * step
+        )
         assert now["reference less measured position"] == pytest.approx(0.0, abs=1e-6)
         assert now["reference now"] == pytest.approx(1e-4 * step / 25e-3)
         load = now["load less what the nominal drive is asked for"]

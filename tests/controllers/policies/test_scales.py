@@ -31,24 +31,24 @@ def seen(task, reading, time):
 def test_an_exercise_of_one_speed_sees_both_angles_and_the_load():
     radius = load_model("station").parameters["rotor"].radius
     reading = Measurement(1.0, 18.9 * DEG * radius, 14.4 * DEG, 300.0, 350e3)
-    found = seen("isokinetic_exercise", reading, 1.0)
-    assert found["reference now"] == pytest.approx(0.2)
+    observation = seen("isokinetic_exercise", reading, 1.0)
+    assert observation["reference now"] == pytest.approx(0.2)
     # 18 deg/s for 10 ms is 0.18 deg.
-    assert found["reference 1 ahead less reference now, over 1"] == pytest.approx(0.2)
-    assert found["reference less measured position"] == pytest.approx(1.0)
-    assert found["reference less position by the other sensor"] == pytest.approx(-1.0)
-    assert found["pressure less pressure at the trial's start"] == pytest.approx(-0.5)
-    assert found["load"] == pytest.approx(1.5)
+    assert observation["reference 1 ahead less reference now, over 1"] == pytest.approx(0.2)
+    assert observation["reference less measured position"] == pytest.approx(1.0)
+    assert observation["reference less position by the other sensor"] == pytest.approx(-1.0)
+    assert observation["pressure less pressure at the trial's start"] == pytest.approx(-0.5)
+    assert observation["load"] == pytest.approx(1.5)
 
 
 @pytest.mark.parametrize("angle, prescribed", [(0.0, 4.0), (15.0, 6.0), (60.0, 9.0), (100.0, 7.5)])
 def test_a_prescribed_moment_is_compared_at_the_angle(angle, prescribed):
     radius = load_model("station").parameters["rotor"].radius
     reading = Measurement(0.0, 0.0, angle * DEG, (prescribed + 0.72) / radius, 400e3)
-    found = seen("profile_exercise", reading, 0.0)
+    observation = seen("profile_exercise", reading, 0.0)
     # 4 % of the greatest moment, 9 N m, is 0.36 N m.
-    assert found["prescribed less measured moment"] == pytest.approx(-2.0, abs=1e-5)
-    assert found["measured rotation"] == pytest.approx(angle / 90.0)
+    assert observation["prescribed less measured moment"] == pytest.approx(-2.0, abs=1e-5)
+    assert observation["measured rotation"] == pytest.approx(angle / 90.0)
 
 
 def test_units_stand_beside_the_names():

@@ -51,13 +51,13 @@ def station() -> Model:
 def nearly_constant(model: Model) -> list[Trial]:
     """Two trials in which the load moves once, and little."""
     time = np.arange(8 * 128 + 1) / 128
-    plant, found = Plant(model), []
+    plant, simulated = Plant(model), []
     for number, pressure in enumerate((280e3, 400e3)):
         motor = 3.0 + 0.3 * np.clip(np.minimum(time - 1.0, 4.0 - time) / 0.5, 0.0, 1.0)
         regulator = np.full(len(time), plant.regulator_voltage(pressure))
         trial = Trial(time, {"motor_voltage": motor, "regulator_voltage": regulator})
-        found.append(plant.simulate(trial, seed=number))
-    return found
+        simulated.append(plant.simulate(trial, seed=number))
+    return simulated
 
 
 def fit_problem(trials: list[Trial]) -> FitProblem:
@@ -75,9 +75,9 @@ def every() -> dict[str, CandidateEffect]:
 def fitted(on: FitProblem, name: str) -> Fitted:
     candidate = every()[name]
     usual = candidate.probes[len(candidate.probes) // 2]
-    found = on.fit(station(), [candidate], {name: usual})
-    assert found is not None
-    return found
+    fitted = on.fit(station(), [candidate], {name: usual})
+    assert fitted is not None
+    return fitted
 
 
 @cache
@@ -96,49 +96,49 @@ def lead(on: FitProblem, name: str) -> float:
 
 @pytest.mark.parametrize("true", TRUTHS)
 def test_proposed_trial_tells_what_was_promised(true):
-    truth, on, rivals, found = case(true)
-    assert found is not None and found.separates == tuple(TRUTHS)
-    measured = Plant(truth).simulate(found.trial, seed=7)
+    truth, on, rivals, proposal = case(true)
+    assert proposal is not None and proposal.separates == tuple(TRUTHS)
+    measured = Plant(truth).simulate(proposal.trial, seed=7)
     before, after = lead(on, true), lead(replace(on, trials=[*on.trials, measured]), true)
-    assert after - before >= 0.5 * np.log(found.expected_odds)
-    assert found.minutes == pytest.approx(found.trial.duration / 60.0)
+    assert after - before >= 0.5 * np.log(proposal.expected_odds)
+    assert proposal.minutes == pytest.approx(proposal.trial.duration / 60.0)
 
 
 def test_it_tells_more_a_minute_than_most_of_the_library():
-    _, on, rivals, found = case("hysteresis")
+    _, on, rivals, proposal = case("hysteresis")
     discrimination = Discrimination.of(on, rivals, 0)
     hopes = {
         each.name: float(np.min(discrimination.odds([each], discrimination.pairs()))) / each.minutes
         for each in library([*discrimination.models, on.given], 0)
     }
-    assert found is not None
-    others = [rate for name, rate in hopes.items() if name != found.excitation]
-    assert hopes[found.excitation] > np.median(others)
+    assert proposal is not None
+    others = [rate for name, rate in hopes.items() if name != proposal.excitation]
+    assert hopes[proposal.excitation] > np.median(others)
 
 
 def test_the_same_seed_proposes_the_same_trial():
-    _, on, rivals, found = case("hysteresis")
+    _, on, rivals, proposal = case("hysteresis")
     again = next_experiment(on, rivals, 0)
-    assert found is not None and again is not None
-    assert (again.excitation, again.expected_odds) == (found.excitation, found.expected_odds)
+    assert proposal is not None and again is not None
+    assert (again.excitation, again.expected_odds) == (proposal.excitation, proposal.expected_odds)
     for name, volts in again.trial.commands.items():
-        np.testing.assert_array_equal(volts, found.trial.commands[name])
+        np.testing.assert_array_equal(volts, proposal.trial.commands[name])
 
 
 def test_a_proposal_is_commands_and_nothing_else():
-    _, _, _, found = case("hysteresis")
-    assert found is not None
-    assert set(found.trial.commands) == {"motor_voltage", "regulator_voltage"}
-    assert not found.trial.measurements and not found.trial.truth
+    _, _, _, proposal = case("hysteresis")
+    assert proposal is not None
+    assert set(proposal.trial.commands) == {"motor_voltage", "regulator_voltage"}
+    assert not proposal.trial.measurements and not proposal.trial.truth
 
 
 def test_one_effect_is_asked_about_against_nothing():
     _, on, rivals, _ = case("hysteresis")
     plain = on.fit(station())
     assert plain is not None
-    found = next_experiment(on, [rivals[0], (plain, ())], 0)
-    assert found is not None and found.separates == (rivals[0][0].names[0],)
-    assert found.expected_odds > 20.0
+    proposal = next_experiment(on, [rivals[0], (plain, ())], 0)
+    assert proposal is not None and proposal.separates == (rivals[0][0].names[0],)
+    assert proposal.expected_odds > 20.0
 
 
 def test_one_rival_needs_no_experiment():
@@ -148,9 +148,9 @@ def test_one_rival_needs_no_experiment():
 
 def test_every_protocol_is_safe_and_as_long_as_a_test_may_be():
     model = station()
-    found = list(library([model]))
-    assert len(found) == 30 and len({each.name for each in found}) == 30
-    for each in found:
+    protocols = list(library([model]))
+    assert len(protocols) == 30 and len({each.name for each in protocols}) == 30
+    for each in protocols:
         again = Plant(model).simulate(each.trial, noise=False)
         assert is_safe(model, again), each.name
         assert 10.0 <= each.trial.duration <= 60.0
@@ -175,10 +175,10 @@ def test_effects_that_were_hidden_are_made_to_show():
     scores = screen(baseline, wanted, 0, lambda candidate: on.probed(fit.model, candidate))
     hidden = [each.candidate.name for each in scores if (each.resolvable or np.inf) > 1.0]
     assert "creep" in hidden
-    found = experiment_to_detect(on, fit, wanted, scores)
-    assert found is not None and "creep" in found.separates
-    assert set(found.separates) <= set(hidden)
-    assert found.expected_odds >= np.exp(12.5)
+    proposal = experiment_to_detect(on, fit, wanted, scores)
+    assert proposal is not None and "creep" in proposal.separates
+    assert set(proposal.separates) <= set(hidden)
+    assert proposal.expected_odds >= np.exp(12.5)
     assert experiment_to_detect(on, fit, wanted, []) is None
 
 
@@ -193,7 +193,7 @@ def test_who_knows_nothing_is_proposed_what_moves_load_and_pressure():
     time = np.arange(0.0, 4.0, 1.0 / 64.0)
     still = Trial(time, {"motor_voltage": 0 * time + 3.0, "regulator_voltage": 0 * time + 6.0})
     measured = Plant(station()).simulate(still, seed=3)
-    found = diagnose([measured], station())
-    assert found.next_experiment is not None
-    volts = found.next_experiment.trial.commands
+    diagnosis = diagnose([measured], station())
+    assert diagnosis.next_experiment is not None
+    volts = diagnosis.next_experiment.trial.commands
     assert min(np.ptp(volts["motor_voltage"]), np.ptp(volts["regulator_voltage"])) > 1.0

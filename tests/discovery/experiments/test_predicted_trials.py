@@ -19,7 +19,7 @@ SOFTER = "stiffness.high_slope_n_per_mm_per_kpa"
 """Stiffness beyond 314 kPa, which the trials stay under."""
 
 
-def found(trials, tried=MOVED):
+def columns_of(trials, tried=MOVED):
     return columns(PROBLEM, STATION, FREE, trials, tried)
 
 
@@ -36,9 +36,9 @@ def commanded(trial, kpa, volts, rows):
 
 
 def test_two_trials_together_are_as_each_alone_to_the_last_bit():
-    together = found(TRIALS)
+    together = columns_of(TRIALS)
     for ours, trial in zip(together, TRIALS, strict=True):
-        (alone,) = found([trial])
+        (alone,) = columns_of([trial])
         assert ours.shape == (len(MOVED), 4, len(trial)) and ours[1:].any()
         np.testing.assert_array_equal(ours, alone)
 
@@ -47,9 +47,9 @@ def test_two_trials_together_are_as_each_alone_to_the_last_bit():
 def test_a_trial_that_begins_without_balance_spoils_no_other(place):
     """980 N on a muscle at 20 kPa, more than it holds."""
     hanging = commanded(TRIALS[0], 20.0, 10.0, slice(0, 1))
-    together = found([*TRIALS[:place], hanging, *TRIALS[place:]])
+    together = columns_of([*TRIALS[:place], hanging, *TRIALS[place:]])
     assert together.pop(place) is None
-    for ours, alone in zip(together, found(TRIALS), strict=True):
+    for ours, alone in zip(together, columns_of(TRIALS), strict=True):
         np.testing.assert_array_equal(ours, alone)
 
 
@@ -57,9 +57,9 @@ def test_a_trial_without_balance_at_one_of_the_parameters_spoils_no_other():
     """Beyond 314 kPa the softened muscle has no spring left; only the third trial begins there."""
     tried = np.stack([AT, AT])
     tried[1, FREE.index(SOFTER)] = -0.05
-    *ours, none = found([*TRIALS, commanded(TRIALS[0], 550.0, 1.0, slice(None))], tried)
+    *ours, none = columns_of([*TRIALS, commanded(TRIALS[0], 550.0, 1.0, slice(None))], tried)
     assert none is None
-    for each, alone in zip(ours, found(TRIALS, tried), strict=True):
+    for each, alone in zip(ours, columns_of(TRIALS, tried), strict=True):
         np.testing.assert_array_equal(each, alone)
 
 
@@ -68,11 +68,11 @@ def test_a_trial_that_runs_away_spoils_no_other():
     tried = np.stack([AT, AT])
     tried[1, FREE.index(SOFTER)] = -0.1
     running = commanded(TRIALS[1], 550.0, 1.0, slice(30, None))
-    *ours, away = found([*TRIALS, running], tried)
+    *ours, away = columns_of([*TRIALS, running], tried)
     assert away is None or np.abs(away[1]).max() > 1e6
-    for each, alone in zip(ours, found(TRIALS, tried), strict=True):
+    for each, alone in zip(ours, columns_of(TRIALS, tried), strict=True):
         np.testing.assert_array_equal(each, alone)
 
 
 def test_no_trial_has_no_columns():
-    assert found([]) == []
+    assert columns_of([]) == []

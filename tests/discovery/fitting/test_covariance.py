@@ -25,8 +25,8 @@ def widened(trials):
     fit = shared.fit(STATION)
     assert fit is not None
     known = np.isfinite(np.diag(fit.covariance))
-    found = covariance(shared, fit, ())
-    return np.sqrt(np.diag(found)[known] / np.diag(fit.covariance)[known])
+    wide = covariance(shared, fit, ())
+    return np.sqrt(np.diag(wide)[known] / np.diag(fit.covariance)[known])
 
 
 def test_white_noise_hardly_widens_errors():
@@ -68,9 +68,9 @@ def scatter(*forces):
 
 
 def test_an_effect_of_one_size_does_not_scatter():
-    found = scatter(6.0, 6.0, 6.0, 6.0)
-    assert set(found) == {"trial", "contraction", "load", "pressure"}
-    assert max(found.values()) < 0.05
+    scattered = scatter(6.0, 6.0, 6.0, 6.0)
+    assert set(scattered) == {"trial", "contraction", "load", "pressure"}
+    assert max(scattered.values()) < 0.05
 
 
 def test_an_effect_of_two_sizes_scatters_by_trial_as_it_was_made():
@@ -115,15 +115,17 @@ def linear(sizes, sharpness, away):
 
 def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():
     # A tenth of an error is nothing, but times 1000 it is more than all that the others show.
-    found = [linear((1.0,) * 4, (1.0, 1.0, 1.0, 1e3), away) for away in np.linspace(-0.3, 0.3, 61)]
-    assert max(found) < 0.1
+    scattered = [
+        linear((1.0,) * 4, (1.0, 1.0, 1.0, 1e3), away) for away in np.linspace(-0.3, 0.3, 61)
+    ]
+    assert max(scattered) < 0.1
 
 
 def test_what_scatters_does_so_wherever_the_fit_stopped():
     sizes, sharpness = (0.4, 1.6, 0.4, 1.6), (1.0, 1.0, 1.0, 3.0)
-    found = [linear(sizes, sharpness, away) for away in (0.0, -0.3, 0.3)]
-    assert found[0] > 0.2
-    assert found[1:] == pytest.approx([found[0]] * 2, rel=0.02)
+    scattered = [linear(sizes, sharpness, away) for away in (0.0, -0.3, 0.3)]
+    assert scattered[0] > 0.2
+    assert scattered[1:] == pytest.approx([scattered[0]] * 2, rel=0.02)
 
 
 def test_the_last_step_ends_where_a_bound_holds_a_parameter():

@@ -21,10 +21,10 @@ def test_parameters_absorb_what_a_least_squares_fit_with_their_prior_does():
     fit = Fitted(STATION, (), ("a", "b"), np.ones(2), covariance, 0.0, np.ones(2), True)
     weights = np.linalg.cholesky(np.linalg.inv(covariance)).T
     stacked = np.concatenate([by.T, weights])
-    for row, found in zip(apart, unabsorbed(apart, by, fit), strict=True):
+    for row, left in zip(apart, unabsorbed(apart, by, fit), strict=True):
         right = np.concatenate([-row, np.zeros(2)])
         rest = right - stacked @ np.linalg.lstsq(stacked, right, rcond=None)[0]
-        assert found == pytest.approx(rest @ rest)
+        assert left == pytest.approx(rest @ rest)
 
 
 def test_what_no_trial_told_is_absorbed_whole():
@@ -67,15 +67,15 @@ def test_surprise_is_the_likelihood_given_what_seen_trials_say_of_parameters(mon
     rest = by[:, 7:]
     covariance = np.eye(5) + rest.T @ np.linalg.inv(seen.curvature) @ rest
     expected = multivariate_normal(-seen.fit.values @ rest, covariance).logpdf(residual[7:])
-    found = surprised(residual, by, 7)
-    assert found == pytest.approx(-2.0 * expected - 5 * np.log(2.0 * np.pi))
+    surprise_value = surprised(residual, by, 7)
+    assert surprise_value == pytest.approx(-2.0 * expected - 5 * np.log(2.0 * np.pi))
 
 
 def test_what_the_seen_trials_do_not_hold_costs_its_freedom_alone():
     by = np.concatenate([np.zeros((2, 5)), np.ones((2, 30)) * [[1.0], [0.0]]], axis=1)
     residual = np.concatenate([np.zeros(5), np.full(30, 7.0)])
-    found = surprised(residual, by, 5, prior=np.zeros((2, 2)), width=20.0)
-    assert found == pytest.approx(np.log(30.0 * 20.0**2 + 1.0))
+    surprise_value = surprised(residual, by, 5, prior=np.zeros((2, 2)), width=20.0)
+    assert surprise_value == pytest.approx(np.log(30.0 * 20.0**2 + 1.0))
     # Bounds that reach far beyond the parameter's size, 7, cost no more than ten times that.
     wide = surprised(residual, by, 5, prior=np.zeros((2, 2)), width=1e9)
     assert wide == pytest.approx(np.log(30.0 * 70.0**2 + 1.0))
@@ -101,9 +101,9 @@ def test_an_effect_that_one_trial_of_three_shows_is_named():
     """The other two hold neither it nor the parameters: of them alone the third is a guess."""
     truth = STATION.with_effects(HYSTERESIS).replace(OFF)
     trials = [held(3.0, 300.0, truth, 1), held(5.0, 420.0, truth, 2)]
-    found = diagnose([*trials, *measured(truth, 1, kinds=(1,))], STATION, propose=False)
-    assert found.verdict == "effect", found.sentence
-    (effect,) = found.effects
+    diagnosis = diagnose([*trials, *measured(truth, 1, kinds=(1,))], STATION, propose=False)
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    (effect,) = diagnosis.effects
     assert effect.name == "hysteresis"
     # One trial, whose start is free, tells the force less well than many.
     assert effect.parameters["force_n"].value == pytest.approx(6.0, rel=0.2)

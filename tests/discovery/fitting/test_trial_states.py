@@ -19,25 +19,25 @@ from tests.discovery.laboratory import STATION, diagnosed, laboratory
 from tests.discovery.rig_trials import FROZEN, driven_slide
 
 
-def back(found, trials, folder):
+def back(diagnosis, trials, folder):
     """The misfit of what is written and read again."""
     path = folder / "trials.toml"
-    path.write_text(dump_states(found.states), encoding="utf-8")
-    model = parse_model(tomllib.loads(dump_model(found.model)))
+    path.write_text(dump_states(diagnosis.states), encoding="utf-8")
+    model = parse_model(tomllib.loads(dump_model(diagnosis.model)))
     named, _ = prepared(
-        [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(trials)], found.given
+        [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(trials)], diagnosis.given
     )
     return misfits(named, model, read_states(path))
 
 
 @pytest.mark.parametrize("case", ["nothing", "parameters", "hysteresis"])
 def test_model_and_trials_read_back_give_the_misfit_that_is_printed(case, tmp_path):
-    found = diagnosed(case, 6)
-    read = back(found, laboratory(case, 6)[0], tmp_path)
-    for signal, judged in found.adequacy.items():
-        assert read[signal] == pytest.approx(found.written[signal], rel=0.01)
+    diagnosis = diagnosed(case, 6)
+    read = back(diagnosis, laboratory(case, 6)[0], tmp_path)
+    for signal, judged in diagnosis.adequacy.items():
+        assert read[signal] == pytest.approx(diagnosis.written[signal], rel=0.01)
         assert read[signal] == pytest.approx(judged.fitted * judged.floor, rel=0.01)
-    assert set(found.states["trial 1"].zeros) == {"contraction_mm", "rotation_deg"}
+    assert set(diagnosis.states["trial 1"].zeros) == {"contraction_mm", "rotation_deg"}
 
 
 def test_zeros_are_what_the_trials_were_shifted_by(tmp_path):
@@ -49,27 +49,27 @@ def test_zeros_are_what_the_trials_were_shifted_by(tmp_path):
                 trial.time, trial.commands, {**trial.measurements, "contraction": shifted}
             )
         )
-    found = refit(trials, STATION)
+    diagnosis = refit(trials, STATION)
     for k in range(3):
-        zero = found.states[f"trial {k + 1}"].zeros["contraction_mm"]
+        zero = diagnosis.states[f"trial {k + 1}"].zeros["contraction_mm"]
         assert zero == pytest.approx(k, abs=0.02)
 
 
 def test_a_free_slide_begins_where_its_trials_say(tmp_path):
     trials = driven_slide()
-    found = refit(trials, FROZEN / "driven_slide" / "model.toml")
-    read = back(found, trials, tmp_path)
-    assert read["contraction_mm"] == pytest.approx(found.written["contraction_mm"], rel=0.01)
-    states = list(found.states.values())
+    diagnosis = refit(trials, FROZEN / "driven_slide" / "model.toml")
+    read = back(diagnosis, trials, tmp_path)
+    assert read["contraction_mm"] == pytest.approx(diagnosis.written["contraction_mm"], rel=0.01)
+    states = list(diagnosis.states.values())
     assert all(
         {"start.contraction_mm", "start.velocity_mm_per_s"} == set(each.parameters)
         for each in states
     )
     # Without its states the model begins every piece at rest in one place.
     named, _ = prepared(
-        [NamedTrial(f"trial {i + 1}", t) for i, t in enumerate(trials)], found.given
+        [NamedTrial(f"trial {i + 1}", t) for i, t in enumerate(trials)], diagnosis.given
     )
-    assert misfits(named, found.model, {})["contraction_mm"] > 10.0 * read["contraction_mm"]
+    assert misfits(named, diagnosis.model, {})["contraction_mm"] > 10.0 * read["contraction_mm"]
 
 
 def test_a_second_diagnosis_of_the_amended_model_changes_nothing_beyond_its_intervals():
@@ -111,8 +111,8 @@ def test_compare_prints_the_misfit(tmp_path):
     for k, trial in enumerate(laboratory("nothing", 3)[0]):
         write_trial(trial, folder / f"trial_{k}.csv")
     (tmp_path / "model.toml").write_text(dump_model(STATION), encoding="utf-8")
-    found = refit(laboratory("nothing", 3)[0], STATION)
-    named = {f"trial_{k}.csv": found.states[f"trial {k + 1}"] for k in range(3)}
+    diagnosis = refit(laboratory("nothing", 3)[0], STATION)
+    named = {f"trial_{k}.csv": diagnosis.states[f"trial {k + 1}"] for k in range(3)}
     (tmp_path / "trials.toml").write_text(dump_states(named), encoding="utf-8")
     done = subprocess.run(
         [sys.executable, "-m", "pma_gym.cli", "compare", "lab", "--model", "model.toml"]
@@ -123,7 +123,7 @@ def test_compare_prints_the_misfit(tmp_path):
         encoding="utf-8",
     )
     assert done.returncode == 0, done.stderr
-    assert f"{found.written['load_n']:.3f}" in done.stdout and "kPa" in done.stdout
+    assert f"{diagnosis.written['load_n']:.3f}" in done.stdout and "kPa" in done.stdout
     assert done.stderr == ""
 
 

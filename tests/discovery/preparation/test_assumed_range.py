@@ -47,11 +47,11 @@ def test_what_lies_beyond_needs_as_many_doublings_as_hold_it():
 def test_a_fit_goes_beyond_what_was_assumed_where_the_trials_ask_for_it():
     trials, gain = strong_drive(2.0)
     shared = fit_problem(trials)
-    found = shared.fit(STATION)
-    assert found is not None
-    assert found.estimate(GAIN)[0] == pytest.approx(gain, rel=0.01)
-    assert found.reach[GAIN] == 2.0
-    assert not shared.whitened_at(found).at_assumed_edge(found.values)
+    fitted = shared.fit(STATION)
+    assert fitted is not None
+    assert fitted.estimate(GAIN)[0] == pytest.approx(gain, rel=0.01)
+    assert fitted.reach[GAIN] == 2.0
+    assert not shared.whitened_at(fitted).at_assumed_edge(fitted.values)
 
 
 def test_a_fit_from_beyond_stays_there():
@@ -65,7 +65,7 @@ def test_a_fit_from_beyond_stays_there():
 
 def test_the_reader_is_told_what_went_beyond():
     trials, _ = strong_drive(2.0)
-    found = refit(trials, STATION)
-    (said,) = (words for words in found.warnings if words.startswith(GAIN))
+    diagnosis = refit(trials, STATION)
+    (said,) = (words for words in diagnosis.warnings if words.startswith(GAIN))
     assert "beyond what is assumed beforehand (39.1 to 157 N/V)" in said
     assert "widened 2 times" in said

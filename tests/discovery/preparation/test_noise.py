@@ -43,13 +43,13 @@ def logged(motor, time=None, contraction=None):
 @pytest.mark.parametrize("coefficients", [(0.7,), (-0.4,), (1.2, -0.5), (0.3, 0.4)])
 def test_autoregression_recovers_what_made_the_noise(coefficients):
     parts = [coloured(coefficients, 2e-3, 5000, seed) for seed in range(4)]
-    found = autoregression(parts, 0.0)
-    assert len(found.coefficients) >= len(coefficients)
-    padded = np.zeros(len(found.coefficients))
+    noise_filter = autoregression(parts, 0.0)
+    assert len(noise_filter.coefficients) >= len(coefficients)
+    padded = np.zeros(len(noise_filter.coefficients))
     padded[: len(coefficients)] = coefficients
-    np.testing.assert_allclose(found.coefficients, padded, atol=4 / np.sqrt(20000))
-    assert found.innovation == pytest.approx(2e-3, rel=0.03)
-    assert found.level == pytest.approx(np.std(np.concatenate(parts)), rel=0.03)
+    np.testing.assert_allclose(noise_filter.coefficients, padded, atol=4 / np.sqrt(20000))
+    assert noise_filter.innovation == pytest.approx(2e-3, rel=0.03)
+    assert noise_filter.level == pytest.approx(np.std(np.concatenate(parts)), rel=0.03)
 
 
 def test_white_noise_has_no_memory():
@@ -58,9 +58,9 @@ def test_white_noise_has_no_memory():
 
 
 def test_a_level_that_is_known_is_kept_as_the_least():
-    found = autoregression([coloured((0.6,), 1.0, 4000)], 5.0)
-    assert found.level == 5.0
-    assert found.innovation == pytest.approx(5.0 * np.sqrt(1 - 0.6**2), rel=0.05)
+    noise_filter = autoregression([coloured((0.6,), 1.0, 4000)], 5.0)
+    assert noise_filter.level == 5.0
+    assert noise_filter.innovation == pytest.approx(5.0 * np.sqrt(1 - 0.6**2), rel=0.05)
 
 
 def test_too_few_readings_say_nothing_but_the_level():
@@ -78,8 +78,8 @@ def test_whitened_noise_is_white_and_of_variance_one(coefficients):
 
 
 def test_a_learnt_autoregression_whitens():
-    found = autoregression([coloured((0.8,), 0.3, 8000, 7)], 0.0)
-    white = found.white(coloured((0.8,), 0.3, 8000, 8)[None], NONE)[0]
+    noise_filter = autoregression([coloured((0.8,), 0.3, 8000, 7)], 0.0)
+    white = noise_filter.white(coloured((0.8,), 0.3, 8000, 8)[None], NONE)[0]
     assert np.mean(white**2) == pytest.approx(1.0, abs=0.08)
     assert abs(np.mean(white[:-1] * white[1:])) < 4 / np.sqrt(8000) + 0.03
 
@@ -100,15 +100,15 @@ def test_whitening_is_linear_and_missing_readings_leave_no_trace():
 def test_rest_is_where_commands_have_long_been_constant():
     motor = np.ones(10 * 64)
     motor[128:256] = 2.0 + np.arange(128) / 128
-    found = rest_segments(logged(motor))
+    segments_at_rest = rest_segments(logged(motor))
     time = np.arange(len(motor)) / 64
-    assert len(found) == 2
-    assert time[found[0].start] == pytest.approx(FIRST_REST_S, abs=2 / 64)
-    assert found[0].stop == 128
+    assert len(segments_at_rest) == 2
+    assert time[segments_at_rest[0].start] == pytest.approx(FIRST_REST_S, abs=2 / 64)
+    assert segments_at_rest[0].stop == 128
     # Index 256 is where the last value begins.
-    assert time[found[1].start] == pytest.approx(4.0 + REST_S, abs=2 / 64)
-    assert found[1].stop == len(motor)
-    for part in found:
+    assert time[segments_at_rest[1].start] == pytest.approx(4.0 + REST_S, abs=2 / 64)
+    assert segments_at_rest[1].stop == len(motor)
+    for part in segments_at_rest:
         assert np.ptp(motor[part]) == 0.0
 
 
@@ -118,8 +118,8 @@ def test_what_always_moves_never_rests():
 
 
 def test_noise_at_rest_is_the_sensors():
-    found = measured(STATION, 4, rate=128.0)
-    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(found)]
+    readings = measured(STATION, 4, rate=128.0)
+    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
     for channel in CHANNELS:
         level = level_at_rest(at_rest(trials, channel))
         assert level == pytest.approx(LEVELS[channel], rel=0.2)
@@ -132,10 +132,12 @@ def test_gaps_do_not_leak():
     segments = at_rest([trial], 0)
     assert level_at_rest(segments) == pytest.approx(1e-5, rel=0.15)
     assert at_rest([trial], 2) == []
-    found = autoregression(segments, 0.0)
-    assert np.isfinite([found.level, found.innovation, *found.coefficients]).all()
+    noise_filter = autoregression(segments, 0.0)
+    assert np.isfinite(
+        [noise_filter.level, noise_filter.innovation, *noise_filter.coefficients]
+    ).all()
     assert np.isfinite(slow_part(segments, 64.0))
-    assert np.isfinite(found.white(trial.measured[0][None], trial.missing[0])).all()
+    assert np.isfinite(noise_filter.white(trial.measured[0][None], trial.missing[0])).all()
 
 
 @pytest.mark.parametrize(("step", "digits"), [(1.234e-5, 7), (3.217e-4, 6), (3.217e-4, 12)])
@@ -144,8 +146,8 @@ def test_the_step_of_readings_is_found(step, digits):
     values = step * np.round(generator.normal(0.02, 20 * step, 640) / step)
     # As a file with some digits has them.
     values = np.round(values, digits)
-    found = step_between([logged(np.ones(640), contraction=values)], 0)
-    assert found == pytest.approx(step, rel=0.01)
+    step_seen = step_between([logged(np.ones(640), contraction=values)], 0)
+    assert step_seen == pytest.approx(step, rel=0.01)
 
 
 def test_continuous_readings_have_no_step():
@@ -156,8 +158,8 @@ def test_continuous_readings_have_no_step():
 
 
 def test_the_daq_shows_its_step():
-    found = measured(STATION, 2, rate=128.0)
-    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(found)]
+    readings = measured(STATION, 2, rate=128.0)
+    trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
     for channel, (_, line) in enumerate(sensors.SENSORS.values()):
         assert step_between(trials, channel) == pytest.approx(line.resolution, rel=1e-3)
 
@@ -178,9 +180,9 @@ def test_a_signal_read_a_few_times_a_trial_is_no_series():
     rng = np.random.default_rng(3)
     # Within a trial all readings share what a wrong model misses: neighbours are not noise.
     parts = [rng.normal(0.0, 5.0) + rng.normal(0.0, 1.0, 4) for _ in range(200)]
-    found = autoregression(parts, 1.0)
-    assert found.coefficients == ()
-    assert found.level == pytest.approx(np.sqrt(26.0), rel=0.2)
+    noise_filter = autoregression(parts, 1.0)
+    assert noise_filter.coefficients == ()
+    assert noise_filter.level == pytest.approx(np.sqrt(26.0), rel=0.2)
     assert slow_part(parts, 0.2, 1.0) == pytest.approx(25.0, rel=0.3)
 
 
@@ -209,5 +211,5 @@ def test_a_step_that_noise_hides_makes_no_sensor_coarse(level, coarse):
     """Whole kPa in a file are nothing to a signal that scatters by more."""
     known = Level(level, "repeats", {}, 1e3, 0.479e3, 40)
     fine = Level(1.0, "rest segments", {}, 0.0, 1.0, 40)
-    found = coarse_sensors([fine, fine, fine, known])
-    assert [each.name for each in found] == (["sensor_quantisation"] if coarse else [])
+    sensors = coarse_sensors([fine, fine, fine, known])
+    assert [each.name for each in sensors] == (["sensor_quantisation"] if coarse else [])

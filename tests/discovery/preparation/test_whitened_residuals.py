@@ -36,10 +36,10 @@ def changed(trial, **measurements):
 
 
 def test_chi_square_of_the_truth_is_the_number_of_readings():
-    found = whitened_residuals(measured(STATION, 4, rate=128.0))
-    chi_square = found.sums(found.start, np.empty(0)).chi_square
+    residuals = whitened_residuals(measured(STATION, 4, rate=128.0))
+    chi_square = residuals.sums(residuals.start, np.empty(0)).chi_square
     # Two zeros of each trial are free.
-    expected = found.count - 2 * found.trials
+    expected = residuals.count - 2 * residuals.trials
     assert abs(chi_square - expected) < 4 * np.sqrt(2 * expected)
 
 
@@ -59,28 +59,30 @@ def test_zeros_of_contraction_and_rotation_are_free(trials):
 
 
 def test_zeros_of_load_and_pressure_are_not_free(trials):
-    found = whitened_residuals(trials)
-    before = found.sums(found.start, np.empty(0)).chi_square
+    residuals = whitened_residuals(trials)
+    before = residuals.sums(residuals.start, np.empty(0)).chi_square
     for name, size in (("load", 5.0), ("pressure", 5e3)):
         moved = [changed(trials[0], **{name: trials[0].measurements[name] + size}), *trials[1:]]
-        assert whitened_residuals(moved).sums(found.start, np.empty(0)).chi_square > before + 100
+        assert (
+            whitened_residuals(moved).sums(residuals.start, np.empty(0)).chi_square > before + 100
+        )
 
 
 @pytest.mark.parametrize("noise", [NOISE, COLOURED])
 def test_pieces_sum_to_sums(trials, noise):
-    found = whitened_residuals(trials, noise)
-    values = found.start + np.array([0.1, 0.01])
-    pieces, sums = found.pieces(values, STEPS), found.sums(values, STEPS)
+    residuals = whitened_residuals(trials, noise)
+    values = residuals.start + np.array([0.1, 0.01])
+    pieces, sums = residuals.pieces(values, STEPS), residuals.sums(values, STEPS)
     assert pieces is not None
-    away = (values - found.start) / PRIOR
+    away = (values - residuals.start) / PRIOR
     total = pieces.total()
     assert total[0, 0] + away @ away == pytest.approx(sums.chi_square, rel=1e-12)
     np.testing.assert_allclose(total[1:, 0] + away / PRIOR, sums.gradient, rtol=1e-9)
     np.testing.assert_allclose(total[1:, 1:] + np.diag(PRIOR**-2), sums.curvature, rtol=1e-9)
     parts = sum(pieces.total([k]) for k in range(3))
     np.testing.assert_allclose(parts, total, rtol=1e-9)
-    assert pieces.readings() == found.count
-    assert sum(pieces.readings([k]) for k in range(3)) == found.count
+    assert pieces.readings() == residuals.count
+    assert sum(pieces.readings([k]) for k in range(3)) == residuals.count
     assert [int((pieces.trial == k).sum()) for k in range(3)] == [20, 20, 20]
 
 
@@ -94,22 +96,22 @@ def test_each_trial_counts_for_itself(trials):
 
 @pytest.mark.parametrize("noise", [NOISE, COLOURED])
 def test_gradient_is_that_of_chi_square(trials, noise):
-    found = whitened_residuals(trials, noise)
-    values = found.start + np.array([0.2, -0.02])
-    sums = found.sums(values, STEPS, central=True)
+    residuals = whitened_residuals(trials, noise)
+    values = residuals.start + np.array([0.2, -0.02])
+    sums = residuals.sums(values, STEPS, central=True)
     for k, step in enumerate(STEPS):
         move = step * np.eye(2)[k]
-        up, down = (found.sums(values + s * move, np.empty(0)).chi_square for s in (1, -1))
+        up, down = (residuals.sums(values + s * move, np.empty(0)).chi_square for s in (1, -1))
         assert (up - down) / (4 * step) == pytest.approx(sums.gradient[k], rel=1e-4)
 
 
 def test_curvature_is_that_of_chi_square_where_the_model_is_right(smooth):
-    found = whitened_residuals(smooth)
-    sums = found.sums(found.start, STEPS, central=True)
+    residuals = whitened_residuals(smooth)
+    sums = residuals.sums(residuals.start, STEPS, central=True)
     for k, step in enumerate(20 * STEPS):
         move = step * np.eye(2)[k]
         up, at, down = (
-            found.sums(found.start + s * move, np.empty(0)).chi_square for s in (1, 0, -1)
+            residuals.sums(residuals.start + s * move, np.empty(0)).chi_square for s in (1, 0, -1)
         )
         assert (up - 2 * at + down) / (2 * step**2) == pytest.approx(sums.curvature[k, k], rel=0.02)
 
@@ -134,24 +136,26 @@ def test_gaps_count_for_nothing(trials):
     gone = {}
     for name, row in trials[0].measurements.items():
         gone[name] = np.where(generator.random(len(row)) < 0.3, np.nan, row)
-    found = whitened_residuals([changed(trials[0], **gone), *trials[1:]], COLOURED)
-    pieces = found.pieces(found.start, STEPS)
+    residuals = whitened_residuals([changed(trials[0], **gone), *trials[1:]], COLOURED)
+    pieces = residuals.pieces(residuals.start, STEPS)
     assert pieces is not None and np.isfinite(pieces.products).all()
     missing = sum(int(np.isnan(row).sum()) for row in gone.values())
     assert pieces.readings() == whitened_residuals(trials).count - missing
     plain = (
-        whitened_residuals([changed(trials[0], **gone)]).sums(found.start, np.empty(0)).chi_square
+        whitened_residuals([changed(trials[0], **gone)])
+        .sums(residuals.start, np.empty(0))
+        .chi_square
     )
     count = pieces.readings([0]) - 2
     assert abs(plain - count) < 4 * np.sqrt(2 * count)
 
 
 def test_a_prior_pulls_and_bounds():
-    found = whitened_residuals(measured(STATION, 1))
-    assert np.all(found.upper <= found.start + FARTHEST * PRIOR)
-    assert np.all(found.lower >= found.start - FARTHEST * PRIOR)
-    values = found.start + PRIOR
-    held = found.sums(values, np.empty(0)).chi_square
+    residuals = whitened_residuals(measured(STATION, 1))
+    assert np.all(residuals.upper <= residuals.start + FARTHEST * PRIOR)
+    assert np.all(residuals.lower >= residuals.start - FARTHEST * PRIOR)
+    values = residuals.start + PRIOR
+    held = residuals.sums(values, np.empty(0)).chi_square
     loose = whitened_residuals(measured(STATION, 1), prior=np.full(2, np.inf))
     free = loose.sums(values, np.empty(0)).chi_square
     assert held - free == pytest.approx(2.0, abs=1e-6 * free)
@@ -169,8 +173,8 @@ def test_threads_change_no_bit(trials):
 
 
 def test_what_cannot_be_simulated_is_infinitely_bad(trials):
-    found = WhitenedResiduals(
+    residuals = WhitenedResiduals(
         STATION, trials, ("contractile_force.intercept_n",), NOISE, np.full(1, np.inf)
     )
-    sums = found.sums(np.array([1e9]), np.ones(1))
+    sums = residuals.sums(np.array([1e9]), np.ones(1))
     assert sums.chi_square == np.inf

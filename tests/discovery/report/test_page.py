@@ -61,8 +61,8 @@ def test_every_picture_stands_on_the_page(diagnoses, verdict):
     assert markdown.startswith(f"# {blocks[0].text}")
 
 
-def test_the_order_of_the_page(found):
-    named = [block.text for block in report_blocks(found, "", {}) if isinstance(block, Heading)]
+def test_the_order_of_the_page(example):
+    named = [block.text for block in report_blocks(example, "", {}) if isinstance(block, Heading)]
     assert named[:8] == [
         "An effect is missing",
         "What to do now",
@@ -83,16 +83,16 @@ def test_the_effect_comes_with_equation_size_and_rivals(page_of):
         assert text in page
 
 
-def test_the_worst_trial_is_the_one_missed_by_most(found):
-    worst = worst_trial(found)
+def test_the_worst_trial_is_the_one_missed_by_most(example):
+    worst = worst_trial(example)
     ratios = {
-        each.name: max(g.before / g.floor for g in each.gaps.values()) for each in found.trials
+        each.name: max(g.before / g.floor for g in each.gaps.values()) for each in example.trials
     }
     assert worst.name == max(ratios, key=ratios.get)
 
 
-def test_the_same_diagnosis_gives_the_same_page(found, page_of):
-    assert report_page(found, "Rig 2", {"Seed": "3"}) == page_of("effect")
+def test_the_same_diagnosis_gives_the_same_page(example, page_of):
+    assert report_page(example, "Rig 2", {"Seed": "3"}) == page_of("effect")
 
 
 @pytest.mark.parametrize("name", CATALOGUE)

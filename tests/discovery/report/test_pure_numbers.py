@@ -27,9 +27,9 @@ def hardly_held(path):
 
 def refused(quantity, value):
     """What a value out of bounds is told."""
-    with pytest.raises(ValueError, match="must lie in") as told:
+    with pytest.raises(ValueError, match="must lie in") as error:
         quantity.check("exponent", value)
-    return str(told.value)
+    return str(error.value)
 
 
 def test_messages_give_a_pure_number_no_unit():
@@ -43,16 +43,16 @@ def test_messages_give_a_pure_number_no_unit():
         Quantity("1", 2, 1, "test")
 
 
-def test_a_sentence_gives_a_pure_number_no_unit(found):
+def test_a_sentence_gives_a_pure_number_no_unit(example):
     effect = NamedEffect("filling", (), 0.001, {"exponent": KNOWN})
-    assert "filling (exponent 1.25)" in sentence(replace(found, effects=(effect,)))
+    assert "filling (exponent 1.25)" in sentence(replace(example, effects=(effect,)))
 
 
-def test_tables_leave_the_unit_of_a_pure_number_blank(found, capsys):
+def test_tables_leave_the_unit_of_a_pure_number_blank(example, capsys):
     moved = {PURE: Moved(1.0, KNOWN, True), FORCE: Moved(0.5, replace(KNOWN, unit="N"), False)}
     assert [row[4] for row in moved_table(moved).rows] == ["", "N"]
     assert effect_table(NamedEffect("filling", (), 0.001, {"exponent": KNOWN})).rows[0][3] == ""
-    print_fit(replace(found, parameters=moved))
+    print_fit(replace(example, parameters=moved))
     lines = capsys.readouterr().out.splitlines()
     pure, force = (next(line for line in lines if path in line) for path in moved)
     assert re.search(r"1\.05 to 1\.45 │ +│ differs", pure)

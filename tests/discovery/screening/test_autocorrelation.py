@@ -21,10 +21,10 @@ def noise(seed, memory_=0.0, parts=6):
 @pytest.mark.parametrize("coefficient", [0.0, 0.5])
 def test_noise_with_a_short_memory_is_never_sure(coefficient):
     for seed in range(60):
-        found = autocorrelation_test(noise(seed, coefficient), RATE)
-        assert not found.sure
-        assert found.score < 5.5
-        assert found.variance == pytest.approx(1.0, abs=0.1)
+        result = autocorrelation_test(noise(seed, coefficient), RATE)
+        assert not result.sure
+        assert result.score < 5.5
+        assert result.variance == pytest.approx(1.0, abs=0.1)
 
 
 @pytest.mark.parametrize("hertz", [0.4, 2.0, 7.0])
@@ -32,24 +32,24 @@ def test_a_sine_as_large_as_half_the_noise_is_seen_at_its_size(hertz):
     time = np.arange(ROWS) / RATE
     parts = [part + np.sqrt(0.5) * np.sin(2 * np.pi * hertz * time + k)
              for k, part in enumerate(noise(1))]  # fmt: skip
-    found = autocorrelation_test(parts, RATE)
-    assert found.sure
+    result = autocorrelation_test(parts, RATE)
+    assert result.sure
     # Its autocorrelation is its share of the variance, at a lag of whole or half periods.
-    assert found.share == pytest.approx(0.25 / 1.25, abs=0.05)
+    assert result.share == pytest.approx(0.25 / 1.25, abs=0.05)
 
 
 def test_missing_readings_count_for_nothing():
     parts = noise(2)
     whole = autocorrelation_test(parts, RATE)
     torn = [np.where(np.arange(ROWS) % 3 == 0, np.nan, part) for part in parts]
-    found = autocorrelation_test(torn, RATE)
-    assert found.variance == pytest.approx(whole.variance, abs=0.05)
-    assert not found.sure
+    result = autocorrelation_test(torn, RATE)
+    assert result.variance == pytest.approx(whole.variance, abs=0.05)
+    assert not result.sure
 
 
 def test_few_readings_say_nothing():
-    found = autocorrelation_test([np.ones(50)], RATE)
-    assert (found.share, found.score, found.sure) == (0.0, 0.0, False)
+    result = autocorrelation_test([np.ones(50)], RATE)
+    assert (result.share, result.score, result.sure) == (0.0, 0.0, False)
 
 
 @pytest.mark.parametrize("hertz", [1.0, 7.0])
@@ -58,10 +58,10 @@ def test_a_ringing_residual_has_its_tone(hertz):
     parts = [
         part + 0.8 * np.sin(2 * np.pi * hertz * time + k) for k, part in enumerate(noise(1, 0.5))
     ]
-    found = tone(parts, RATE)
-    assert found is not None
-    assert found.hertz == pytest.approx(hertz, abs=0.15)
-    assert found.rms == pytest.approx(0.8 / np.sqrt(2.0), rel=0.15)
+    beat = tone(parts, RATE)
+    assert beat is not None
+    assert beat.hertz == pytest.approx(hertz, abs=0.15)
+    assert beat.rms == pytest.approx(0.8 / np.sqrt(2.0), rel=0.15)
 
 
 def test_noise_and_a_slow_drift_have_no_tone():

@@ -91,9 +91,9 @@ def test_absent_values_change_nothing(name, trials):
     shared, candidate = fit_problem(trials), BY_NAME[name]
     base = shared.whitened_residuals(STATION)
     expected = base.readings(base.start)
-    found = shared.probed(STATION, candidate).readings(candidate.absent)
-    assert found is not None
-    for one, other in zip(found, expected, strict=True):
+    changes = shared.probed(STATION, candidate).readings(candidate.absent)
+    assert changes is not None
+    for one, other in zip(changes, expected, strict=True):
         # An effect with a memory takes other steps: that much is the integrator's tolerance.
         assert np.max(np.abs(one - other) / LEVELS[:, None]) < 2e-3
 
@@ -176,8 +176,8 @@ def test_an_effect_of_ones_own_takes_part(catalogue, tmp_path):
     load_effects(path)
     assert "swirl" in {candidate.name for candidate in candidate_effects(STATION)}
     truth = STATION.with_effects({"swirl": {"factor_n_s2_per_mm2": 0.05}})
-    found = diagnose(measured(truth, 4), STATION)
-    assert [effect.name for effect in found.effects] == ["swirl"]
+    diagnosis = diagnose(measured(truth, 4), STATION)
+    assert [effect.name for effect in diagnosis.effects] == ["swirl"]
 
 
 def test_the_catalogue_is_as_it_was():

@@ -18,20 +18,20 @@ LEVELS = np.array([0.05e-3, 5e-3, 2.0, 1e3])
 def trials(number: int, seconds: float = 8.0, rate: float = 128.0) -> list[Trial]:
     """Triangles of load at several pressures, with a hold at the end."""
     clock = np.arange(round(seconds * rate)) / rate
-    plant, found = Plant("serres2008"), []
+    plant, simulated = Plant("serres2008"), []
     for k in range(number):
         turn = np.interp(clock, [1.0, 3.0, 5.0, seconds - 2.0], [1.0, 5.0, 2.0, 4.0])
         volts = plant.regulator_voltage(np.linspace(220e3, 520e3, 6)[5 * k % 6 if k % 2 else k % 6])
         commands = {"motor_voltage": turn, "regulator_voltage": np.full(len(clock), volts)}
-        found.append(plant.simulate(Trial(clock, commands), noise=False))
-    return found
+        simulated.append(plant.simulate(Trial(clock, commands), noise=False))
+    return simulated
 
 
-def noisy(found: list[Trial], gap=lambda trial: 0.0, seed: int = 0) -> list[Trial]:
+def noisy(clean: list[Trial], gap=lambda trial: 0.0, seed: int = 0) -> list[Trial]:
     """The trials with noise, and a gap (noise levels) in the contraction."""
     generator = np.random.default_rng(seed)
     made = []
-    for trial in found:
+    for trial in clean:
         rows = {
             name: row + level * generator.standard_normal(len(trial))
             for (name, row), level in zip(trial.measurements.items(), LEVELS, strict=True)
@@ -51,19 +51,19 @@ def localised(made: list[Trial], seed: int = 0):
 
 
 def test_noise_alone_lies_nowhere():
-    found = trials(6)
-    told = [localised(noisy(found, seed=seed))[0] for seed in range(10)]
-    assert sum(map(len, told)) == 0
+    data = trials(6)
+    places = [localised(noisy(data, seed=seed))[0] for seed in range(10)]
+    assert sum(map(len, places)) == 0
 
 
 def test_noise_larger_than_was_thought_lies_nowhere_in_particular():
-    found = trials(6)
+    data = trials(6)
     generator = np.random.default_rng(3)
-    told = [
-        localised(noisy(found, lambda trial: 1.0 * generator.standard_normal(len(trial)), seed))[0]
+    places = [
+        localised(noisy(data, lambda trial: 1.0 * generator.standard_normal(len(trial)), seed))[0]
         for seed in range(10)
     ]
-    assert sum(1 for each in told if each) <= 1
+    assert sum(1 for each in places if each) <= 1
 
 
 def after_reversals(trial: Trial) -> np.ndarray:
@@ -94,9 +94,9 @@ def test_a_gap_is_found_where_it_is(words):
 
 
 def test_a_map_holds_the_signed_residual_over_the_noise():
-    _, (found,) = localised(noisy(trials(6), GAPS["above"]))
+    _, (data,) = localised(noisy(trials(6), GAPS["above"]))
     _, (held,) = localised(noisy(trials(6), lambda trial: 3.0 * (trial.time > 6.2) - 0.5))
-    for each in (found, held):
+    for each in (data, held):
         assert each.residual.shape == (len(each.y_edges) - 1, len(each.x_edges) - 1)
     # Simulated less measured: a reading that is too large leaves less than nothing.
     assert np.nanmin(held.residual) == pytest.approx(-2.2, abs=0.4)
@@ -133,8 +133,8 @@ def test_one_short_trial_of_few_rows_is_no_reason_to_fail():
 
 
 def test_p_values_are_adjusted_as_by_benjamini_and_hochberg():
-    found = adjusted(np.array([0.9, 0.001, 0.02, 0.021]))
-    np.testing.assert_allclose(found, [0.9, 0.004, 0.028, 0.028])
+    raised = adjusted(np.array([0.9, 0.001, 0.02, 0.021]))
+    np.testing.assert_allclose(raised, [0.9, 0.004, 0.028, 0.028])
 
 
 def test_many_trials_take_seconds():

@@ -27,7 +27,7 @@ def noise(seed, memory=0.0):
     return np.asarray(lfilter([np.sqrt(1 - memory**2)], [1, -memory], white, axis=1))[:, 100:]
 
 
-def found(parts, level=1.0, step=0.0):
+def scan_of(parts, level=1.0, step=0.0):
     return scan_statistic(list(parts), EDGES, level, step)
 
 
@@ -55,12 +55,12 @@ def test_noise_does_not_burst_be_it_coloured_or_rounded(memory, step):
             # Rounding follows what creeps, and what stands still stays beside the truth.
             parts = np.round((parts + 2.0 * creep) / step) * step - 2.0 * creep
             level = max(np.sqrt(np.mean(parts[0, :96] ** 2)), step / np.sqrt(12.0))
-        assert found(parts, level, step).chance > 0.01
-        assert found(parts, level, step).excess == 0.0
+        assert scan_of(parts, level, step).chance > 0.01
+        assert scan_of(parts, level, step).excess == 0.0
 
 
 def test_noise_larger_everywhere_than_at_rest_does_not_burst():
-    assert all(found(3.0 * noise(seed, 0.5)).excess == 0.0 for seed in range(20))
+    assert all(scan_of(3.0 * noise(seed, 0.5)).excess == 0.0 for seed in range(20))
 
 
 @pytest.mark.parametrize("memory", [0.0, 0.5])
@@ -68,7 +68,7 @@ def test_a_beat_in_one_piece_of_one_trial_is_a_burst_of_its_size(memory):
     for seed in range(10):
         parts = noise(seed, memory)
         parts[2, 330:334] += BEAT
-        beat = found(parts)
+        beat = scan_of(parts)
         assert beat.chance < CHANCE
         assert beat.excess == pytest.approx(np.sum(BEAT**2), rel=0.25)
 
@@ -77,18 +77,18 @@ def test_one_wild_reading_is_none_however_wild_nor_are_many_that_come_alone():
     for seed in range(10):
         parts = noise(seed, 0.5)
         parts[3, 500] += 1e4
-        assert found(parts).excess == 0.0
+        assert scan_of(parts).excess == 0.0
         # One reading in a hundred: some pieces have three of them.
         generator = np.random.default_rng(seed)
         thrown = generator.random((PARTS, ROWS)) < 0.01
-        assert found(noise(seed) + np.where(thrown, 30.0, 0.0)).excess == 0.0
+        assert scan_of(noise(seed) + np.where(thrown, 30.0, 0.0)).excess == 0.0
 
 
 def test_rounding_by_a_half_step_is_taken_off():
     parts = 0.3 * noise(0)
     parts[0, 320:352] += 1.5
-    assert found(parts, 0.3, 0.0).chance < CHANCE
-    assert found(parts, 0.3, 3.0).excess == 0.0
+    assert scan_of(parts, 0.3, 0.0).chance < CHANCE
+    assert scan_of(parts, 0.3, 3.0).excess == 0.0
 
 
 def test_a_beat_hardly_moves_the_noise_that_it_is_judged_by():
@@ -105,8 +105,8 @@ def test_missing_readings_count_for_nothing_and_few_say_nothing():
     parts = noise(2)
     parts[2, 330:334] += BEAT
     parts[2, 331:333] = np.nan
-    assert np.isfinite(found(parts).chance)
-    assert found(np.full((PARTS, ROWS), np.nan)) == NO_EXCESS
+    assert np.isfinite(scan_of(parts).chance)
+    assert scan_of(np.full((PARTS, ROWS), np.nan)) == NO_EXCESS
     assert scan_statistic([np.ones(60)], [[0, 30, 60]], 1.0, 0.0) == NO_EXCESS
     assert scan_statistic([100.0 * np.ones(200)], [[0, 200]], 1.0, 0.0) == NO_EXCESS
 

@@ -93,8 +93,8 @@ def test_chance_is_fair(quiet):
 @pytest.mark.parametrize("name", HIDDEN)
 def test_what_is_hidden_stands_out(name):
     shared = fit_problem(measured(STATION.with_effects(HIDDEN[name]), 4))
-    found = screen(baseline(shared), CANDIDATES, 0, lambda s: shared.probed(STATION, s))
-    best = max(found, key=lambda each: each.gain)
+    scores = screen(baseline(shared), CANDIDATES, 0, lambda s: shared.probed(STATION, s))
+    best = max(scores, key=lambda each: each.gain)
     assert best.candidate.name == name
     assert best.gain > 100
     assert best.change > 0.3
@@ -122,8 +122,8 @@ def test_what_an_effect_does_is_all_its_own(quiet):
     looked = screen(base, [candidate], 0, whitened_of)
     assert looked[0].gain < 25.0
     rows = [-part[1 + probe].astype(float) for part in whitened_of.kept["hysteresis"]]
-    found = screen(with_residual(base, rows), CANDIDATES, 0, whitened_of)
-    best = max(found, key=lambda each: each.gain)
+    scores = screen(with_residual(base, rows), CANDIDATES, 0, whitened_of)
+    best = max(scores, key=lambda each: each.gain)
     assert best.candidate.name == "hysteresis"
     assert best.probe == probe
     assert best.factor == pytest.approx(1.0, rel=1e-3)
@@ -136,21 +136,21 @@ def test_an_effect_of_one_sign_does_not_explain_its_opposite(quiet):
     assert not candidate.signs.any()
     screen(base, [candidate], 0, whitened_of)
     rows = [part[1].astype(float) for part in whitened_of.kept["hysteresis"]]
-    found = screen(with_residual(base, rows), [candidate], 0, whitened_of)[0]
+    scores = screen(with_residual(base, rows), [candidate], 0, whitened_of)[0]
     towards = screen(with_residual(base, [-row for row in rows]), [candidate], 0, whitened_of)[0]
-    assert found.gain < 0.05 * towards.gain
+    assert scores.gain < 0.05 * towards.gain
 
 
 def test_what_no_trial_excites_is_never_resolved(quiet):
     """Pressure of a resting regulator says nothing of its delay."""
     trials = [measured(STATION, 4)[k] for k in (0, 2, 3)]
     shared = fit_problem(trials)
-    found = scores_by_name(
+    scores = scores_by_name(
         screen(baseline(shared), CANDIDATES, 0, lambda candidate: shared.probed(STATION, candidate))
     )
-    blind = found["regulator_delay"]
+    blind = scores["regulator_delay"]
     assert blind.gain == 0.0 and blind.p_value == 1.0 and blind.resolvable is None
-    assert found["hysteresis"].resolvable is not None
+    assert scores["hysteresis"].resolvable is not None
 
 
 def test_larger_effects_are_resolved_sooner(quiet):
@@ -173,8 +173,8 @@ def test_fits_begin_where_most_is_explained():
     base = baseline(shared)
     candidate = next(each for each in CANDIDATES if each.name == "hysteresis")
     whitened = shared.probed(STATION, candidate)
-    found = screen(base, [candidate], 0, lambda _: whitened)[0]
-    begun = starting_points(base, whitened, found)
+    scores = screen(base, [candidate], 0, lambda _: whitened)[0]
+    begun = starting_points(base, whitened, scores)
     force = candidate.paths.index("hysteresis.force_n")
     assert begun
     assert 3.0 < begun[0][force] < 12.0

@@ -26,7 +26,7 @@ INTERCEPT = "contractile_force.intercept_n"
 NAMED = "Parameters that are off: "
 
 
-def found(model, seed):
+def eliminated(model, seed):
     """The fewest parameters that are off in trials of a model, as the station sees them."""
     shared = fit_problem(measured(model, 4, rate=32.0, seed=seed))
     fit = shared.fit(STATION)
@@ -41,7 +41,7 @@ def found(model, seed):
 
 @pytest.mark.parametrize("seed", [5, 6])
 def test_nothing_is_off_where_nothing_is(seed):
-    few, free = found(STATION, seed)
+    few, free = eliminated(STATION, seed)
     assert few.paths == ()
     assert few.model == STATION
     assert few.chi_square > free.chi_square
@@ -50,7 +50,7 @@ def test_nothing_is_off_where_nothing_is(seed):
 def test_a_parameter_that_hides_behind_others_is_named():
     """With all of them free, the intercept of the force moves by less than its error."""
     given = float(values(STATION, [INTERCEPT])[0])
-    few, free = found(STATION.replace({INTERCEPT: 1.2 * given}), 11)
+    few, free = eliminated(STATION.replace({INTERCEPT: 1.2 * given}), 11)
     value, error = free.estimate(INTERCEPT)
     assert abs(value - given) < error
     assert few.paths == (INTERCEPT,)
@@ -63,7 +63,7 @@ def test_a_parameter_that_hides_behind_others_is_named():
 
 def test_what_is_off_is_estimated_more_surely_where_nothing_else_is_free():
     off = {"drive.gain_n_per_v": 101.0, INTERCEPT: 53.5}
-    few, free = found(STATION.replace(off), 12)
+    few, free = eliminated(STATION.replace(off), 12)
     assert set(few.paths) == set(off)
     for path, truth in off.items():
         value, error = few.estimate(path)
@@ -99,18 +99,18 @@ def test_the_given_model_is_proposed_where_no_parameter_is_off():
     for k, trial in enumerate(commanded(2)):
         held = {name: np.full(len(trial), row[0]) for name, row in trial.commands.items()}
         trials.append(plant.simulate(Trial(trial.time, held), seed=k))
-    found = diagnose(trials, STATION, propose=False)
-    assert found.verdict == "undecidable"
-    assert found.model == STATION and not found.parameters
-    assert all(gap.after == gap.before and gap.held_out for gap in found.gap.values())
-    assert said(found) == [f"{NAMED}none of 20 is needed to explain these trials."]
+    diagnosis = diagnose(trials, STATION, propose=False)
+    assert diagnosis.verdict == "undecidable"
+    assert diagnosis.model == STATION and not diagnosis.parameters
+    assert all(gap.after == gap.before and gap.held_out for gap in diagnosis.gap.values())
+    assert said(diagnosis) == [f"{NAMED}none of 20 is needed to explain these trials."]
 
 
 def test_what_is_off_but_hardly_shows_leaves_the_model_as_it_is(monkeypatch):
     monkeypatch.setattr(decision, "MOVED_CHANGE", np.inf)
-    found = diagnose(laboratory("parameters", 6)[0], STATION, propose=False)
-    assert found.verdict == "agrees" and found.model == STATION
-    (words,) = said(found)
+    diagnosis = diagnose(laboratory("parameters", 6)[0], STATION, propose=False)
+    assert diagnosis.verdict == "agrees" and diagnosis.model == STATION
+    (words,) = said(diagnosis)
     assert words.endswith("of the noise: the model stays as it was given.")
 
 
@@ -124,13 +124,13 @@ def test_intervals_hold_where_all_numbers_are_a_little_off():
             for path, value in zip(own.free, values(STATION, own.free), strict=True)
         }
         trials = measured(STATION.replace(off), 4, rate=32.0, seed=seed)
-        found = diagnose(trials, STATION, propose=False)
-        assert said(found)
-        for path, moved in found.parameters.items():
+        diagnosis = diagnose(trials, STATION, propose=False)
+        assert said(diagnosis)
+        for path, moved in diagnosis.parameters.items():
             low, high = moved.now.low, moved.now.high
             assert low is not None and high is not None
             held.append(low <= off[path] <= high)
-            note = found.model.notes[path]
+            note = diagnosis.model.notes[path]
             assert (note.low, note.high) == pytest.approx((low, high))
     assert len(held) > 30
     assert np.mean(held) > 0.8
@@ -153,8 +153,8 @@ def test_a_named_parameter_that_another_could_stand_for_comes_with_a_note(
 ):
     given = float(values(STATION, [path])[0])
     trials = measured(STATION.replace({path: factor * given}), 4, rate=32.0, seed=11)
-    found = diagnose(trials, STATION, propose=False)
-    assert list(found.parameters) == [named]
-    (warning,) = found.warnings
+    diagnosis = diagnose(trials, STATION, propose=False)
+    assert list(diagnosis.parameters) == [named]
+    (warning,) = diagnosis.warnings
     assert warning.startswith(f"{named}: ")
     assert warning.endswith(f"{words}, {named} may be as it was given")

@@ -29,42 +29,42 @@ def selected(case, seed=0):
 
 
 def test_hysteresis_is_found_with_its_size():
-    _, refitted, found = selected("hysteresis")
-    assert [candidate.name for candidate in found.chosen] == ["hysteresis"]
+    _, refitted, stage = selected("hysteresis")
+    assert [candidate.name for candidate in stage.chosen] == ["hysteresis"]
     for path, truth in (("hysteresis.force_n", 6.0), ("hysteresis.distance_mm", 1.0)):
-        value, error = found.fit.estimate(path)
+        value, error = stage.fit.estimate(path)
         assert abs(value - truth) < 3.0 * error
         assert error < 0.1 * truth
-    assert found.fit.chi_square < 0.7 * refitted.chi_square
+    assert stage.fit.chi_square < 0.7 * refitted.chi_square
 
 
 def test_parameters_come_right_only_beside_the_effect():
-    _, refitted, found = selected("hysteresis")
+    _, refitted, stage = selected("hysteresis")
     for path, truth in OFF.items():
-        value, error = found.fit.estimate(path)
+        value, error = stage.fit.estimate(path)
         assert abs(value - truth) < 3.5 * error
     # Damping takes what hysteresis loses, as long as that is missing.
     truth = STATION.at_the_door("damping")["contracting_n_s_per_mm"]
     wrong, right = (
         abs(fit.estimate("damping.contracting_n_s_per_mm")[0] - truth)
-        for fit in (refitted, found.fit)
+        for fit in (refitted, stage.fit)
     )
     assert right < 0.5 * wrong
 
 
 @pytest.mark.parametrize("case", ["nothing", "parameters"])
 def test_nothing_hidden_nothing_found(case):
-    shared, refitted, found = selected(case)
-    assert found.chosen == ()
-    assert len(found.stages) == 1
-    assert found.stages[0].gate == () and found.stages[0].fits == {}
+    shared, refitted, stage = selected(case)
+    assert stage.chosen == ()
+    assert len(stage.stages) == 1
+    assert stage.stages[0].gate == () and stage.stages[0].fits == {}
     expected = shared.whitened_residuals(refitted.model).count
     assert abs(refitted.chi_square - expected) < 5 * np.sqrt(2 * expected)
 
 
 def test_the_chosen_lead_their_rounds():
-    _, _, found = selected("hysteresis")
-    first = found.stages[0]
+    _, _, stage = selected("hysteresis")
+    first = stage.stages[0]
     assert all(passes(first.problem, each, first.missing) for each in first.gate)
     assert first.missing or all(each.p_value <= ALARM for each in first.gate)
     assert "hysteresis" in {each.candidate.name for each in first.gate}
@@ -75,8 +75,8 @@ def test_the_chosen_lead_their_rounds():
 
 
 def test_every_fit_explains_more_than_without():
-    _, _, found = selected("hysteresis")
-    first = found.stages[0]
+    _, _, stage = selected("hysteresis")
+    first = stage.stages[0]
     for name, fit in first.fits.items():
         assert fit.chi_square <= first.before.chi_square, name
         assert fit.names == (name,)
@@ -84,23 +84,23 @@ def test_every_fit_explains_more_than_without():
 
 
 def test_what_was_added_is_not_looked_for_again():
-    _, _, found = selected("hysteresis")
-    assert len(found.stages) == 2
-    assert "hysteresis" not in {each.candidate.name for each in found.stages[1].scores}
+    _, _, stage = selected("hysteresis")
+    assert len(stage.stages) == 2
+    assert "hysteresis" not in {each.candidate.name for each in stage.stages[1].scores}
 
 
 def test_learnt_noise_is_never_less_than_at_rest():
     for case in ("hysteresis", "nothing"):
-        shared, _, found = selected(case)
-        for before, after in zip(shared.noise, found.problem.noise, strict=True):
+        shared, _, stage = selected(case)
+        for before, after in zip(shared.noise, stage.problem.noise, strict=True):
             assert after.level >= before.level
             assert after.level < 1.15 * before.level
 
 
 def test_a_fit_comes_back_from_its_journal_bit_by_bit():
-    shared, _, found = selected("hysteresis")
-    fit = found.stages[0].fits["hysteresis"]
-    again = restored(kept_form(fit), shared, found.stages[0].before, found.chosen)
+    shared, _, stage = selected("hysteresis")
+    fit = stage.stages[0].fits["hysteresis"]
+    again = restored(kept_form(fit), shared, stage.stages[0].before, stage.chosen)
     assert again.paths == fit.paths and again.names == fit.names
     assert np.array_equal(again.values, fit.values)
     assert again.chi_square == fit.chi_square
@@ -120,13 +120,13 @@ def test_a_delay_comes_back_from_its_journal_switched_on():
 
 def test_the_truth_is_hardly_better_than_what_was_found():
     """The search found the bottom: no model explains much more than the one that made the data."""
-    shared, _, found = selected("hysteresis")
+    shared, _, stage = selected("hysteresis")
     truth = STATION.replace(OFF)
     truth = truth.with_effects(HYSTERESIS)
-    whitened = shared.whitened_residuals(truth, found.chosen)
+    whitened = shared.whitened_residuals(truth, stage.chosen)
     begun = np.array([_value(truth, each.path) for each in whitened.free])
     there = whitened.sums(begun, np.empty(0)).chi_square
-    fitted = found.stages[0].fits["hysteresis"]
+    fitted = stage.stages[0].fits["hysteresis"]
     assert fitted.chi_square < there + 10.0
 
 
@@ -137,7 +137,7 @@ def _value(model, path):
 
 def taut(effects, rate=128.0):
     """Trials of which one begins with a slack cable that comes taut once, slowly drawn."""
-    found = []
+    simulated = []
     for number, asked in enumerate(commanded(3, rate)):
         time = asked.time
         motor, regulator = (
@@ -148,8 +148,8 @@ def taut(effects, rate=128.0):
             regulator += 1.0 * (time < 0.5)
         commands = {"motor_voltage": motor, "regulator_voltage": regulator}
         plant = Plant(STATION.with_effects(effects).replace(OFF))
-        found.append(plant.simulate(Trial(time, commands), seed=7 + number, noise=True))
-    return found
+        simulated.append(plant.simulate(Trial(time, commands), seed=7 + number, noise=True))
+    return simulated
 
 
 def by_bursts_alone(trials, monkeypatch):
@@ -158,10 +158,10 @@ def by_bursts_alone(trials, monkeypatch):
     shared = fit_problem(trials)
     refitted = shared.careful_fit(STATION)
     assert not is_autocorrelated(shared, refitted)
-    found = select(
+    selection = select(
         shared, refitted, CANDIDATES, 0, Journal(None, trials, STATION, ""), lambda *_: None
     )
-    return scan_of_fit(shared, refitted), found
+    return scan_of_fit(shared, refitted), selection
 
 
 def readings(trials):
@@ -170,19 +170,19 @@ def readings(trials):
 
 def test_a_beat_of_the_cable_opens_the_gate_for_what_makes_it(monkeypatch):
     trials = taut({"drive_dead_zone": {"width_n": 5.0, "slope": 2.0}})
-    scan, found = by_bursts_alone(trials, monkeypatch)
+    scan, selection = by_bursts_alone(trials, monkeypatch)
     assert scan.chance < 1e-6 and scan.excess > 300.0
-    assert [candidate.name for candidate in found.chosen] == ["drive_dead_zone"]
-    assert found.stages[0].scores[0].p_value <= scan.chance
-    assert found.stages[0].scan == scan and found.stages[1].scan.excess == 0.0
-    assert found.fit.estimate("drive_dead_zone.width_n")[0] == pytest.approx(5.0, rel=0.15)
-    assert found.fit.chi_square < 1.05 * readings(trials)
+    assert [candidate.name for candidate in selection.chosen] == ["drive_dead_zone"]
+    assert selection.stages[0].scores[0].p_value <= scan.chance
+    assert selection.stages[0].scan == scan and selection.stages[1].scan.excess == 0.0
+    assert selection.fit.estimate("drive_dead_zone.width_n")[0] == pytest.approx(5.0, rel=0.15)
+    assert selection.fit.chi_square < 1.05 * readings(trials)
 
 
 def test_a_cable_that_comes_taut_as_it_should_is_no_burst(monkeypatch):
-    scan, found = by_bursts_alone(taut({}), monkeypatch)
+    scan, selection = by_bursts_alone(taut({}), monkeypatch)
     assert scan.chance == 1.0 and scan.excess == 0.0
-    assert found.chosen == () and found.stages[0].gate == ()
+    assert selection.chosen == () and selection.stages[0].gate == ()
 
 
 def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
@@ -192,7 +192,9 @@ def test_noise_larger_in_places_bursts_but_names_nothing(monkeypatch):
         rows = slice(200, 264)
         row["load"][rows] += 3.0 * generator.standard_normal(64)
         trials.append(Trial(trial.time, trial.commands, row))
-    scan, found = by_bursts_alone(trials, monkeypatch)
+    scan, selection = by_bursts_alone(trials, monkeypatch)
     assert scan.excess > 300.0
-    assert found.chosen == () and found.stages[0].gate == () and found.stages[0].fits == {}
-    assert all(each.p_value > 1e-3 for each in found.stages[0].scores)
+    assert (
+        selection.chosen == () and selection.stages[0].gate == () and selection.stages[0].fits == {}
+    )
+    assert all(each.p_value > 1e-3 for each in selection.stages[0].scores)

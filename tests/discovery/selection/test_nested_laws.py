@@ -46,9 +46,9 @@ def fit_of(static, dynamic, speed, begun):
     noise = tuple(map(white_noise, (2e-5, 1.0, 1.0, 1.0)))
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     start = np.array([*begun, *DRY.absent[len(begun) :]])
-    found = bench.fit(SLIDE, (DRY,), {DRY.name: start})
-    assert found is not None
-    return bench, found
+    fitted = bench.fit(SLIDE, (DRY,), {DRY.name: start})
+    assert fitted is not None
+    return bench, fitted
 
 
 def test_friction_of_one_size_has_one_number():
@@ -106,13 +106,13 @@ def test_limits_stay_within_what_the_catalogue_allows(monkeypatch, largest):
 
 def test_no_value_is_said_of_what_is_not_determined():
     logs, _ = rubbing(12.0, 12.0, 5.0)
-    found = diagnose(logs, SLIDE, propose=False)
-    (effect,) = found.effects
+    diagnosis = diagnose(logs, SLIDE, propose=False)
+    (effect,) = diagnosis.effects
     assert list(effect.parameters) == ["dynamic_n"]
-    assert "static not determined" in found.sentence
-    assert "stribeck speed not determined" in found.sentence
-    assert "limit" not in found.sentence
-    (written,) = json.loads(found.text())["effects"]
+    assert "static not determined" in diagnosis.sentence
+    assert "stribeck speed not determined" in diagnosis.sentence
+    assert "limit" not in diagnosis.sentence
+    (written,) = json.loads(diagnosis.text())["effects"]
     assert set(written["not_determined"]) == {"static_n", "stribeck_speed_mm_per_s"}
     assert set(written["parameters"]) == {"dynamic_n"}
-    assert "not determined" in found.model.notes[STATIC].source
+    assert "not determined" in diagnosis.model.notes[STATIC].source

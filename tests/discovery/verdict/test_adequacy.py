@@ -37,21 +37,21 @@ def floors(trials, stated=None):
 
 def moving(number):
     """Triangles that begin settled and go on until the log ends: nothing rests in them."""
-    found = []
+    pieces = []
     for trial in measured(STATION, number, kinds=(0,)):
         rows = (trial.time >= 0.5) & (trial.time < 4.0)
         commands = {name: row[rows] for name, row in trial.commands.items()}
         readings = {name: row[rows] for name, row in trial.measurements.items()}
-        found.append(Trial(trial.time[rows], commands, readings))
-    return found
+        pieces.append(Trial(trial.time[rows], commands, readings))
+    return pieces
 
 
 # -- floors ----------------------------------------------------------------------------------------
 
 
 def test_rest_segments_give_the_noise_of_the_sensors():
-    found = floors(measured(STATION, 6))
-    for name, floor in found.items():
+    levels = floors(measured(STATION, 6))
+    for name, floor in levels.items():
         assert floor.source == "rest segments"
         assert floor.level == pytest.approx(TRUE[name], rel=0.25)
 
@@ -59,15 +59,15 @@ def test_rest_segments_give_the_noise_of_the_sensors():
 def test_a_tolerance_comes_before_rest_and_repeats_before_a_tolerance():
     trials = measured(STATION, 3)
     stated = Stated({"contraction": 2e-4})
-    found = floors(trials, stated)
-    assert (found["contraction"].source, found["contraction"].level) == ("tolerance", 2e-4)
-    assert found["load"].source == "rest segments"
+    levels = floors(trials, stated)
+    assert (levels["contraction"].source, levels["contraction"].level) == ("tolerance", 2e-4)
+    assert levels["load"].source == "rest segments"
     plant = Plant(STATION)
     repeats = [plant.simulate(commanded(1)[0], seed=seed) for seed in (1, 2, 3)]
-    found = floors(repeats, stated)
+    levels = floors(repeats, stated)
     for name in OUTPUTS:
-        assert found[name].source == "repeats"
-        assert found[name].level == pytest.approx(TRUE[name], rel=0.15)
+        assert levels[name].source == "repeats"
+        assert levels[name].level == pytest.approx(TRUE[name], rel=0.15)
 
 
 def test_the_scatter_of_repeats_holds_what_the_rig_does_not_repeat():
@@ -75,9 +75,9 @@ def test_the_scatter_of_repeats_holds_what_the_rig_does_not_repeat():
     strong = STATION.replace({"drive.gain_n_per_v": 100.0})
     trial = commanded(1)[0]
     repeats = [Plant(each).simulate(trial, seed=k) for k, each in enumerate((STATION, strong))]
-    found = floors(repeats)
-    assert found["load"].level > 5.0 * TRUE["load"]
-    assert found["pressure"].level == pytest.approx(TRUE["pressure"], rel=0.1)
+    levels = floors(repeats)
+    assert levels["load"].level > 5.0 * TRUE["load"]
+    assert levels["pressure"].level == pytest.approx(TRUE["pressure"], rel=0.1)
 
 
 def test_a_file_that_was_copied_is_no_repeat():
@@ -100,8 +100,8 @@ def test_of_a_summary_the_printed_standard_errors_count():
     rows = {name: np.where(few, row, np.nan) for name, row in trial.measurements.items()}
     trials = [replace(trial, measurements=rows)]
     assert is_summary([rows["load"]]) and not is_summary([trial.measurements["load"]])
-    found = floors(trials, Stated(standard_error={"load": 3.0}))
-    assert (found["load"].source, found["load"].level) == ("standard errors", 3.0)
+    levels = floors(trials, Stated(standard_error={"load": 3.0}))
+    assert (levels["load"].source, levels["load"].level) == ("standard errors", 3.0)
 
 
 # -- regression ------------------------------------------------------------------------------------
@@ -127,9 +127,9 @@ def commanded_readings(number, seconds):
 
 
 def test_of_noise_nothing_is_explained():
-    found = regressed(lambda logged, k: 0.0)
-    assert abs(found.mean) < 0.02
-    assert found.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
+    explained = regressed(lambda logged, k: 0.0)
+    assert abs(explained.mean) < 0.02
+    assert explained.bound(0.0125, np.random.default_rng(0)) < MOST_EXPLAINED**2
 
 
 def late(logged):
@@ -148,16 +148,16 @@ STRUCTURE = {
 
 @pytest.mark.parametrize("law", STRUCTURE)
 def test_what_follows_state_command_or_its_history_is_explained(law):
-    found = regressed(STRUCTURE[law])
+    explained = regressed(STRUCTURE[law])
     whole = np.mean([np.mean(STRUCTURE[law](e, 0) ** 2) for e in logs(commanded_readings(6, 5.0))])
-    assert found.mean > 0.5 * whole, (found.mean, whole)
+    assert explained.mean > 0.5 * whole, (explained.mean, whole)
 
 
 def test_what_differs_from_trial_to_trial_is_not():
     """A slow drift, another in every trial, repeats with nothing."""
     waves = np.random.default_rng(3).uniform(0.0, 6.0, 6)
-    found = regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k]))
-    assert found.mean < 0.2
+    explained = regressed(lambda logged, k: np.sin(0.9 * logged.time + waves[k]))
+    assert explained.mean < 0.2
 
 
 def test_the_bound_is_an_upper_one_that_narrows_with_data():
@@ -166,10 +166,10 @@ def test_the_bound_is_an_upper_one_that_narrows_with_data():
     for blocks in (10, 1000):
         for _ in range(100):
             share = generator.normal(0.1, 1.0, blocks) * 50.0
-            found = Explained(share, np.full(blocks, 50.0))
-            bound = found.bound(0.05, generator, 400)
+            explained = Explained(share, np.full(blocks, 50.0))
+            bound = explained.bound(0.05, generator, 400)
             above += bound >= 0.1
-            widths.append(bound - found.mean)
+            widths.append(bound - explained.mean)
     assert 170 <= above <= 200
     assert np.mean(widths[:100]) > 5.0 * np.mean(widths[100:])
 
@@ -195,9 +195,9 @@ def judged(scale=1.0, unseen=1.0, seen=True, number=6, stated=None, law=None):
 
 
 def test_noise_is_adequate():
-    found = judged()
-    assert found.structure is None and found.undecided is None
-    assert all(0.8 < each.misfit < 1.3 for each in found.signals.values())
+    adequacy = judged()
+    assert adequacy.structure is None and adequacy.undecided is None
+    assert all(0.8 < each.misfit < 1.3 for each in adequacy.signals.values())
 
 
 @pytest.mark.parametrize(
@@ -210,23 +210,23 @@ def test_noise_is_adequate():
     ],
 )
 def test_what_is_too_large_or_not_known_is_a_fault(case, fault):
-    found = judged(**case)
-    assert {each.fault for each in found.signals.values()} == {fault}
-    assert (found.structure is not None) == (fault == "misfit")
+    adequacy = judged(**case)
+    assert {each.fault for each in adequacy.signals.values()} == {fault}
+    assert (adequacy.structure is not None) == (fault == "misfit")
 
 
 def test_structure_of_the_size_of_the_noise_is_seen_below_the_limit_of_the_misfit():
     law = STRUCTURE["of the speed"]
-    found = judged(law=lambda logged: 0.9 * law(logged, 0))
-    assert {each.fault for each in found.signals.values()} == {"explained"}
-    assert all(each.misfit < 1.5 for each in found.signals.values())
+    adequacy = judged(law=lambda logged: 0.9 * law(logged, 0))
+    assert {each.fault for each in adequacy.signals.values()} == {"explained"}
+    assert all(each.misfit < 1.5 for each in adequacy.signals.values())
 
 
 def test_a_tolerance_makes_the_same_structure_good_enough():
     law = STRUCTURE["of the speed"]
     wide = Stated({name: 3.0 * level for name, level in TRUE.items()})
-    found = judged(law=lambda logged: 0.9 * law(logged, 0), stated=wide)
-    assert all(each.fault is None for each in found.signals.values())
+    adequacy = judged(law=lambda logged: 0.9 * law(logged, 0), stated=wide)
+    assert all(each.fault is None for each in adequacy.signals.values())
 
 
 # -- verdicts --------------------------------------------------------------------------------------
@@ -238,23 +238,23 @@ def in_data_set(trials, **stated):
 
 def test_without_repeat_rest_or_tolerance_nothing_agrees():
     trials = moving(6)
-    found = refit(trials, STATION)
-    assert found.verdict == "undecidable"
-    assert "neither a repeat, a rest segment nor a tolerance" in found.sentence
-    assert "[tolerance], " in found.sentence and "_mm = a number in mm" in found.sentence
+    diagnosis = refit(trials, STATION)
+    assert diagnosis.verdict == "undecidable"
+    assert "neither a repeat, a rest segment nor a tolerance" in diagnosis.sentence
+    assert "[tolerance], " in diagnosis.sentence and "_mm = a number in mm" in diagnosis.sentence
     stated = {name: 2.0 * level for name, level in TRUE.items()}
-    found = refit(in_data_set(trials, tolerance=stated), STATION)
-    assert found.verdict == "agrees"
-    assert "within 0.0493 mm in contraction" in found.sentence
+    diagnosis = refit(in_data_set(trials, tolerance=stated), STATION)
+    assert diagnosis.verdict == "agrees"
+    assert "within 0.0493 mm in contraction" in diagnosis.sentence
 
 
 def test_an_exact_sensor_agrees_by_a_tolerance_alone():
     silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(4)]
     assert refit(silent, STATION).verdict == "undecidable"
-    found = refit(
+    diagnosis = refit(
         in_data_set(silent, tolerance={name: 2 * TRUE[name] for name in OUTPUTS}), STATION
     )
-    assert found.verdict == "agrees"
+    assert diagnosis.verdict == "agrees"
 
 
 @pytest.mark.parametrize("case", ["hysteresis", "bump"])
@@ -270,28 +270,28 @@ def test_a_refit_alone_does_not_call_a_wrong_structure_right(case):
         ),
         6,
     )
-    found = refit(trials, STATION)
-    assert found.verdict == "unknown"
-    assert "parameters alone do not explain that" in found.sentence
-    assert "noise floors" in found.sentence
+    diagnosis = refit(trials, STATION)
+    assert diagnosis.verdict == "unknown"
+    assert "parameters alone do not explain that" in diagnosis.sentence
+    assert "noise floors" in diagnosis.sentence
 
 
 def test_trials_that_do_not_hold_the_parameters_cannot_tell():
-    found = diagnose(measured(STATION.replace(OFF), 3), STATION, propose=False)
-    assert found.verdict == "undecidable"
-    assert "do not determine the parameters" in found.sentence
+    diagnosis = diagnose(measured(STATION.replace(OFF), 3), STATION, propose=False)
+    assert diagnosis.verdict == "undecidable"
+    assert "do not determine the parameters" in diagnosis.sentence
     assert diagnose(measured(STATION.replace(OFF), 6), STATION, propose=False).verdict == (
         "parameters"
     )
 
 
 def test_the_answer_says_how_many_floors_are_left():
-    found = diagnosed("nothing")
-    assert set(found.adequacy) == set(found.gap)
-    for judgement in found.adequacy.values():
+    diagnosis = diagnosed("nothing")
+    assert set(diagnosis.adequacy) == set(diagnosis.gap)
+    for judgement in diagnosis.adequacy.values():
         assert isinstance(judgement, Judgement) and judgement.fault is None
         assert judgement.misfit == pytest.approx(1.0, abs=0.3)
-    assert found.document()["adequacy"]["load_n"]["source"] == "rest segments"
+    assert diagnosis.document()["adequacy"]["load_n"]["source"] == "rest segments"
 
 
 # -- folds, words ----------------------------------------------------------------------------------
@@ -306,21 +306,23 @@ def test_pieces_are_left_out_by_whole_files_or_in_contiguous_blocks():
 
 
 def test_pieces_are_not_called_trials():
-    found = diagnosed("nothing")
-    pieces = replace(found, trials=tuple(replace(each, file="long.csv") for each in found.trials))
+    diagnosis = diagnosed("nothing")
+    pieces = replace(
+        diagnosis, trials=tuple(replace(each, file="long.csv") for each in diagnosis.trials)
+    )
     assert "this trial (in 3 pieces)" in sentence(pieces)
 
 
 def test_the_headline_names_a_limit_a_rough_fit_and_what_got_worse():
-    found = diagnosed("hysteresis")
-    (effect,) = found.effects
+    diagnosis = diagnosed("hysteresis")
+    (effect,) = diagnosis.effects
     known = {
         name: replace(each, limit="upper" if name == "force_n" else "")
         for name, each in effect.parameters.items()
     }
     said = sentence(
         replace(
-            found,
+            diagnosis,
             effects=(replace(effect, parameters=known),),
             converged=False,
             worsened=(("load_n",), ("run_2.csv",)),
@@ -333,8 +335,8 @@ def test_the_headline_names_a_limit_a_rough_fit_and_what_got_worse():
 
 def test_intervals_stay_within_what_the_fit_allows():
     for name in ("hysteresis", "parameters"):
-        found = diagnosed(name)
-        for effect in found.effects:
+        diagnosis = diagnosed(name)
+        for effect in diagnosis.effects:
             for path, each in effect.parameters.items():
                 if each.low is not None:
                     assert each.low >= 0.0, path

@@ -65,39 +65,42 @@ def test_a_share_of_hardly_anything_is_none():
 
 
 def test_an_effect_of_no_one_size_is_named_with_what_it_leaves():
-    found = of_no_one_size()
-    assert found.verdict == "effect", found.sentence
-    (effect,) = found.effects
+    diagnosis = of_no_one_size()
+    assert diagnosis.verdict == "effect", diagnosis.sentence
+    (effect,) = diagnosis.effects
     assert effect.name == "hysteresis"
     assert min(SIZES) < effect.parameters["force_n"].value < max(SIZES)
-    known = found.approximate
-    assert known is not None and known.effects == found.effects and known.held_out
+    known = diagnosis.approximate
+    assert known is not None and known.effects == diagnosis.effects and known.held_out
     assert 0.1 < known.left < 0.25
-    assert "law approximate" in found.sentence and "of the misfit beyond noise" in found.sentence
-    assert any("law of hysteresis is approximate: 1" in words for words in found.warnings)
-    written = json.loads(found.text())["approximate"]
+    assert (
+        "law approximate" in diagnosis.sentence
+        and "of the misfit beyond noise" in diagnosis.sentence
+    )
+    assert any("law of hysteresis is approximate: 1" in words for words in diagnosis.warnings)
+    written = json.loads(diagnosis.text())["approximate"]
     assert written["left"] == pytest.approx(known.left)
     assert written["closed"] == pytest.approx(1.0 - known.left)
     assert [each["name"] for each in written["effects"]] == ["hysteresis"]
 
 
 def test_a_right_law_is_not_called_approximate():
-    found = diagnosed("hysteresis")
-    assert found.verdict == "effect" and found.approximate is None
-    assert "approximate" not in found.sentence
-    assert json.loads(found.text())["approximate"] is None
+    diagnosis = diagnosed("hysteresis")
+    assert diagnosis.verdict == "effect" and diagnosis.approximate is None
+    assert "approximate" not in diagnosis.sentence
+    assert json.loads(diagnosis.text())["approximate"] is None
 
 
 def test_an_unknown_says_its_best_candidate_with_its_size_and_what_is_left():
-    found = of_no_one_size()
-    left = replace(found.approximate, left=0.35)
+    diagnosis = of_no_one_size()
+    left = replace(diagnosis.approximate, left=0.35)
     reason = Reason("slow", 0.4, 0.35, ("hysteresis",), leaves=0.4)
-    said = sentence(replace(found, verdict="unknown", effects=(), approximate=left), reason)
+    said = sentence(replace(diagnosis, verdict="unknown", effects=(), approximate=left), reason)
     assert "that no effect of the catalogue carries" in said
     assert "The best candidate is hysteresis (force" in said
     assert "it closes 65 % of the misfit beyond noise" in said
     assert "law approximate, 35 % of the misfit beyond noise (mean square) is left" in said
-    without = sentence(replace(found, verdict="unknown", effects=(), approximate=None), reason)
+    without = sentence(replace(diagnosis, verdict="unknown", effects=(), approximate=None), reason)
     assert "best candidate" not in without
 
 

@@ -24,10 +24,10 @@ def drawn():
 
 
 def test_the_law_that_is_missing_explains_most():
-    found = drawn()
-    assert found[0].name == "residual_force_of_contraction"
-    assert [law.gain for law in found] == sorted((law.gain for law in found), reverse=True)
-    assert found[0].gain > 1.5 * found[1].gain
+    laws = drawn()
+    assert laws[0].name == "residual_force_of_contraction"
+    assert [law.gain for law in laws] == sorted((law.gain for law in laws), reverse=True)
+    assert laws[0].gain > 1.5 * laws[1].gain
 
 
 def test_a_bump_is_drawn_where_it_is():
@@ -59,13 +59,13 @@ def test_a_straight_line_is_left_to_parameters():
 def test_an_effect_outside_the_catalogue_is_unknown():
     truth = STATION.with_effects(BUMP).replace(OFF)
     trials = measured(truth, 6, rate=32.0, kinds=(0,), kpa=(240.0, 300.0))
-    found = diagnose(trials, STATION, propose=False)
-    assert found.verdict == "unknown"
-    assert not found.effects
-    assert found.law is not None
-    assert found.law.variable == CONTRACTION
-    assert found.law.at[int(np.argmax(found.law.law))] == pytest.approx(24.0, abs=3.0)
-    assert "no effect of the catalogue" in found.sentence
+    diagnosis = diagnose(trials, STATION, propose=False)
+    assert diagnosis.verdict == "unknown"
+    assert not diagnosis.effects
+    assert diagnosis.law is not None
+    assert diagnosis.law.variable == CONTRACTION
+    assert diagnosis.law.at[int(np.argmax(diagnosis.law.law))] == pytest.approx(24.0, abs=3.0)
+    assert "no effect of the catalogue" in diagnosis.sentence
 
 
 @pytest.mark.parametrize(

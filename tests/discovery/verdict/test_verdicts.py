@@ -32,46 +32,46 @@ from tests.discovery.laboratory import (
 def standing(number=2):
     """The diagnosis of trials whose commands never change."""
     plant = Plant(STATION.replace(OFF))
-    found = []
+    simulated = []
     for k, trial in enumerate(commanded(number)):
         held = {name: np.full(len(trial), row[0]) for name, row in trial.commands.items()}
-        found.append(plant.simulate(Trial(trial.time, held), seed=k))
-    return diagnose(found, STATION)
+        simulated.append(plant.simulate(Trial(trial.time, held), seed=k))
+    return diagnose(simulated, STATION)
 
 
 def test_the_true_model_agrees():
-    found = diagnosed("nothing")
-    assert found.verdict == "agrees"
-    assert found.effects == () and found.law is None
-    assert found.model == found.given
-    assert "agrees" in found.sentence
+    diagnosis = diagnosed("nothing")
+    assert diagnosis.verdict == "agrees"
+    assert diagnosis.effects == () and diagnosis.law is None
+    assert diagnosis.model == diagnosis.given
+    assert "agrees" in diagnosis.sentence
 
 
 @pytest.mark.parametrize("seed", [5, 6, 7])
 def test_the_true_model_agrees_whatever_the_noise(seed):
-    found = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION, propose=False)
-    assert found.verdict == "agrees"
-    assert not found.where or min(place.p_value for place in found.where) > 1e-4
+    diagnosis = diagnose(measured(STATION, 4, rate=32.0, seed=seed), STATION, propose=False)
+    assert diagnosis.verdict == "agrees"
+    assert not diagnosis.where or min(place.p_value for place in diagnosis.where) > 1e-4
 
 
 def test_parameters_that_are_off_are_named():
     # Of three trials, one of each kind, two do not hold the parameters for the third.
-    found = diagnosed("parameters", 6)
-    assert found.verdict == "parameters"
-    assert found.effects == ()
+    diagnosis = diagnosed("parameters", 6)
+    assert diagnosis.verdict == "parameters"
+    assert diagnosis.effects == ()
     for path, truth in OFF.items():
-        moved = found.parameters[path]
+        moved = diagnosis.parameters[path]
         assert moved.significant
         assert moved.start == pytest.approx(_given(path))
         half = 0.5 * (moved.now.high - moved.now.low)
         assert abs(moved.now.value - truth) < 2.0 * half
-        assert path in found.sentence
-    assert found.model.at_the_door("drive")["gain_n_per_v"] == pytest.approx(101.0, rel=2e-3)
+        assert path in diagnosis.sentence
+    assert diagnosis.model.at_the_door("drive")["gain_n_per_v"] == pytest.approx(101.0, rel=2e-3)
 
 
 def test_only_what_moved_is_significant():
-    found = diagnosed("parameters")
-    significant = {path for path, moved in found.parameters.items() if moved.significant}
+    diagnosis = diagnosed("parameters")
+    significant = {path for path, moved in diagnosis.parameters.items() if moved.significant}
     assert set(OFF) <= significant
     assert len(significant) <= len(OFF) + 1
 
@@ -81,79 +81,79 @@ def test_intervals_cover_the_truth():
     covered = []
     for seed in (11, 12, 13, 14):
         trials = measured(STATION.replace(OFF), 4, rate=32.0, seed=seed)
-        found = diagnose(trials, STATION, propose=False)
+        diagnosis = diagnose(trials, STATION, propose=False)
         for path, truth in OFF.items():
-            now = found.parameters[path].now
+            now = diagnosis.parameters[path].now
             covered.append(now.low <= truth <= now.high)
     assert sum(covered) >= 6
 
 
 def test_hysteresis_is_named_with_its_size():
-    found = diagnosed("hysteresis")
-    assert found.verdict == "effect"
-    effect = found.effects[0]
+    diagnosis = diagnosed("hysteresis")
+    assert diagnosis.verdict == "effect"
+    effect = diagnosis.effects[0]
     assert effect.name == "hysteresis"
-    assert len(found.effects) == 1
+    assert len(diagnosis.effects) == 1
     assert effect.p_value <= 0.005
     for name, truth in (("force_n", 6.0), ("distance_mm", 1.0)):
         estimate = effect.parameters[name]
         assert estimate.low < estimate.value < estimate.high
         error = (estimate.high - estimate.low) / 3.92
         assert abs(estimate.value - truth) < 3.0 * error
-    assert "hysteresis" in found.sentence
-    assert found.candidates[0].name == "hysteresis"
-    assert found.candidates[0].why == "added to the model"
-    assert found.candidates[0].held_out_gain > 0.0
+    assert "hysteresis" in diagnosis.sentence
+    assert diagnosis.candidates[0].name == "hysteresis"
+    assert diagnosis.candidates[0].why == "added to the model"
+    assert diagnosis.candidates[0].held_out_gain > 0.0
 
 
 def test_an_effect_closes_the_gap_on_trials_it_has_not_seen():
-    found = diagnosed("hysteresis")
-    for gap in found.gap.values():
+    diagnosis = diagnosed("hysteresis")
+    for gap in diagnosis.gap.values():
         assert gap.held_out
     for signal in ("contraction_mm", "rotation_deg"):
-        gap = found.gap[signal]
+        gap = diagnosis.gap[signal]
         assert gap.after < 0.5 * gap.parameters
-    load = found.gap["load_n"]
+    load = diagnosis.gap["load_n"]
     assert load.before > 5 * load.after
     assert load.after == pytest.approx(load.floor, rel=0.1)
 
 
 def test_two_effects_are_both_named():
-    found = diagnosed("pair")
-    assert found.verdict == "effect"
-    assert {effect.name for effect in found.effects} == {"hysteresis", "regulator_delay"}
-    delay = next(each for each in found.effects if each.name == "regulator_delay")
+    diagnosis = diagnosed("pair")
+    assert diagnosis.verdict == "effect"
+    assert {effect.name for effect in diagnosis.effects} == {"hysteresis", "regulator_delay"}
+    delay = next(each for each in diagnosis.effects if each.name == "regulator_delay")
     assert delay.parameters["delay_ms"].value == pytest.approx(20.0, abs=2.0)
 
 
 def test_what_never_moves_decides_nothing():
-    found = standing()
-    assert found.verdict == "undecidable"
-    assert found.next_experiment is not None
-    assert found.next_experiment.excitation in found.sentence
-    assert found.next_experiment.separates
-    moves = found.next_experiment.trial.commands
+    diagnosis = standing()
+    assert diagnosis.verdict == "undecidable"
+    assert diagnosis.next_experiment is not None
+    assert diagnosis.next_experiment.excitation in diagnosis.sentence
+    assert diagnosis.next_experiment.separates
+    moves = diagnosis.next_experiment.trial.commands
     assert any(np.ptp(row) > 0.0 for row in moves.values())
-    assert len(found.not_detectable) > 10
+    assert len(diagnosis.not_detectable) > 10
 
 
 def test_what_stands_still_does_not_identify_what_moves():
-    found = standing()
-    assert "damping.contracting_n_s_per_mm" in found.not_identifiable
-    assert all(found.not_identifiable.values())
+    diagnosis = standing()
+    assert "damping.contracting_n_s_per_mm" in diagnosis.not_identifiable
+    assert all(diagnosis.not_identifiable.values())
 
 
 def test_floors_are_the_sensors_noise():
-    found = diagnosed("nothing", 4, 128.0)
+    diagnosis = diagnosed("nothing", 4, 128.0)
     factors = (1e-3, np.pi / 180.0, 1.0, 1e3)
-    for floor, level, factor in zip(found.floors.values(), LEVELS, factors, strict=True):
+    for floor, level, factor in zip(diagnosis.floors.values(), LEVELS, factors, strict=True):
         assert floor.value * factor == pytest.approx(level, rel=0.25)
 
 
 def test_an_amended_model_carries_its_intervals():
-    found = diagnosed("hysteresis")
-    note = found.model.notes["hysteresis.force_n"]
-    estimate = found.effects[0].parameters["force_n"]
+    diagnosis = diagnosed("hysteresis")
+    note = diagnosis.model.notes["hysteresis.force_n"]
+    estimate = diagnosis.effects[0].parameters["force_n"]
     assert (note.low, note.high) == pytest.approx((estimate.low, estimate.high))
 
 
@@ -180,8 +180,8 @@ def test_trials_left_out_bear_an_effect_out_together_or_in_most_folds(with_it, w
 
 
 def test_an_effect_that_is_not_borne_out_is_said_to_be_likeliest():
-    found = replace(diagnosed("hysteresis"), verdict="undecidable")
-    said = sentence(found)
+    diagnosis = replace(diagnosed("hysteresis"), verdict="undecidable")
+    said = sentence(diagnosis)
     assert "misses something, hysteresis" in said and "most likely" in said
     assert "left out of these 3 trials does not confirm it" in said
 
@@ -246,10 +246,10 @@ UNKNOWN = {
 
 @pytest.mark.parametrize(("reason", "said"), UNKNOWN.values(), ids=UNKNOWN)
 def test_an_unknown_says_what_the_best_leave_and_which_figure_is_beyond_its_limit(reason, said):
-    found = replace(diagnosed("hysteresis"), verdict="unknown", tones={"load_n": 12.5})
+    diagnosis = replace(diagnosed("hysteresis"), verdict="unknown", tones={"load_n": 12.5})
     head = "Something is missing in model lab that no effect of the catalogue carries: "
     tone = " What is left of load oscillates at 12.5 Hz."
-    assert sentence(found, reason) == head + said + tone
+    assert sentence(diagnosis, reason) == head + said + tone
 
 
 def made_up(chosen=("creep",), *, gate=True, missing=False, gain=200.0):
@@ -299,9 +299,9 @@ def test_what_is_within_its_limits_is_not_unknown(same_size):
         ResidualFraction(unknown.MOST_LEFT, unknown.MOST_AUTOCORRELATED),
         SimpleNamespace(gain=260.0),
     )
-    found = made_up()
-    assert unknown.why_unknown(found, left, [law]) is None
-    assert decision.verdict_of(found, None, (), False, False) == "effect"
+    diagnosis = made_up()
+    assert unknown.why_unknown(diagnosis, left, [law]) is None
+    assert decision.verdict_of(diagnosis, None, (), False, False) == "effect"
 
 
 @pytest.mark.parametrize(
@@ -312,11 +312,11 @@ def test_what_is_within_its_limits_is_not_unknown(same_size):
     ],
 )
 def test_the_first_figure_beyond_its_limit_is_the_reason(same_size, left, why, figure, limit):
-    found = made_up(("creep", "filling"))
-    reason = unknown.why_unknown(found, left, [])
+    diagnosis = made_up(("creep", "filling"))
+    reason = unknown.why_unknown(diagnosis, left, [])
     assert (reason.why, reason.figure, reason.limit) == (why, figure, limit)
     assert (reason.effects, reason.leaves) == (("creep", "filling"), left.slow)
-    assert decision.verdict_of(found, reason, (), False, False) == "unknown"
+    assert decision.verdict_of(diagnosis, reason, (), False, False) == "unknown"
 
 
 def test_a_size_that_scatters_is_told_by_where_it_scatters_most(same_size):
@@ -361,26 +361,26 @@ def test_nothing_added_and_nothing_slow_is_for_other_verdicts(same_size):
 
 
 def test_nothing_is_held_out_of_a_single_trial():
-    found = diagnosed("nothing", 1)
-    assert all(not record.held_out for record in found.trials)
+    diagnosis = diagnosed("nothing", 1)
+    assert all(not record.held_out for record in diagnosis.trials)
 
 
 def test_every_trial_has_its_curves():
     trials = laboratory("hysteresis")[0]
-    found = diagnosed("hysteresis")
-    assert len(found.trials) == len(trials)
-    for record, trial in zip(found.trials, trials, strict=True):
+    diagnosis = diagnosed("hysteresis")
+    assert len(diagnosis.trials) == len(trials)
+    for record, trial in zip(diagnosis.trials, trials, strict=True):
         shape = (len(trial), 4)
         assert record.measured.shape == record.before.shape == record.after.shape == shape
         assert np.array_equal(record.measured[:, 2], trial.measurements["load"])
 
 
 def test_every_candidate_is_accounted_for():
-    found = diagnosed("hysteresis")
-    assert len(found.candidates) > 25
-    assert len({each.name for each in found.candidates}) == len(found.candidates)
-    assert all(each.why for each in found.candidates)
-    assert set(found.not_detectable) <= {each.name for each in found.candidates}
+    diagnosis = diagnosed("hysteresis")
+    assert len(diagnosis.candidates) > 25
+    assert len({each.name for each in diagnosis.candidates}) == len(diagnosis.candidates)
+    assert all(each.why for each in diagnosis.candidates)
+    assert set(diagnosis.not_detectable) <= {each.name for each in diagnosis.candidates}
 
 
 def _given(path):

@@ -18,19 +18,19 @@ def without(columns, start, stop):
 
 def size_of(dataset, name):
     """An effect's size in a diagnosis that names it alone."""
-    found = diagnose(dataset, GIVEN, propose=False)
-    assert [each.name for each in found.effects] == [name], found.sentence
-    return found.effects[0].parameters
+    diagnosis = diagnose(dataset, GIVEN, propose=False)
+    assert [each.name for each in diagnosis.effects] == [name], diagnosis.sentence
+    return diagnosis.effects[0].parameters
 
 
 def test_missing_rows_cut_a_trial_and_the_effect_is_still_named(tmp_path):
     folder = write(tmp_path / "lab", [without(each, 2.0, 3.4) for each in logs(seconds=8.0)])
-    found = checked(folder)
-    assert found.checked[0].startswith("all files: about 140 rows are missing from 1.99 to 3.4 s")
-    assert "the trial is cut there; 2 pieces" in found.checked[0]
-    names = [each.name for each in found.trials]
+    data = checked(folder)
+    assert data.checked[0].startswith("all files: about 140 rows are missing from 1.99 to 3.4 s")
+    assert "the trial is cut there; 2 pieces" in data.checked[0]
+    names = [each.name for each in data.trials]
     assert names[:2] == ["trial0.csv", "trial0.csv from 3.4 s"]
-    assert size_of(found, "hysteresis")["force_n"].value == pytest.approx(20.0, abs=0.5)
+    assert size_of(data, "hysteresis")["force_n"].value == pytest.approx(20.0, abs=0.5)
 
 
 def test_a_command_that_is_missing_while_it_moves_cuts_a_trial(tmp_path):
@@ -39,11 +39,11 @@ def test_a_command_that_is_missing_while_it_moves_cuts_a_trial(tmp_path):
         volts = each["motor_voltage_v"].copy()
         volts[200:260] = np.nan
         each["motor_voltage_v"] = volts
-    found = checked(write(tmp_path / "lab", written))
-    assert found.checked[0].startswith(
+    data = checked(write(tmp_path / "lab", written))
+    assert data.checked[0].startswith(
         "all files: motor_voltage_v has no value in 60 rows from 1.99 to 2.6 s (0.61 s)"
     )
-    assert len(found) == 6
+    assert len(data) == 6
 
 
 def test_a_command_that_is_written_once_is_held_and_no_gap(tmp_path):
@@ -60,24 +60,24 @@ def test_trials_that_begin_in_motion_get_a_start_of_their_own(tmp_path):
     for columns, begin in zip(logs(seconds=8.0), (1.3, 1.5, 1.2), strict=True):
         kept = {name: values[columns["time_s"] >= begin] for name, values in columns.items()}
         written.append(kept | {"time_s": kept["time_s"] - kept["time_s"][0]})
-    found = checked(write(tmp_path / "lab", written))
-    assert len(found.checked) == 3
-    for words, each in zip(found.checked, found.trials, strict=True):
+    data = checked(write(tmp_path / "lab", written))
+    assert len(data.checked) == 3
+    for words, each in zip(data.checked, data.trials, strict=True):
         assert f"{each.name} begins at 0.0" in words
         assert "m/s (contraction_mm), not at rest: commands that lead there from rest" in words
         # It begins settled: no command moves in its first rows, nothing counts there.
         assert np.ptp(each.trial.commands["motor_voltage"][:20]) == 0.0
         assert np.isnan(each.trial.measurements["contraction"][:100]).all()
-    sizes = size_of(found, "hysteresis")
+    sizes = size_of(data, "hysteresis")
     assert sizes["force_n"].value == pytest.approx(20.0, abs=0.5)
     assert sizes["distance_mm"].value == pytest.approx(3.0, abs=0.15)
 
 
 def test_a_piece_too_short_to_forget_its_beginning_is_named_and_left_out(tmp_path):
     columns = without(log(2.0, 300.0, 1, seconds=4.2), 2.0, 3.5)
-    found = checked(write(tmp_path / "lab", [columns]))
-    assert [each.name for each in found.trials] == ["trial0.csv"]
-    assert "depends on how it began: it is not used; begin the log at rest" in found.checked[-1]
+    data = checked(write(tmp_path / "lab", [columns]))
+    assert [each.name for each in data.trials] == ["trial0.csv"]
+    assert "depends on how it began: it is not used; begin the log at rest" in data.checked[-1]
 
 
 def test_copies_are_used_once(tmp_path):
@@ -85,10 +85,10 @@ def test_copies_are_used_once(tmp_path):
     later = {name: v + 100.0 * (name == "time_s") for name, v in originals[0].items()}
     folder = write(tmp_path / "lab", [*originals, originals[1], later])
     (folder / "dataset.toml").write_text('[trials."trial2.csv"]\nrepeat_of = "trial3.csv"\n')
-    found = checked(folder)
-    assert [each.name for each in found.trials] == ["trial0.csv", "trial1.csv", "trial2.csv"]
-    assert found.trials[2].repeat_of == "trial1.csv"
-    assert sorted(found.checked) == [
+    data = checked(folder)
+    assert [each.name for each in data.trials] == ["trial0.csv", "trial1.csv", "trial2.csv"]
+    assert data.trials[2].repeat_of == "trial1.csv"
+    assert sorted(data.checked) == [
         f"{copy} has the same content as {first}: a copy is no second measurement, it is used once"
         for copy, first in (("trial3.csv", "trial1.csv"), ("trial4.csv", "trial0.csv"))
     ]
@@ -131,11 +131,11 @@ def test_rounded_stamps_agree_as_even_ones_do(tmp_path):
     written = logs(truth=GIVEN, rate=384.0, seconds=4.0)
     for each in written:
         each["time_s"] = np.rint(1e3 * each["time_s"]) / 1e3
-    found = checked(write(tmp_path / "lab", written))
-    (words,) = found.checked
+    data = checked(write(tmp_path / "lab", written))
+    (words,) = data.checked
     assert words.startswith("all files: time_s is rounded to 1 ms by the logger")
-    assert np.ptp(np.diff(found.trials[0].trial.time)) < 1e-9
-    assert diagnose(found, GIVEN, propose=False).verdict in ("agrees", "undecidable")
+    assert np.ptp(np.diff(data.trials[0].trial.time)) < 1e-9
+    assert diagnose(data, GIVEN, propose=False).verdict in ("agrees", "undecidable")
 
 
 def test_long_logs_are_averaged(tmp_path, monkeypatch):
@@ -144,9 +144,9 @@ def test_long_logs_are_averaged(tmp_path, monkeypatch):
     columns = log(2.0, 300.0, 1, rate=500.0, seconds=8.0)
     columns["motor_voltage_v"][2000:] = 1.0
     folder = write(tmp_path / "lab", [columns])
-    found = checked(folder)
-    assert "readings are averaged over 4 rows each, which leaves" in found.checked[-1]
-    (given,), (fewer,) = read_dataset(folder).trials, found.trials
+    data = checked(folder)
+    assert "readings are averaged over 4 rows each, which leaves" in data.checked[-1]
+    (given,), (fewer,) = read_dataset(folder).trials, data.trials
     assert len(fewer.trial) < 1100
     # The commands are the same courses, the jump included.
     joined = np.interp(given.trial.time, fewer.trial.time, fewer.trial.commands["motor_voltage"])

@@ -36,9 +36,9 @@ def spoilt(name, factor, offset):
 
 def lines_of(message):
     """The lines that a message proposes, as a dataset.toml would have them."""
-    found = re.findall(r'("(?:[^"\\]|\\.)+" = \{[^}]*\})', message)
-    assert found
-    return "[columns]\n" + "\n".join(found) + "\n"
+    matches = re.findall(r'("(?:[^"\\]|\\.)+" = \{[^}]*\})', message)
+    assert matches
+    return "[columns]\n" + "\n".join(matches) + "\n"
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -200,8 +200,8 @@ def test_missing_physics_is_no_unit(tmp_path, name, row):
             },
         )
         named.append(NamedTrial(f"trial{number}", trial))
-    found = check_dataset(Dataset("", None, tuple(named), tmp_path), GIVEN)
-    assert [words for words in found.checked or () if "late" not in words] == []
+    data = check_dataset(Dataset("", None, tuple(named), tmp_path), GIVEN)
+    assert [words for words in data.checked or () if "late" not in words] == []
 
 
 def test_signals_that_are_late_together_are_named(tmp_path):

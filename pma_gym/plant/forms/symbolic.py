@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from pma_gym.codegen.rebinding import rebind
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.notation import Names, Notation
+from pma_gym.plant.forms.notation import Names, Notation
 
 if TYPE_CHECKING:
     import sympy
