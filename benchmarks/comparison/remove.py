@@ -42,7 +42,7 @@ def _removed(name: str, path: Path) -> int:
     specs = info.get("contenders")
     if isinstance(specs, dict) and name in specs:
         rest = {each: entry for each, entry in specs.items() if each != name}
-        write_run(path.parent, info, specs=rest)
+        write_run(path.parent, info, contenders=rest)
     return count
 
 
