@@ -165,7 +165,7 @@ def test_gains_are_of_the_kind_of_task_and_of_the_loop(controller, station):
     late = replace(base, period=0.02, action_delay=0.02)
     slow = scheduled_gains(controller, late)
     assert slow.integral < 0.7 * scheduled_gains(controller, base).integral
-    # Heard late is as bad as obeyed late.
+    # A delay of the measurement counts as one of the command does.
     delayed = replace(base, period=0.02, observation_delay=0.02)
     assert scheduled_gains(controller, delayed) == slow
     # What was not tuned takes the gains of what is nearest in dead time: 5 to 10 ms, 50 to 40 ms.
@@ -196,15 +196,17 @@ def test_regulator_begins_at_the_voltage_that_holds_its_pressure(station, readin
     assert controller.act(reading(extension=-1e-3), PERIOD) < controller.act(reading(), 0.0)
 
 
-@pytest.mark.parametrize("kind", [PID, FeedforwardPID])
-def test_contraction_and_late_commands(kind, drive):
+@pytest.mark.parametrize(
+    ("kind", "error", "late_error"),
+    # PID alone has 0.0509 and 0.1174 mm, with gains tuned on the station before its refit.
+    [(PID, 0.051, 0.118), (FeedforwardPID, 0.05, 0.10)],
+)
+def test_contraction_and_late_commands(kind, error, late_error, drive):
     got, _ = drive(kind(), "isotonic", 200)
-    # Measured: 0.0509 mm, with gains tuned on the station before its hysteresis was refitted.
-    assert max(got.values()) <= 0.051
+    assert max(got.values()) <= error
     loop = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
     got, _ = drive(kind(), "isotonic", 200, **loop)
-    # Measured: 0.1174 mm, with the same gains of the earlier station.
-    assert max(got.values()) <= 0.118
+    assert max(got.values()) <= late_error
     got, _ = drive(kind(), "displacement", 200, **loop)
     assert got["displacement"] <= 0.10
 
