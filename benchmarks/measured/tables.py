@@ -134,7 +134,7 @@ def reverse_words(result: Measured) -> Iterator[str]:
 
 
 def _hypothesis_words(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
-    """What was thought of when the tables had been seen: told, and never counted."""
+    """Hypotheses made after the tables were seen: listed, and never counted."""
     for each in explanations:
         if each.hypothesis:
             size = ", ".join(f"{name} {value:.3g}" for name, value in each.values.items())

@@ -104,7 +104,7 @@ class Selection:
         problem: with the noise that it leaves.
         refitted: the model with its own parameters refitted alone; better than what the selection
             began with, where it had been caught.
-        undetermined: parameters of the suspects that left their laws, by path (`nested_laws`).
+        undetermined: parameters of the candidates that left their laws, by path (`nested_laws`).
     """
 
     stages: tuple[Stage, ...]
