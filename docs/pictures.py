@@ -8,6 +8,7 @@ from pathlib import Path
 
 import gymnasium as gym
 import matplotlib.image
+from moving_picture import draw_moving_picture
 from rich.console import Console
 
 import pma_gym  # noqa: F401 - registers the environments
@@ -85,6 +86,7 @@ def draw_exercise() -> None:
 
 if __name__ == "__main__":
     draw_station()
+    draw_moving_picture(IMAGES / "rotation.gif")
     draw_diagnosis()
     draw_hidden_effects()
     draw_exercise()

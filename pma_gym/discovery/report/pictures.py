@@ -35,7 +35,9 @@ def gap_picture(gaps: dict[str, Gap], names: Sequence[str]) -> bytes:
         panels = np.atleast_1d(np.array(drawn.subplots(1, len(gaps)), dtype=object))
         for panel, (signal, gap) in zip(panels, gaps.items(), strict=True):
             values = [gap.before, gap.parameters, gap.after]
-            bars = panel.bar(names, values, color=[BEFORE, PARAMETERS, AFTER], width=0.65)
+            # A word a line: names of two words would touch their neighbours.
+            lines = [name.replace(" ", "\n") for name in names]
+            bars = panel.bar(lines, values, color=[BEFORE, PARAMETERS, AFTER], width=0.65)
             # Misfit in its unit, and below it in noises.
             labels = [f"{figure(v)}\n{figure(v / gap.floor, 2)} x noise" for v in values]
             panel.bar_label(bars, labels, padding=2, fontsize="small")
