@@ -6,10 +6,8 @@ from importlib import metadata
 from rich.console import Console
 from rich.table import Table
 
-from pma_gym.effects import CATALOGUE
-from pma_gym.effects.effect import Value
 from pma_gym.envs import ENVIRONMENTS
-from pma_gym.plant.model import Model, Note, load_model, shipped_models
+from pma_gym.plant.model import Model, load_model, shipped_models
 
 _PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
@@ -39,26 +37,10 @@ def print_model(model: Model, console: Console) -> None:
         table.add_column(name, justify="right")
     table.add_column("unit")
     table.add_column("source")
-    for effect in model.parameters:
-        table.add_section()
-        shown = effect
-        stems = CATALOGUE[effect].names_at_the_door()
-        for door, value in model.at_the_door(effect).items():
-            note = model.notes.get(f"{effect}.{door}", Note())
-            unit = CATALOGUE[effect].quantities[stems[door]].unit
-            cells = (stems[door], _text(value), _interval(note), unit, note.source)
-            table.add_row(shown, *cells)
-            shown = ""
+    before = ""
+    for row in model.rows():
+        if row.effect != before:
+            table.add_section()
+        shown, before = "" if row.effect == before else row.effect, row.effect
+        table.add_row(shown, row.parameter, row.value_text, row.interval_text, row.unit, row.source)
     console.print(table)
-
-
-def _text(value: Value) -> str:
-    if isinstance(value, tuple):
-        return ", ".join(_text(one) for one in value)
-    return f"{value:.6g}"
-
-
-def _interval(note: Note) -> str:
-    if note.low is None or note.high is None:
-        return ""
-    return f"{note.low:.4g} to {note.high:.4g}"
