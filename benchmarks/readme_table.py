@@ -20,10 +20,8 @@ from benchmarks.reproduction.score import PHASES, UNITS
 from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = tuple(
-    ROOT / name
-    for name in ("README.md", "docs/results.md", "docs/measured.md", "docs/notebook/reproduction.md")
-)
+PAGES = ("results.md", "measured.md", "notebook/reproduction.md")
+FILES = (ROOT / "README.md", *(ROOT / "docs" / name for name in PAGES))
 SCORES = ROOT / "results" / "reproduction" / "scores.json"
 
 Run = Mapping[str, Any]

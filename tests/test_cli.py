@@ -168,7 +168,7 @@ def test_a_folder_is_no_command_file(run, ramp):
 
 
 def test_an_empty_command_cell_holds_the_value_before_it(run, tmp_path):
-    """As docs/reference/data-files.md says, even where commands are joined linearly."""
+    """As docs/data.md says, even where commands are joined linearly."""
     (tmp_path / "gap.csv").write_text(f"{WISHES}\n0,0,300\n1,,\n2,3,\n")
     (tmp_path / "full.csv").write_text(f"{WISHES}\n0,0,300\n1,0,300\n2,3,300\n")
     loads = {}
@@ -179,7 +179,7 @@ def test_an_empty_command_cell_holds_the_value_before_it(run, tmp_path):
 
 
 def test_a_trial_begins_settled_at_its_first_row(run, tmp_path):
-    """As docs/reference/data-files.md says: an episode that began at rest needs a first row of 0 V."""
+    """As docs/data.md says: an episode that began at rest needs a first row of 0 V."""
     extensions = {}
     for name, first in (("pulled", ""), ("rest", "-0.01,0,300\n")):
         (tmp_path / f"{name}.csv").write_text(f"{WISHES}\n{first}0,3,300\n1,3,300\n")

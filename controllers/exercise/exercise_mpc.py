@@ -66,7 +66,7 @@ class ExerciseMPC:
 
     Mean RMSE by phase of 16 operators of seeds from 1000000 on, nominal station, by which settings
     were tried. All figures here were measured behind an earlier, looser safety layer of the
-    exercises of a moment; behind the one of now their errors are larger (`docs/notebook/exercise-bounds.md`):
+    exercises of a moment; behind the one of now their errors are larger (`docs/exercise.md`):
 
         =============================  ================  =================
         .                              isokinetic (deg)  isotonic (N m)

@@ -143,7 +143,7 @@ def card(policy: PolicyFile, seeds: int) -> str:
             "",
             "Limits: for this control rate and delay alone (others are refused), for stations like "
             "those of the recipe; at a limit of the rig it knows no more than its training showed "
-            "it. How busy its voltage is stands in docs/notebook/policies.md. Never run on a real rig.",
+            "it. How busy its voltage is stands in docs/policies.md. Never run on a real rig.",
             "",
         ]
     )
