@@ -21,8 +21,14 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command("hidden-effects")(hidden_effects)
-    app.command("hidden-effects-report")(hidden_effects_report)
+    app.command(
+        "hidden-effects",
+        epilog="Example: python -m benchmarks hidden-effects --block single --n 20",
+    )(hidden_effects)
+    app.command(
+        "hidden-effects-report",
+        epilog="Example: python -m benchmarks hidden-effects-report results/blocks/single-0",
+    )(hidden_effects_report)
 
 
 def hidden_effects(
