@@ -39,7 +39,7 @@ class HiddenEffect:
         """What it makes of the drive."""
         return drive
 
-    def reading(self) -> "Reading | None":
+    def reading(self) -> "SensorLink | None":
         """What it makes of the position sensor, None if nothing."""
         return None
 
@@ -53,7 +53,7 @@ class HiddenEffect:
 
 
 @dataclass(frozen=True)
-class Reading:
+class SensorLink:
     """What is between the axis and its position sensor.
 
     Attributes:
@@ -221,8 +221,8 @@ class ChannelDelay(HiddenEffect):
 
     name: ClassVar[str] = "channel_delay"
 
-    def reading(self) -> Reading:  # noqa: D102
-        return Reading(delay=self.size)
+    def reading(self) -> SensorLink:  # noqa: D102
+        return SensorLink(delay=self.size)
 
 
 @dataclass(frozen=True)
@@ -231,8 +231,8 @@ class Backlash(HiddenEffect):
 
     name: ClassVar[str] = "backlash"
 
-    def reading(self) -> Reading:  # noqa: D102
-        return Reading(play=self.size)
+    def reading(self) -> SensorLink:  # noqa: D102
+        return SensorLink(play=self.size)
 
 
 @dataclass(frozen=True)

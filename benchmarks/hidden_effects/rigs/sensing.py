@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from benchmarks.hidden_effects.rigs.laws import Reading
+from benchmarks.hidden_effects.rigs.laws import SensorLink
 from benchmarks.hidden_effects.rigs.noise import Noise, draw_noise
 from benchmarks.hidden_effects.rigs.rig import Rig, log_uniform
 
@@ -45,7 +45,7 @@ class Sensed:
 
     sensor: Sensor
     noise: Array
-    between: Sequence[Reading]
+    between: Sequence[SensorLink]
     interval: float
     exact: list[float] = field(default_factory=list)
     _past: list[float] = field(default_factory=list)

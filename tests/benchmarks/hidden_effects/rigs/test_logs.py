@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.hidden_effects.rigs import effect_size, laws, stick_slip
 from benchmarks.hidden_effects.rigs.drive import Drive, Transmission
-from benchmarks.hidden_effects.rigs.laws import Reading
+from benchmarks.hidden_effects.rigs.laws import SensorLink
 from benchmarks.hidden_effects.rigs.noise import Noise
 from benchmarks.hidden_effects.rigs.rig import Rig
 from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor
@@ -62,10 +62,10 @@ def sensed(readings, positions, step=1e-9):
 
 def test_readings_are_late_and_have_play():
     positions = np.sin(np.linspace(0.0, 9.0, 300))
-    late = sensed([Reading(delay=0.025)], positions)
+    late = sensed([SensorLink(delay=0.025)], positions)
     rows = np.arange(300)
     assert late == pytest.approx(np.interp(rows - 2.5, rows, positions), abs=1e-8)
-    played = sensed([Reading(play=0.2)], positions)
+    played = sensed([SensorLink(play=0.2)], positions)
     assert played.max() == pytest.approx(positions.max() - 0.1, abs=1e-6)
     # Past the turn it waits until the play is used up.
     assert played[20:70] == pytest.approx(np.maximum.accumulate(positions)[20:70] - 0.1, abs=1e-8)
