@@ -105,7 +105,7 @@ KNOWN: dict[str, tuple[str, ...]] = {
 """What the catalogue has for each kind of rig."""
 
 GROUPS: tuple[frozenset[str], ...] = (
-    frozenset({"drive_delay", "drive_lag", "channel_delay"}),
+    frozenset({"drive_delay", "drive_lag", "lvdt_lag"}),
     frozenset({"coulomb_friction", "load_dependent_friction", "position_dependent_friction"}),
 )
 """Effects that usual logs cannot always tell apart; fixed before any held-out seed is run."""

@@ -11,6 +11,7 @@ from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size
+from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from pma_gym.data.datasets.dataset import read_dataset
@@ -47,18 +48,21 @@ def test_an_effect_has_the_size_that_was_drawn(case):
 
 
 def test_of_600_cases_200_hide_one_effect_100_two_and_200_none():
-    rigs = len(KNOWN)
-    kinds = Counter(drawing.KINDS[turn // rigs % len(drawing.KINDS)] for turn in range(600))
+    turns = [drawing.turn_of(number) for number in range(1, 601)]
+    kinds = Counter(kind for _, kind, _ in turns)
     assert kinds["one effect"] == kinds["nothing"] == 200
     assert kinds["two effects"] == kinds["outside"] == 100
+    halves = Counter(simulator for _, _, simulator in turns[: 12 * len(KNOWN)])
+    assert halves["own"] == halves["MuJoCo"]
+    assert len(set(turns)) == 4 * len(KNOWN) * 2
 
 
 def test_a_pilot_is_the_beginning_of_its_file():
     """Each effect's size is set on the bits that the file then has."""
     rng = np.random.default_rng(5)
-    campaign = drawing._campaign(rng, "slide", "own", (5, 1))
-    short, long = (drawing.run(campaign, (), 0, seconds) for seconds in (2.0, 3.0))
-    assert np.array_equal(long.log.readings[: len(short.log.readings)], short.log.readings)
+    campaign = draw_driven(rng, "slide", "own", (5, 1))
+    short, long = (campaign.run((), 0, seconds) for seconds in (2.0, 3.0))
+    assert np.array_equal(long.readings[: len(short.readings)], short.readings)
     plain = effect_size.change(campaign.rig, [long.motion], [long.exact])
     assert effect_size.size(plain, campaign.sensor.rms) < 0.1
 
