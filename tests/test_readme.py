@@ -120,7 +120,8 @@ def test_the_package_carries_it():
 
 def table(name):
     """Header and rows of a block of figures."""
-    block = (RESULTS + RECORD).split(f"<!-- figures: {name} -->")[1].split("<!-- end of figures -->")[0]
+    _, after = (RESULTS + RECORD).split(f"<!-- figures: {name} -->")
+    block = after.split("<!-- end of figures -->")[0]
     lines = [line.strip("| ").split(" | ") for line in block.strip().splitlines()]
     return lines[0], lines[2:]
 
