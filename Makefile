@@ -10,7 +10,7 @@ BENCH_ARGS ?=
 EXAMPLES ?= 100000
 NAMES ?=
 
-EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines,docs,dev
+EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines,foreign,docs,dev
 # Windows has its programs elsewhere, with another ending.
 BIN = $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PIP = $(BIN)/pip$(if $(filter Windows_NT,$(OS)),.exe)
@@ -26,7 +26,7 @@ export NO_MKDOCS_2_WARNING = 1
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .PHONY: help bench peers test examples fuzz test-integrations test-lower-bounds kills lint style types layers
-.PHONY: pages forms docs build release-check clean distclean
+.PHONY: spelling pages forms docs build release-check clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -76,11 +76,18 @@ KILLS ?= 200
 kills: $(FULL) ## Kill long commands at random moments, resume them, count losses (KILLS=200).
 	$(BIN)/python -m tests.kills.kill_and_resume --kills $(KILLS)
 
-lint: style types layers pages forms ## Check style, types, layers and documentation (-k: all, whatever fails).
+lint: style spelling types layers pages forms ## Check style, types, layers and documentation (-k: all, whatever fails).
 
 style: $(FULL)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+# Tests misspell on purpose: messages name the word that was meant.
+SPELT = docs README.md CONTRIBUTING.md CHANGELOG.md pma_gym controllers benchmarks
+
+spelling: $(FULL)
+	$(BIN)/codespell $(SPELT)
+	$(BIN)/python -m pytest -q tests/test_words.py tests/test_pages.py
 
 types: $(FULL)
 	$(BIN)/pyright --pythonpath $(BIN)/python

@@ -20,7 +20,8 @@ from benchmarks.reproduction.score import PHASES, UNITS
 from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = tuple(ROOT / name for name in ("README.md", "docs/benchmark.md", "docs/results.md"))
+PAGES = ("results.md", "measured.md", "notebook/reproduction.md")
+FILES = (ROOT / "README.md", *(ROOT / "docs" / name for name in PAGES))
 SCORES = ROOT / "results" / "reproduction" / "scores.json"
 
 Run = Mapping[str, Any]
@@ -240,7 +241,7 @@ def main(
         bool, typer.Option("--kept", help="Only figures that docs/figures keeps; needs no run.")
     ] = False,
 ) -> None:
-    """Put a run's figures into README.md and docs/benchmark.md."""
+    """Put a run's figures into README.md and the pages of results."""
     try:
         run = None if kept else load_run(scores)
         texts = {path: path.read_text(encoding="utf-8") for path in FILES}

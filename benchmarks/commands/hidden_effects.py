@@ -35,7 +35,7 @@ def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, undecidable, or all."
+            help="single, faint, nothing, parameters, pair, unknown, undecidable, rigs, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],
