@@ -79,9 +79,8 @@ class DrivenCampaign:
         noise = self._noise(i)
         between = [r for r in (each.reading() for each in effects) if r is not None]
         sensed = Sensed(self.sensor, noise, between, 1.0 / rig.rate)
-        # A drive that is off moves nothing only where nothing else does.
-        released = not rig.gravity and not any(each.force(0.0, 0.0, 0.0) for each in effects)
-        controller = Controller(self.believed, reference, sensed, self.bandwidth, released)
+        rests = self._rests(effects)
+        controller = Controller(self.believed, reference, sensed, self.bandwidth, rests)
         transmission = Transmission()
         for each in effects:
             transmission = each.transmission(transmission)
@@ -123,7 +122,11 @@ class DrivenCampaign:
                 }
             )
         model = files.MODELS[self.rig.kind](self.believed, limit, self.sensor.rms)
-        return files.folder(self.rig.rate, tables, self.repeats, model)
+        # Without a repeat or a rest nothing but the sensor's data sheet says how much is noise.
+        stated = (
+            {} if self.repeats or self._rests(effects) else {position: factor * self.sensor.rms}
+        )
+        return files.folder(self.rig.rate, tables, self.repeats, model, stated)
 
     def truth(self) -> dict[str, Any]:
         """What nobody must read before the diagnosis is made, besides the effects."""
@@ -138,6 +141,11 @@ class DrivenCampaign:
             "noise": {position: self.sensor.rms * factor},
             "noise_kinds": self.sensor.noise.names,
         }
+
+    def _rests(self, effects: Sequence[HiddenEffect]) -> bool:
+        """Whether it rests while its drive is off: where nothing else moves it."""
+        pulled = any(each.force(0.0, 0.0, 0.0) for each in effects)
+        return not pulled and not self.rig.gravity * math.sin(self.rig.gravity_angle)
 
     def _noise(self, i: int) -> np.ndarray:
         rng = np.random.default_rng((*self.seed, i, 7))

@@ -14,7 +14,11 @@ Table = Mapping[str, tuple[Array, int]]
 
 
 def folder(
-    rate: float, tables: Sequence[Table], repeats: Mapping[int, int], model: str
+    rate: float,
+    tables: Sequence[Table],
+    repeats: Mapping[int, int],
+    model: str,
+    tolerance: Mapping[str, float],
 ) -> dict[str, str]:
     """Texts of a data set's files by name.
 
@@ -23,9 +27,12 @@ def folder(
         tables: of the files.
         repeats: by number of a file, from 0, the earlier one that it repeats.
         model: text of the model.
+        tolerance: by column, where the lab states one.
     """
     texts = {_name(i): _csv(rate, table) for i, table in enumerate(tables)}
     lines = ['title = "Logs of a drive"', 'model = "model.toml"']
+    if tolerance:
+        lines += ["", "[tolerance]", *(f"{key} = {_number(x)}" for key, x in tolerance.items())]
     for i in range(len(tables)):
         lines += ["", f'[trials."{_name(i)}"]', f"order = {i + 1}"]
         if i in repeats:

@@ -81,6 +81,9 @@ def simulate(
             drive.push(command)
             for i in range(steps):
                 world.step(drive.at(i * h))
+                if i == 0:
+                    # Only the step from a row on knows what accelerates there.
+                    table[row - 1, 1:3] = world.begun()
         table[row] = *world.state(), command
     return Motion(np.arange(rows) * interval, *table.T)
 
@@ -117,6 +120,11 @@ class World:
         """Position, speed and acceleration."""
         data = self.data
         return data.qpos[0], data.qvel[0] + 0.5 * self.h * data.qacc[0], data.qacc[0]
+
+    def begun(self) -> tuple[float, float]:
+        """Speed and acceleration where the last step began."""
+        data = self.data
+        return data.qvel[0] - 0.5 * self.h * data.qacc[0], data.qacc[0]
 
     def inverse(self, q: float, v: float, a: float, u: float) -> float:
         """Force of the drive (N, N m) that such a motion takes; `u` is what laws are given."""

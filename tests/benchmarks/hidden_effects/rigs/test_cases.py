@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
 from benchmarks.hidden_effects.rigs import drawing, effect_size
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
+from benchmarks.hidden_effects.rigs.laws import ConstantForce
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from pma_gym.data.datasets.dataset import read_dataset
@@ -63,8 +65,33 @@ def test_a_pilot_is_the_beginning_of_its_file():
     campaign = draw_driven(rng, "slide", "own", (5, 1))
     short, long = (campaign.run((), 0, seconds) for seconds in (2.0, 3.0))
     assert np.array_equal(long.readings[: len(short.readings)], short.readings)
-    plain = effect_size.change(campaign.rig, [long.motion], [long.exact])
-    assert effect_size.size(plain, campaign.sensor.rms) < 0.1
+
+
+@pytest.mark.parametrize("kind", ["slide", "joint"])
+@pytest.mark.parametrize("simulator", ["own", "MuJoCo"])
+def test_no_effect_has_no_size(kind, simulator):
+    """An integrator's error would be an effect that nobody hid: encoders of 50 nm show it."""
+    if simulator == "MuJoCo":
+        pytest.importorskip("mujoco")
+    for seed in (2, 3):
+        campaign = draw_driven(np.random.default_rng(seed), kind, simulator, (5, seed))
+        motion = (run := campaign.run((), 0, 4.0)).motion
+        plain = effect_size.change(campaign.rig, [motion], [run.exact])
+        assert effect_size.size(plain, campaign.sensor.rms) < 1e-3
+
+
+def test_a_lab_without_rest_or_repeat_states_its_tolerance():
+    campaign = replace(draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)), repeats={})
+    campaign = replace(campaign, bandwidth=campaign.rig.frequency)
+    campaign = replace(campaign, references=[campaign.references[0]])
+    texts = campaign.texts([])
+    assert "tolerance" not in texts["dataset.toml"]
+    # The drive is off while it rests, and every reading is of one place.
+    rows = [line.split(",") for line in texts["run_01.csv"].splitlines()[1:100]]
+    assert {float(row[1]) for row in rows} == {0.0}
+    pulled = campaign.texts([ConstantForce(0.1 * campaign.rig.peak_force)])
+    stated = float(pulled["dataset.toml"].split("contraction_mm = ")[1].split()[0])
+    assert stated == pytest.approx(1e3 * campaign.sensor.rms, rel=1e-5)
 
 
 @pytest.mark.parametrize("draw", [lambda rng: draw_slide(rng, True), draw_joint])
