@@ -13,8 +13,7 @@ from benchmarks.report.margins import Condition, conditions, is_linear
 from benchmarks.report.standings import Standings
 from benchmarks.report.verdicts import Verdict, bounds_needed, verdicts
 from benchmarks.runner.provenance import check_run, finished_rows, read_run
-from benchmarks.suites.frozen import Entry, FrozenSuite
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
