@@ -10,7 +10,7 @@ BENCH_ARGS ?=
 EXAMPLES ?= 100000
 NAMES ?=
 
-EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines,docs,dev
+EXTRAS = bench,rl,rllib,scale,mpc,policies,onnx,view,files,symbolic,baselines,foreign,docs,dev
 # Windows has its programs elsewhere, with another ending.
 BIN = $(VENV)/$(if $(filter Windows_NT,$(OS)),Scripts,bin)
 PIP = $(BIN)/pip$(if $(filter Windows_NT,$(OS)),.exe)

@@ -21,25 +21,27 @@ from benchmarks.executors.executor import Executor
 
 def register(app: typer.Typer) -> None:
     """Make it what the program does without a command."""
-    app.callback()(reproduction)
+    app.callback(epilog="Example: python -m benchmarks --controllers pid --pressures 300")(
+        reproduction
+    )
 
 
 def reproduction(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "reproduction",
+    out: Annotated[Path, typer.Option(help="Folder.")] = RESULTS / "reproduction",
     controllers: Annotated[
-        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; all if empty.")
+        str, typer.Option(help="Names or file.py:Class by commas; else all.")
     ] = "",
     model: Annotated[
         str,
-        typer.Option(help="Models by commas: shipped names or TOML files; the suite's if empty."),
+        typer.Option(help="Names or TOML files by commas; else the suite's."),
     ] = "",
-    task: Annotated[str, typer.Option(help="displacement or rotation; both if empty.")] = "",
-    pressures: Annotated[str, typer.Option(help="Pressures in kPa by commas; all if empty.")] = "",
+    task: Annotated[str, typer.Option(help="displacement or rotation; else both.")] = "",
+    pressures: Annotated[str, typer.Option(help="In kPa by commas; else all.")] = "",
     jobs: Jobs = 2,
     executor: ExecutorOption = LOCAL,
 ) -> None:
-    """Run every controller through every trial and write the report (the main job)."""
+    """Run every controller through every trial and write the report."""
     if context.invoked_subcommand is not None:
         return
     try:

@@ -16,15 +16,19 @@ from benchmarks.commands.options import (
     listed,
     refuse,
 )
+from pma_gym.cli.options import JsonOption
+from pma_gym.cli.terminal import print_json
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(run)
-    app.command()(report)
-    app.command()(add)
-    app.command()(remove)
-    app.command()(suites)
+    app.command(
+        epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
+    )(run)
+    app.command(epilog="Example: python -m benchmarks report robust")(report)
+    app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
+    app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
+    app.command(epilog="Example: python -m benchmarks suites")(suites)
 
 
 def run(
@@ -146,9 +150,12 @@ def remove(
         refuse(error)
 
 
-def suites() -> None:
+def suites(as_json: JsonOption = False) -> None:
     """List the frozen suites: their versions, cases and controllers."""
-    from benchmarks.comparison.listing import print_suites
+    from benchmarks.comparison.listing import print_suites, suite_documents
     from pma_gym.terminal import SafeConsole
 
-    print_suites(SafeConsole())
+    if as_json:
+        print_json(suite_documents())
+    else:
+        print_suites(SafeConsole())

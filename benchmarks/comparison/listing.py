@@ -29,6 +29,24 @@ def print_suites(console: Console) -> None:
         console.print(f"  controllers: {names}", highlight=False)
 
 
+def suite_documents() -> list[dict[str, object]]:
+    """The frozen suites for programs: version, size, tasks and controllers."""
+    return [
+        {
+            "name": suite.name,
+            "version": suite.version,
+            "title": suite.title,
+            "stations": len(suite.stations),
+            "episodes": len(suite.episodes),
+            "cases": len(cases(suite, suite.entries)),
+            "tasks": list(suite.tasks),
+            "controllers": [entry.spec.name for entry in suite.entries],
+            "control_rate_hz": suite.control_rate_hz,
+        }
+        for suite in map(frozen_suite, suite_names())
+    ]
+
+
 def _control(suite: FrozenSuite) -> str:
     """Rate and delays, for people."""
     words = [f"{suite.control_rate_hz:g} Hz"]

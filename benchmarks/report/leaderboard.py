@@ -11,11 +11,13 @@ from benchmarks.comparison.command_lines import run_command
 from benchmarks.report.errors import Errors, Measure, Record, measures, pooled_measure, task_of
 from benchmarks.report.margins import Condition, conditions, is_linear
 from benchmarks.report.standings import Standings
+from benchmarks.report.tables import standings_table
 from benchmarks.report.verdicts import Verdict, bounds_needed, verdicts
 from benchmarks.runner.provenance import check_run, finished_rows, read_run
 from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
+from pma_gym.pages.notebook import notebook_html
 from pma_gym.tasks import ISOTONIC, TASKS, infeasibility_reason
 
 LOOP_TASKS = (*TASKS, *ISOTONIC)
@@ -104,6 +106,11 @@ class Leaderboard:
     @cached_property
     def _bound(self) -> Bounds:
         return self.bounds or Bounds(self.suite.model)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the standings in every measure."""
+        shown = [each for each in self.standings.values() if each.errors.values.size]
+        return notebook_html([standings_table(each, self.labels) for each in shown])
 
     @property
     def missing(self) -> list[Entry]:

@@ -25,8 +25,8 @@ _RANKS = (
     "1–3 means that these controllers cannot be told apart. Intervals come from 2000 resamples of "
     "what was drawn at random, stations or noise, the same for all controllers. “Over the best” "
     "compares two controllers on the same stations and so resolves far finer differences than "
-    "their two intervals. A failed case counts as an error of the whole range. `docs/scores.md` "
-    "defines every figure."
+    "their two intervals. A failed case counts as an error of the whole range. "
+    "`docs/reference/score-definitions.md` defines every figure."
 )
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,9 @@ from pma_gym.data.trial_checks import (
     check_values,
 )
 from pma_gym.data.trial_columns import BY_QUANTITY, COLUMNS, TrialError, suggestion
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["COMMANDS", "MEASUREMENTS", "TRUTH", "Trial", "TrialError"]
 
@@ -114,6 +118,27 @@ class Trial:
             TrialError: rotation was not measured.
         """
         return self._measured("rotation")
+
+    def plot(self) -> "Figure":
+        """Commands and measurements over time, a panel a column, in the units of files.
+
+        A notebook shows the figure; a script calls its `show()`, or `savefig("trial.png")`.
+        """
+        # Imported here: most programs that use trials draw none, and Matplotlib takes a while.
+        from pma_gym.data.trial_plot import plot_series, series_of
+
+        return plot_series({"": series_of(self)})
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the plot, and below it where the trial comes from."""
+        from pma_gym.pages.document import Paragraph, Picture
+        from pma_gym.pages.figures import png
+        from pma_gym.pages.notebook import notebook_html
+
+        notes = "; ".join(f"{name}: {text}" for name, text in self.provenance.items())
+        words = f"Trial: {len(self)} samples, {self.duration:.6g} s. {notes}"
+        blocks = [Paragraph(words.strip()), Picture("trial", "")]
+        return notebook_html(blocks, {"trial": png(self.plot())})
 
     def _check(self) -> None:
         def place(index: int) -> str:

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
+from pma_gym.pages.document import Block, Callout, TextTable
+from pma_gym.pages.notebook import notebook_html
 from pma_gym.plant.model import Model
 
 SCHEMA = 1
@@ -497,6 +499,27 @@ class Diagnosis:
             "warnings": list(self.warnings),
         }
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the verdict, the gap by signal, the effects and their sizes.
+
+        `pma_gym.discovery.report.page.report_page` writes the whole page.
+        """
+        tone = {"agrees": "good", "effect": "good", "parameters": "good", "unknown": "bad"}
+        blocks: list[Block] = [Callout(self.sentence, tone=tone.get(self.verdict, "open"))]
+        if self.gap:
+            blocks.append(
+                TextTable("Misfit (rms)", _GAP_HEADER, [*map(_gap_row, self.gap.items())])
+            )
+        rows = [
+            [effect.name, name, f"{size.value:.3g}", _interval_text(size), size.unit]
+            for effect in self.effects
+            for name, size in effect.parameters.items()
+        ]
+        if rows:
+            header = ["Effect", "Parameter", "Estimate", "95 % interval", "Unit"]
+            blocks.append(TextTable("Effects that are missing", header, rows, words=2))
+        return notebook_html(blocks)
+
     def text(self) -> str:
         """`document` as JSON; the same diagnosis gives the same bytes.
 
@@ -504,3 +527,18 @@ class Diagnosis:
             ValueError: a number that is not finite, which JSON does not know.
         """
         return json.dumps(self.document(), indent=1, allow_nan=False) + "\n"
+
+
+_GAP_HEADER = ["Column", "Model as given", "Parameters refitted", "Model proposed", "Noise"]
+
+
+def _gap_row(gap: tuple[str, Gap]) -> list[str]:
+    signal, sizes = gap
+    values = (sizes.before, sizes.parameters, sizes.after, sizes.floor)
+    return [signal, *(f"{value:.3g}" for value in values)]
+
+
+def _interval_text(size: Estimate) -> str:
+    if size.low is None or size.high is None:
+        return ""
+    return f"{size.low:.3g} to {size.high:.3g}"

@@ -132,7 +132,7 @@ def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
         pictures: PNG by name; one that is missing is left out.
     """
     title = next(block.text for block in blocks if isinstance(block, Heading))
-    body = "\n".join(_html_block(block, pictures) for block in blocks)
+    body = "\n".join(html_block(block, pictures) for block in blocks)
     page = _PAGE.read_text(encoding="utf-8")
     # Once and together: a title may hold `{body}`.
     parts = {"{title}": html.escape(printable(title)), "{body}": printable(body)}
@@ -160,7 +160,13 @@ def _without_tags(text: str) -> str:
     return re.sub(r"(`[^`\n]*`)|<(?=[A-Za-z/!?])", lambda match: match[1] or "&lt;", text)
 
 
-def _html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
+def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
+    """A block as HTML.
+
+    Args:
+        block: the block.
+        pictures: PNG by name; a picture that is missing is left out.
+    """
     match block:
         case Heading(text, level):
             return f"<h{level}>{_inline(text)}</h{level}>"

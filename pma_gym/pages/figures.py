@@ -1,13 +1,17 @@
 """How plots look, wherever they are drawn: one style, no screen, the same bytes every time."""
 
 import io
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.registry import BackendFilter, backend_registry
 from matplotlib.figure import Figure
+
+_WITHOUT_WINDOW = BackendFilter.NON_INTERACTIVE
 
 DPI = 120
 """Resolution of the PNGs (1/inch)."""
@@ -31,11 +35,42 @@ _RULES: dict[Any, Any] = {
 }
 
 
+class Plot(Figure):
+    """A figure that notebooks show, `savefig` writes and `show` opens in a window.
+
+    No list of open figures keeps it: many may be drawn without closing any.
+    """
+
+    def _repr_png_(self) -> bytes:
+        """What a notebook shows."""
+        return png(self)
+
+    def show(self, warn: bool = True) -> None:
+        """Open the figure in a window and wait until it is closed.
+
+        Args:
+            warn: say that there is no screen, where there is none; Matplotlib's argument.
+        """
+        from matplotlib import pyplot
+
+        if pyplot.get_backend().lower() in backend_registry.list_builtin(_WITHOUT_WINDOW):
+            if warn:
+                warnings.warn(
+                    f"Matplotlib's backend {pyplot.get_backend()} opens no window; write the "
+                    "figure with savefig('figure.png'), or set MPLBACKEND to one that does: QtAgg",
+                    stacklevel=2,
+                )
+            return
+        # Matplotlib makes a window only for a figure that it makes itself: it is given this one.
+        pyplot.figure(FigureClass=lambda *_, **__: self)  # type: ignore[arg-type]
+        pyplot.show()
+
+
 @contextmanager
-def picture(width: float, height: float) -> Iterator[Figure]:
+def picture(width: float, height: float) -> Iterator[Plot]:
     """An empty figure (inches) in the house style; drawn without a screen."""
     with mpl.rc_context(_RULES):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = Plot(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
 

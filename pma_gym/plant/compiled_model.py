@@ -73,6 +73,11 @@ class CompiledModel:
         """The effects' parameters (SI) by name."""
         return self.model.parameters
 
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the model's table, and the plant's states."""
+        states = f"<p>States: {', '.join(self.states)}</p>"
+        return self.model._repr_html_() + states
+
     def regulator_voltage(self, pressure: float) -> float:
         """Regulator voltage (V) that settles at a pressure (Pa).
 

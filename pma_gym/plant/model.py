@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -42,6 +42,41 @@ class Note:
     source: str = ""
     low: float | None = None
     high: float | None = None
+
+
+class ParameterRow(NamedTuple):
+    """A parameter as people read it.
+
+    Attributes:
+        effect: that it belongs to.
+        parameter: its name, without unit.
+        value: in `unit`; several numbers of a table.
+        low: lower end of its 95 % interval, or None.
+        high: upper end, or None.
+        unit: in files.
+        source: where the value comes from.
+    """
+
+    effect: str
+    parameter: str
+    value: Value
+    low: float | None
+    high: float | None
+    unit: str
+    source: str
+
+    @property
+    def value_text(self) -> str:
+        """The value in six digits."""
+        values = self.value if isinstance(self.value, tuple) else (self.value,)
+        return ", ".join(f"{value:.6g}" for value in values)
+
+    @property
+    def interval_text(self) -> str:
+        """The interval in four digits; empty where there is none."""
+        if self.low is None or self.high is None:
+            return ""
+        return f"{self.low:.4g} to {self.high:.4g}"
 
 
 @dataclass(frozen=True)
@@ -183,6 +218,30 @@ class Model:
     def at_the_door(self, effect: str) -> dict[str, Value]:
         """One effect's values by their names in files."""
         return CATALOGUE[effect].at_the_door(self.parameters[effect])
+
+    def rows(self) -> Iterator[ParameterRow]:
+        """Every parameter with its interval, unit and source, in the order of files."""
+        for effect in self.parameters:
+            stems = CATALOGUE[effect].names_at_the_door()
+            for door, value in self.at_the_door(effect).items():
+                note = self.notes.get(f"{effect}.{door}", Note())
+                unit = CATALOGUE[effect].quantities[stems[door]].unit
+                yield ParameterRow(
+                    effect, stems[door], value, note.low, note.high, unit, note.source
+                )
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a table of effects and parameters."""
+        from pma_gym.pages.document import TextTable
+        from pma_gym.pages.notebook import notebook_html
+
+        header = ["Effect", "Parameter", "Value", "95 % interval", "Unit", "Source"]
+        rows = [
+            [r.effect, r.parameter, r.value_text, r.interval_text, r.unit, r.source]
+            for r in self.rows()
+        ]
+        title = f"{self.name} ({self.plant}): {self.title}"
+        return notebook_html([TextTable(title, header, rows, words=2)])
 
     def paths(self) -> Iterator[str]:
         """Every parameter as `effect.parameter_unit`."""

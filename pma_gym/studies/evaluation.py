@@ -19,6 +19,8 @@ from pma_gym.metrics import (
     regression,
     rmse,
 )
+from pma_gym.pages.document import Paragraph, TextTable
+from pma_gym.pages.notebook import notebook_html
 from pma_gym.units import SI_FACTORS
 
 LONGEST_GAP = 0.2
@@ -61,7 +63,40 @@ class Evaluation:
         return float(f_distribution.sf(self.regression.f_ratio, 1, self.regression.error_dof))
 
 
-def evaluate(trial: Trial, task: str = "displacement", use_truth: bool = False) -> list[Evaluation]:
+class Evaluations(list[Evaluation]):
+    """A trial's phases, in order."""
+
+    @property
+    def title(self) -> str:
+        """What was judged."""
+        return f"Isokinetic {self[0].protocol.name}" if self else "No phases"
+
+    def documents(self) -> list[dict[str, float | int | str]]:
+        """A dictionary a phase, figures in the task's unit in files, all digits."""
+        return [_document(row) for row in self]
+
+    def rows(self) -> list[list[str]]:
+        """Rows of the dissertation's table: a label, then a figure a phase."""
+        by_phase = [_figures(row) for row in self]
+        return [
+            [figures[0][0], *(text for _, text in figures)]
+            for figures in zip(*by_phase, strict=True)
+        ]
+
+    def notes(self) -> list[str]:
+        """What was done to the samples of which phases, if anything."""
+        texts = dict.fromkeys(row.note for row in self if row.note)
+        named = {text: ", ".join(r.phase.name for r in self if r.note == text) for text in texts}
+        return [f"{phases}: {text}" for text, phases in named.items()]
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the table, and what was done to the samples."""
+        header = ["Phase", *(row.phase.name for row in self)]
+        table = TextTable(self.title, header, self.rows())
+        return notebook_html([table, *map(Paragraph, self.notes())])
+
+
+def evaluate(trial: Trial, task: str = "displacement", use_truth: bool = False) -> Evaluations:
     """Judge a trial as the dissertation judged its own.
 
     Each phase is sampled at 384 Hz for 1923 samples; a log on other times is interpolated
@@ -84,10 +119,11 @@ def evaluate(trial: Trial, task: str = "displacement", use_truth: bool = False) 
     position = _position(trial, protocol, use_truth)
     measured = ~np.isnan(position)
     time = trial.time - trial.time[0]
-    return [_row(protocol, phase, time[measured], position[measured]) for phase in protocol.phases]
+    known = time[measured], position[measured]
+    return Evaluations(_row(protocol, phase, *known) for phase in protocol.phases)
 
 
-def print_evaluation(rows: list[Evaluation], console: Console) -> None:
+def print_evaluation(rows: Evaluations, console: Console) -> None:
     """Print rows as tables 20-22 or 24-30 have them, in mm or deg.
 
     Args:
@@ -96,15 +132,14 @@ def print_evaluation(rows: list[Evaluation], console: Console) -> None:
     """
     if not rows:
         return
-    table = Table("Phase", title=f"Isokinetic {rows[0].protocol.name}")
+    table = Table("Phase", title=rows.title)
     for row in rows:
         table.add_column(row.phase.name, justify="right")
-    for figures in zip(*(_figures(row) for row in rows), strict=True):
-        table.add_row(figures[0][0], *(text for _, text in figures))
+    for cells in rows.rows():
+        table.add_row(*cells)
     console.print(table)
-    for note in dict.fromkeys(row.note for row in rows if row.note):
-        phases = ", ".join(row.phase.name for row in rows if row.note == note)
-        console.print(f"{phases}: {note}", highlight=False)
+    for note in rows.notes():
+        console.print(note, highlight=False)
 
 
 def _position(trial: Trial, protocol: Protocol, use_truth: bool) -> NDArray[np.float64]:
@@ -203,6 +238,28 @@ def _figures(row: Evaluation) -> list[tuple[str, str]]:
         ("RMSE (% of range)", _text(row.percent_of_range)),
         ("Samples", str(line.n)),
     ]
+
+
+def _document(row: Evaluation) -> dict[str, float | int | str]:
+    """The row's figures by name with unit."""
+    line, unit, suffix = row.regression, row.protocol.unit, row.protocol.suffix
+    factor = SI_FACTORS[unit]
+    return {
+        "task": row.protocol.name,
+        "phase": row.phase.name,
+        f"rmse_{suffix}": row.rmse / factor,
+        "rmse_percent_of_range": row.percent_of_range,
+        f"slope_{suffix}_per_s": line.slope / factor,
+        f"slope_std_error_{suffix}_per_s": line.slope_std_error / factor,
+        f"intercept_{suffix}": line.intercept / factor,
+        f"intercept_std_error_{suffix}": line.intercept_std_error / factor,
+        f"ss_model_{suffix}2": line.ss_model / factor**2,
+        f"ss_error_{suffix}2": line.ss_error / factor**2,
+        "f_ratio": line.f_ratio,
+        "p_value": row.p_value,
+        "samples": line.n,
+        "note": row.note,
+    }
 
 
 def _text(figure: float) -> str:

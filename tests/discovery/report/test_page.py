@@ -108,3 +108,17 @@ def test_the_page_is_found_at_its_old_place_with_a_warning():
     assert old is report_page
     with pytest.raises(ImportError, match="nothing_such"):
         from pma_gym.discovery.report import nothing_such  # noqa: F401
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_a_notebook_shows_the_sentence_the_gap_and_the_effects(diagnoses, verdict):
+    diagnosis = diagnoses[verdict]
+    shown = diagnosis._repr_html_()
+    tags = Tags()
+    tags.feed(shown)
+    assert not tags.open
+    assert diagnosis.sentence in shown
+    for signal, gap in diagnosis.gap.items():
+        assert signal in shown and f"{gap.after:.3g}" in shown
+    for effect in diagnosis.effects:
+        assert effect.name in shown and set(effect.parameters) <= set(re.findall(r"\w+", shown))
