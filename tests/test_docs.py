@@ -122,7 +122,9 @@ EXAMPLES = [
     for number, (language, code) in enumerate(
         re.findall(r"```(python|bash)\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
     )
-    if not re.search(r"^(make|pip|python -m (benchmarks|rl_zoo3))", code, re.MULTILINE)
+    if not re.search(
+        r"^(make|pip|(\.venv/bin/)?python -m (benchmarks|rl_zoo3))", code, re.MULTILINE
+    )
 ]
 
 

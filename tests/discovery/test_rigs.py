@@ -93,7 +93,7 @@ def test_every_example_has_its_place_on_the_page():
     page = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
     readme = (FROZEN / "README.md").read_text(encoding="utf-8")
     for name, (effect, _) in HIDDEN.items():
-        assert f"pma-gym diagnose tests/discovery/rigs/{name}\n" in page
+        assert f"`pma-gym diagnose tests/discovery/rigs/{name}`" in page
         (line,) = (line for line in readme.splitlines() if line.startswith(f"| `{name}`"))
         assert effect.replace("_", " ") in line.lower()
     assert sum(path.stat().st_size for path in FROZEN.rglob("*")) < 1e6

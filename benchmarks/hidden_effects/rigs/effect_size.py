@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.hidden_effects.rigs.rig import Rig
-from benchmarks.hidden_effects.rigs.stick_slip import Motion
+from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
 
 Array = np.ndarray
 

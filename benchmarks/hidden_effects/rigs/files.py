@@ -2,79 +2,69 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.hidden_effects.rigs.lab_names import OURS, LabNames
 from benchmarks.hidden_effects.rigs.rig import Rig
 
 Array = np.ndarray
 
-
-@dataclass(frozen=True)
-class Log:
-    """One file.
-
-    Attributes:
-        command: of the drive (N, N m), shape (rows,).
-        readings: of the position sensor (m, rad), shape (rows,).
-    """
-
-    command: Array
-    readings: Array
+Table = Mapping[str, tuple[Array, int]]
+"""Columns of a file by name: values, shape (rows,), and decimals."""
 
 
-def contents(
-    rig: Rig,
-    believed: Rig,
-    logs: Sequence[Log],
+def folder(
+    rate: float,
+    tables: Sequence[Table],
     repeats: Mapping[int, int],
-    step: float,
-    rms: float,
+    model: str,
+    tolerance: Mapping[str, float],
+    names: LabNames = OURS,
 ) -> dict[str, str]:
-    """Texts of the folder's files by name.
+    """Texts of a data set's files by name.
 
     Args:
-        rig: the rig.
-        believed: as the lab's model has it.
-        logs: its files.
+        rate: of all files (Hz).
+        tables: of the files.
         repeats: by number of a file, from 0, the earlier one that it repeats.
-        step: that readings are rounded to (m, rad).
-        rms: of the sensor's noise (m, rad).
+        model: text of the model.
+        tolerance: by column, where the lab states one.
+        names: that the lab has for its columns.
     """
-    texts = {_name(i): _table(rig, log, step) for i, log in enumerate(logs)}
+    texts = {_name(i): _csv(rate, table, names) for i, table in enumerate(tables)}
     lines = ['title = "Logs of a drive"', 'model = "model.toml"']
-    for i in range(len(logs)):
+    lines += names.lines(list(tables[0]))
+    if tolerance:
+        lines += ["", "[tolerance]", *(f"{key} = {_number(x)}" for key, x in tolerance.items())]
+    for i in range(len(tables)):
         lines += ["", f'[trials."{_name(i)}"]', f"order = {i + 1}"]
         if i in repeats:
             lines.append(f'repeat_of = "{_name(repeats[i])}"')
-    texts["dataset.toml"] = "\n".join(lines) + "\n"
-    limit = max(float(np.abs(log.command).max()) for log in logs)
-    texts["model.toml"] = MODELS[rig.kind](believed, limit, rms)
-    return texts
+    return texts | {"dataset.toml": "\n".join(lines) + "\n", "model.toml": model}
+
+
+def digits(step: float) -> int:
+    """Decimals that a column needs for a step: two more than its own."""
+    return max(0, math.ceil(-math.log10(step)) + 2)
 
 
 def _name(i: int) -> str:
     return f"run_{i + 1:02d}.csv"
 
 
-def _table(rig: Rig, log: Log, step: float) -> str:
-    command, position, factor = COLUMNS[rig.kind]
-    digits = max(0, math.ceil(-math.log10(step * factor)) + 2)
-    smallest = float(np.abs(log.command).max()) or 1.0
-    places = max(0, math.ceil(-math.log10(smallest)) + 6)
-    sign = -1.0 if rig.kind == "slide" else 1.0
-    rows = [f"time_s,{command},{position}"]
-    for i, (u, q) in enumerate(zip(sign * log.command, factor * log.readings, strict=True)):
-        rows.append(f"{i / rig.rate:.7g},{u + 0.0:.{places}f},{q + 0.0:.{digits}f}")
+def _csv(rate: float, table: Table, names: LabNames) -> str:
+    header, columns = [names.time], []
+    for ours, (values, places) in table.items():
+        name, factor = names.of(ours)
+        decimals = names.decimals(ours, places)
+        header.append(name)
+        # Adding 0 turns -0.0 into 0.0.
+        columns.append([f"{value + 0.0:.{decimals}f}" for value in values / factor])
+    rows = [",".join(header)]
+    for i, cells in enumerate(zip(*columns, strict=True)):
+        rows.append(",".join([f"{i / rate / names.second:.9g}", *cells]))
     return "\n".join(rows) + "\n"
-
-
-COLUMNS = {
-    "slide": ("load_command_n", "contraction_mm", 1e3),
-    "joint": ("torque_n_m", "angle_rad", 1.0),
-}
-"""Command, position, and the position's unit in SI units, by kind of rig."""
 
 
 def _slide(rig: Rig, limit: float, rms: float) -> str:

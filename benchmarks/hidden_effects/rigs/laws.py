@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-from benchmarks.hidden_effects.rigs.drive import Transmission
+from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,19 @@ class LoadFriction(HiddenEffect):
     def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
         del q, v
         return self.size * abs(u)
+
+
+@dataclass(frozen=True)
+class PressureFriction(HiddenEffect):
+    """Dry friction `size` without pressure that grows by `slope` of itself a pascal: a seal."""
+
+    slope: float = 0.0
+    name: ClassVar[str] = "pressure_dependent_friction"
+
+    def kinetic(self, q: float, v: float, u: float) -> float:  # noqa: D102
+        # An imposed motion has a pressure where a driven one has the force of its drive.
+        del q, v
+        return self.size * (1.0 + self.slope * u)
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from benchmarks.hidden_effects.rigs import laws, mujoco_axis, stick_slip
-from benchmarks.hidden_effects.rigs.drive import Transmission
+from benchmarks.hidden_effects.rigs import laws
 from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
+from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
 
 SLIDE = Rig("slide", 2.0, 0.0, 0.0, 0.0, 0.0, 0.05, 2.0, 1000.0)
 JOINT = Rig("joint", 0.02, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 1000.0)

@@ -2,6 +2,7 @@
 
 import json
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +11,10 @@ from benchmarks.hidden_effects.evaluation.scoring import count
 from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
-from benchmarks.hidden_effects.rigs import drawing, effect_size
+from benchmarks.hidden_effects.rigs import drawing, effect_size, files
+from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
+from benchmarks.hidden_effects.rigs.lab_names import GERMAN, METRES, OURS
+from benchmarks.hidden_effects.rigs.laws import ConstantForce
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
 from pma_gym.data.datasets.dataset import read_dataset
@@ -47,20 +51,61 @@ def test_an_effect_has_the_size_that_was_drawn(case):
 
 
 def test_of_600_cases_200_hide_one_effect_100_two_and_200_none():
-    rigs = len(KNOWN)
-    kinds = Counter(drawing.KINDS[turn // rigs % len(drawing.KINDS)] for turn in range(600))
+    turns = [drawing.turn_of(number) for number in range(1, 601)]
+    kinds = Counter(kind for _, kind, _ in turns)
     assert kinds["one effect"] == kinds["nothing"] == 200
     assert kinds["two effects"] == kinds["outside"] == 100
+    halves = Counter(simulator for _, _, simulator in turns[: 12 * len(KNOWN)])
+    assert halves["own"] == halves["MuJoCo"]
+    assert len(set(turns)) == 4 * len(KNOWN) * 2
 
 
 def test_a_pilot_is_the_beginning_of_its_file():
     """Each effect's size is set on the bits that the file then has."""
     rng = np.random.default_rng(5)
-    campaign = drawing._campaign(rng, "slide", "own", (5, 1))
-    short, long = (drawing.run(campaign, (), 0, seconds) for seconds in (2.0, 3.0))
-    assert np.array_equal(long.log.readings[: len(short.log.readings)], short.log.readings)
-    plain = effect_size.change(campaign.rig, [long.motion], [long.exact])
-    assert effect_size.size(plain, campaign.sensor.rms) < 0.1
+    campaign = draw_driven(rng, "slide", "own", (5, 1))
+    short, long = (campaign.run((), 0, seconds) for seconds in (2.0, 3.0))
+    assert np.array_equal(long.readings[: len(short.readings)], short.readings)
+
+
+@pytest.mark.parametrize("kind", ["slide", "joint"])
+@pytest.mark.parametrize("simulator", ["own", "MuJoCo"])
+def test_no_effect_has_no_size(kind, simulator):
+    """An integrator's error would be an effect that nobody hid: encoders of 50 nm show it."""
+    if simulator == "MuJoCo":
+        pytest.importorskip("mujoco")
+    for seed in (2, 3):
+        campaign = draw_driven(np.random.default_rng(seed), kind, simulator, (5, seed))
+        motion = (run := campaign.run((), 0, 4.0)).motion
+        plain = effect_size.change(campaign.rig, [motion], [run.exact])
+        assert effect_size.size(plain, campaign.sensor.rms) < 1e-3
+
+
+def test_a_lab_without_rest_or_repeat_states_its_tolerance():
+    campaign = replace(draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)), repeats={})
+    campaign = replace(campaign, bandwidth=campaign.rig.frequency)
+    campaign = replace(campaign, references=[campaign.references[0]])
+    texts = campaign.texts([])
+    assert "tolerance" not in texts["dataset.toml"]
+    # The drive is off while it rests, and every reading is of one place.
+    rows = [line.split(",") for line in texts["run_01.csv"].splitlines()[1:100]]
+    assert {float(row[1]) for row in rows} == {0.0}
+    pulled = campaign.texts([ConstantForce(0.1 * campaign.rig.peak_force)])
+    stated = float(pulled["dataset.toml"].split("contraction_mm = ")[1].split()[0])
+    assert stated == pytest.approx(1e3 * campaign.sensor.rms, rel=1e-5)
+
+
+@pytest.mark.parametrize("names", [OURS, METRES, GERMAN])
+def test_a_lab_s_own_names_and_units_are_read_as_ours(names, tmp_path):
+    force, position = np.array([0.0, 1.25, -2.5]), np.array([0.00045, 12.3456, -7.0])
+    tables = [{"load_command_n": (force, 4), "contraction_mm": (position, 5)}]
+    model = draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)).texts([])["model.toml"]
+    for name, text in files.folder(50.0, tables, {}, model, {}, names).items():
+        (tmp_path / name).write_text(text, "utf-8")
+    trial = read_dataset(tmp_path).trials[0].trial
+    assert trial.time == pytest.approx([0.0, 0.02, 0.04])
+    assert trial.commands["load_command"] == pytest.approx(force, abs=1e-4)
+    assert trial.measurements["contraction"] == pytest.approx(1e-3 * position, abs=1e-8)
 
 
 @pytest.mark.parametrize("draw", [lambda rng: draw_slide(rng, True), draw_joint])

@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects.rigs import effect_size, laws, stick_slip
-from benchmarks.hidden_effects.rigs.drive import Drive, Transmission
+from benchmarks.hidden_effects.rigs import effect_size, laws
 from benchmarks.hidden_effects.rigs.laws import SensorLink
 from benchmarks.hidden_effects.rigs.noise import Noise
 from benchmarks.hidden_effects.rigs.rig import Rig
 from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor
+from benchmarks.hidden_effects.rigs.simulators import stick_slip
+from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
 
 INTERVAL = 0.01
 

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.rigs import laws
-from benchmarks.hidden_effects.rigs.drive import Drive, Transmission
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect, summed
 from benchmarks.hidden_effects.rigs.rig import GRAVITY, Rig
-from benchmarks.hidden_effects.rigs.stick_slip import Motion, Source
+from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
+from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion, Source
 
 LONGEST = 0.25e-3
 """Longest step (s)."""
@@ -70,7 +70,7 @@ def simulate(
     library, interval = mujoco(), 1.0 / rig.rate
     steps = max(1, int(np.ceil(interval / longest - 1e-9)))
     drive, h = Drive(transmission, interval), interval / steps
-    world = _World(library, rig, effects, h)
+    world = World(library, rig, effects, h)
     table = np.empty((rows, 4))
     command = source(0, start[0])
     drive.begin(command)
@@ -81,11 +81,14 @@ def simulate(
             drive.push(command)
             for i in range(steps):
                 world.step(drive.at(i * h))
+                if i == 0:
+                    # Only the step from a row on knows what accelerates there.
+                    table[row - 1, 1:3] = world.begun()
         table[row] = *world.state(), command
     return Motion(np.arange(rows) * interval, *table.T)
 
 
-class _World:
+class World:
     """A model of MuJoCo with one axis, and the effects that change with its state."""
 
     def __init__(
@@ -117,6 +120,21 @@ class _World:
         """Position, speed and acceleration."""
         data = self.data
         return data.qpos[0], data.qvel[0] + 0.5 * self.h * data.qacc[0], data.qacc[0]
+
+    def begun(self) -> tuple[float, float]:
+        """Speed and acceleration where the last step began."""
+        data = self.data
+        return data.qvel[0] - 0.5 * self.h * data.qacc[0], data.qacc[0]
+
+    def inverse(self, q: float, v: float, a: float, u: float) -> float:
+        """Force of the drive (N, N m) that such a motion takes; `u` is what laws are given."""
+        data = self.data
+        data.qpos[0], data.qvel[0] = q, v
+        self._apply(u)
+        data.ctrl[0] = 0.0
+        data.qacc[0] = a
+        self.library.mj_inverse(self.model, data)
+        return float(data.qfrc_inverse[0] - self.force[0])
 
     def _apply(self, u: float) -> None:
         q, v = self.data.qpos[0], self.data.qvel[0]

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.hidden_effects.rigs.drive import Drive, Transmission
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect, summed
 from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
 
 Array = np.ndarray
 
