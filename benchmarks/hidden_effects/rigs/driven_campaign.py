@@ -122,7 +122,7 @@ class DrivenCampaign:
                     position: (factor * run.readings, files.digits(factor * self.sensor.step)),
                 }
             )
-        model = files.MODELS[self.rig.kind](self.believed, limit, self.sensor.rms)
+        model = files.MODELS[self.rig.kind](self.believed, limit)
         # Without a repeat or a rest nothing but the sensor's data sheet says how much is noise.
         stated = (
             {} if self.repeats or self._rests(effects) else {position: factor * self.sensor.rms}

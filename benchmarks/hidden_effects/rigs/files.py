@@ -67,8 +67,12 @@ def _csv(rate: float, table: Table, names: LabNames) -> str:
     return "\n".join(rows) + "\n"
 
 
-def _slide(rig: Rig, limit: float, rms: float) -> str:
-    """Of a slide on a rigid drive; it has no key for a spring."""
+def _slide(rig: Rig, limit: float) -> str:
+    """Of a slide on a rigid drive, which has no key for a spring.
+
+    Nor has it a sensor: one of 100 kHz, the fastest that may be stated, would already be late by a
+    hundredth of what an encoder of 50 nm tells.
+    """
     return f"""schema = 1
 name = "lab"
 title = "What the lab believes"
@@ -88,10 +92,6 @@ slope_n_s_per_mm_per_kpa = 0.0
 [start]
 contraction_mm = 0.0
 velocity_mm_per_s = 0.0
-
-[lvdt]
-bandwidth_hz = 1e5
-noise_mm = {_number(1e3 * rms)}
 """
 
 
