@@ -16,7 +16,7 @@ import typer
 
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation.readme import diagnosis
-from benchmarks.reproduction.score import PHASES, UNITS
+from benchmarks.runner.phase_score import PHASES, UNITS
 from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -81,10 +81,12 @@ def setting(run: Run) -> str:
 def speed(run: Run) -> str:
     """How long the run took."""
     info = run["run"]
+    before = info.get("cases_reused", 0)
+    reused = f" ({before} of the cases were done before)" if before else ""
     return (
         f"This run: {len(run['scores'])} cases and the bounds in {info['wall_time_s']:.0f} s with "
-        f"{info['jobs']} processes; {info['environment_steps_per_second']:.0f} environment steps a "
-        "second in one process."
+        f"{info['jobs']} processes{reused}; "
+        f"{info['environment_steps_per_second']:.0f} environment steps a second in one process."
     )
 
 

@@ -18,7 +18,7 @@ import pma_gym.cli
 from benchmarks import readme_table
 from benchmarks.hidden_effects.evaluation.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
-from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.runner.phase_score import PHASES, measured_score
 from benchmarks.suites.reproduction import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent

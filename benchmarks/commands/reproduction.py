@@ -47,7 +47,7 @@ def reproduction(
     try:
         code = reproduce(out, controllers, model, task, pressures, chosen_executor(executor, jobs))
     except KeyboardInterrupt:
-        print("Interrupted before the first case: nothing is measured or written", file=sys.stderr)
+        print("Interrupted before the first case; run it again", file=sys.stderr)
         code = INTERRUPTED
     raise typer.Exit(code)
 
@@ -58,7 +58,8 @@ def reproduce(
     """The main job; its exit code."""
     from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError, parse_controllers
-    from benchmarks.suites.reproduction import SuiteError, load_suite
+    from benchmarks.suites.reproduction import load_suite
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.plant.model import ModelError, load_model
     from pma_gym.terminal import SafeConsole
 
@@ -77,7 +78,7 @@ def reproduce(
 
 
 def _pressures(text: str) -> list[float]:
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.numerals import parse_numbers
 
     numbers = parse_numbers(text)

@@ -17,7 +17,6 @@ from benchmarks.commands.options import (
     listed,
     refuse,
 )
-from benchmarks.commands.reproduction import reproduce
 from pma_gym.cli.options import JsonOption
 from pma_gym.cli.terminal import print_json
 
@@ -48,19 +47,24 @@ def run(
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
+    from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.terminal import SafeConsole
 
     places = chosen_executor(executor, jobs)
     try:
-        if suite == "reproduction":
-            every = "" if controllers == "all" else controllers
-            raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", places))
         frozen = frozen_suite(suite)
-        entries = chosen(frozen, controllers)
-        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, places, SafeConsole())
+        folder = out or RESULTS / frozen.name
+        if isinstance(frozen, ReproductionSuite):
+            specs = [entry.spec for entry in chosen(frozen, controllers)]
+            selected = frozen.select(controllers=specs)
+            code = run_job(selected, folder, places, SafeConsole())
+        else:
+            entries = chosen(frozen, controllers)
+            code = run_comparison(frozen, entries, folder, places, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -78,15 +82,22 @@ def report(
         Path | None, typer.Option(help="Folder of the page; that of the run if not given.")
     ] = None,
 ) -> None:
-    """Write a suite's leaderboard from the journal of its run."""
+    """Write a suite's page, its leaderboard, from the journal of its run."""
+    from benchmarks.executors.choice import local
     from benchmarks.report.publish import run_report
+    from benchmarks.reproduction.job import report_again
     from benchmarks.suites.frozen import frozen_suite
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
 
     try:
         frozen = frozen_suite(suite)
         folder = results or RESULTS / frozen.name
-        print(f"Report: {run_report(frozen, folder, out or folder)}")
+        if isinstance(frozen, ReproductionSuite):
+            page = report_again(frozen, folder, out or folder, local(2))
+        else:
+            page = run_report(frozen, folder, out or folder)
+        print(f"Report: {page}")
     except SuiteError as error:
         refuse(error)
 
@@ -136,7 +147,7 @@ def add(
     from benchmarks.comparison.add import own_controller, run_add
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.terminal import SafeConsole
 
     try:
@@ -162,7 +173,7 @@ def remove(
     from benchmarks.comparison.command_lines import report_command
     from benchmarks.comparison.remove import remove_controller
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
 
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]

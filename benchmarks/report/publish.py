@@ -14,7 +14,7 @@ from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import loop_pictures, page_blocks, score_pictures
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
-from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.suite import FrozenSuite
 from pma_gym.cli.progress import StepProgress
 from pma_gym.pages.document import to_html, to_markdown
 

@@ -10,6 +10,7 @@ import numpy as np
 from benchmarks.hidden_effects.rigs import effect_size, files
 from benchmarks.hidden_effects.rigs.control import Controller
 from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
+from benchmarks.hidden_effects.rigs.lab_names import draw_names
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.hidden_effects.rigs.rig import Rig, draw_joint, draw_slide
 from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor, draw_sensor
@@ -121,12 +122,13 @@ class DrivenCampaign:
                     position: (factor * run.readings, files.digits(factor * self.sensor.step)),
                 }
             )
-        model = files.MODELS[self.rig.kind](self.believed, limit, self.sensor.rms)
+        model = files.MODELS[self.rig.kind](self.believed, limit)
         # Without a repeat or a rest nothing but the sensor's data sheet says how much is noise.
         stated = (
             {} if self.repeats or self._rests(effects) else {position: factor * self.sensor.rms}
         )
-        return files.folder(self.rig.rate, tables, self.repeats, model, stated)
+        names = draw_names(np.random.default_rng((*self.seed, 11)))
+        return files.folder(self.rig.rate, tables, self.repeats, model, stated, names)
 
     def truth(self) -> dict[str, Any]:
         """What nobody must read before the diagnosis is made, besides the effects."""

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.hidden_effects.rigs import laws
+from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig
 from benchmarks.hidden_effects.rigs.laws import HiddenEffect
 from benchmarks.hidden_effects.rigs.rig import Rig
 
-Draw = Callable[[np.random.Generator, Rig], HiddenEffect]
+AnyRig = Rig | ImposedRig
+"""Of either kind."""
+
+Draw = Callable[[np.random.Generator, AnyRig], HiddenEffect]
 
 
 @dataclass(frozen=True)
@@ -23,34 +27,40 @@ class Offer:
     """
 
     draw: Draw
-    fits: Callable[[Rig], bool] = lambda rig: True
+    fits: Callable[[AnyRig], bool] = lambda rig: True
 
 
-def _free(rig: Rig) -> bool:
+def _free(rig: AnyRig) -> bool:
     return not rig.stiffness and not rig.gravity
 
 
-def _coulomb(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _coulomb(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     rise = rng.uniform(0.1, 0.5) if rng.random() < 0.5 else 0.0
     stribeck = rig.peak_speed * rng.uniform(0.02, 0.1)
     return laws.CoulombFriction(0.5 * rig.peak_force / (1.0 + rise), rise, stribeck)
 
 
-def _by_position(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _by_position(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     slope = rng.choice((-1.0, 1.0)) * rng.uniform(0.4, 0.8) / rig.travel
     return laws.PositionFriction(0.3 * rig.peak_force, float(slope))
 
 
-def _cogging(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _by_pressure(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
+    assert isinstance(rig, ImposedRig)
+    slope = rng.uniform(0.5, 3.0) / max(rig.pressures)
+    return laws.PressureFriction(0.3 * rig.peak_force, slope)
+
+
+def _cogging(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     period = rig.travel * rng.uniform(0.15, 0.6)
     return laws.Cogging(0.3 * rig.peak_force, period, rng.uniform(0.0, 2.0 * math.pi))
 
 
-def _gravity(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _gravity(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     return laws.Gravity(0.8 * rig.peak_force, rng.uniform(-0.4, 0.4))
 
 
-def _late(rig: Rig) -> float:
+def _late(rig: AnyRig) -> float:
     """A fortieth of the fastest period (s): loops of four times that frequency bear it."""
     return 1.0 / (40.0 * rig.frequency)
 
@@ -58,6 +68,9 @@ def _late(rig: Rig) -> float:
 OFFERS: dict[str, Offer] = {
     "coulomb_friction": Offer(_coulomb),
     "load_dependent_friction": Offer(lambda rng, rig: laws.LoadFriction(0.5)),
+    "pressure_dependent_friction": Offer(
+        _by_pressure, lambda rig: isinstance(rig, ImposedRig) and rig.area > 0.0
+    ),
     "position_dependent_friction": Offer(_by_position),
     "constant_force": Offer(lambda rng, rig: laws.ConstantForce(0.5 * rig.peak_force)),
     "gravity": Offer(_gravity, lambda rig: rig.kind == "joint" and not rig.gravity),
@@ -81,16 +94,16 @@ OFFERS: dict[str, Offer] = {
 """By the catalogue's name."""
 
 
-def _bumper(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _bumper(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     return laws.EndBumper(3.0 * rig.peak_force / rig.travel, rig.travel * rng.uniform(0.2, 0.5))
 
 
-def _detent(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _detent(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     place, width = rng.uniform(-0.4, 0.4), rng.uniform(0.05, 0.15)
     return laws.Detent(0.5 * rig.peak_force, rig.travel * place, rig.travel * width)
 
 
-def _brake(rng: np.random.Generator, rig: Rig) -> HiddenEffect:
+def _brake(rng: np.random.Generator, rig: AnyRig) -> HiddenEffect:
     place, width = rng.uniform(-0.5, 0.5), rng.uniform(0.1, 0.2)
     size = 1.5 * rig.peak_force / rig.peak_speed
     return laws.EddyBrake(size, rig.travel * place, rig.travel * width)

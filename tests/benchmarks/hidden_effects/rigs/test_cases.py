@@ -11,8 +11,9 @@ from benchmarks.hidden_effects.evaluation.scoring import count
 from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation.files import write_case
 from benchmarks.hidden_effects.generation.undecidable import BLOCKS
-from benchmarks.hidden_effects.rigs import drawing, effect_size
+from benchmarks.hidden_effects.rigs import drawing, effect_size, files
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
+from benchmarks.hidden_effects.rigs.lab_names import GERMAN, METRES, OURS
 from benchmarks.hidden_effects.rigs.laws import ConstantForce
 from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, group
 from benchmarks.hidden_effects.rigs.rig import draw_joint, draw_slide
@@ -92,6 +93,19 @@ def test_a_lab_without_rest_or_repeat_states_its_tolerance():
     pulled = campaign.texts([ConstantForce(0.1 * campaign.rig.peak_force)])
     stated = float(pulled["dataset.toml"].split("contraction_mm = ")[1].split()[0])
     assert stated == pytest.approx(1e3 * campaign.sensor.rms, rel=1e-5)
+
+
+@pytest.mark.parametrize("names", [OURS, METRES, GERMAN])
+def test_a_lab_s_own_names_and_units_are_read_as_ours(names, tmp_path):
+    force, position = np.array([0.0, 1.25, -2.5]), np.array([0.00045, 12.3456, -7.0])
+    tables = [{"load_command_n": (force, 4), "contraction_mm": (position, 5)}]
+    model = draw_driven(np.random.default_rng(2), "slide", "own", (5, 2)).texts([])["model.toml"]
+    for name, text in files.folder(50.0, tables, {}, model, {}, names).items():
+        (tmp_path / name).write_text(text, "utf-8")
+    trial = read_dataset(tmp_path).trials[0].trial
+    assert trial.time == pytest.approx([0.0, 0.02, 0.04])
+    assert trial.commands["load_command"] == pytest.approx(force, abs=1e-4)
+    assert trial.measurements["contraction"] == pytest.approx(1e-3 * position, abs=1e-8)
 
 
 @pytest.mark.parametrize("draw", [lambda rng: draw_slide(rng, True), draw_joint])
