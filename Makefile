@@ -25,8 +25,8 @@ export NO_MKDOCS_2_WARNING = 1
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help bench peers test examples fuzz test-integrations test-lower-bounds kills lint style types layers
-.PHONY: spelling pages forms docs build release-check clean distclean
+.PHONY: help bench peers test test-campaigns examples fuzz test-integrations test-lower-bounds kills lint style types layers
+.PHONY: test-browser spelling pages forms docs build release-check clean distclean
 
 help: ## Show this list.
 	@echo "Targets:"
@@ -40,10 +40,16 @@ peers: $(CORE) ## Install what the speed is compared with, into .peers/ (some gi
 	$(BIN)/python -m benchmarks.speed.install
 
 test: $(FULL) ## Run the tests and the examples in the docstrings.
-	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m "not example and not kills" $(PYTEST_ARGS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m "not example and not kills and not campaign and not browser" $(PYTEST_ARGS)
+
+test-campaigns: $(FULL) ## Diagnose further hidden effects and rigs, check accuracy further (minutes).
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m campaign tests $(PYTEST_ARGS)
 
 examples: $(FULL) ## Run the examples of README and the pages, and with Ray, PyTorch and SB3.
 	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal -m example tests $(PYTEST_ARGS)
+
+test-browser: $(FULL) ## Look at reports and pages in Chromium (apt-get install chromium).
+	$(BIN)/python -m pytest -m browser tests/browser $(PYTEST_ARGS)
 
 fuzz: $(FULL) ## Feed the readers hostile files: EXAMPLES inputs each (default 100000; hours).
 	PMA_GYM_FUZZ_EXAMPLES=$(EXAMPLES) $(BIN)/python -m pytest -n $(JOBS) --hypothesis-profile search tests/fuzz $(PYTEST_ARGS)
