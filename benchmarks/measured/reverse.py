@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from benchmarks.reproduction.rotation_reading import reading
-from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.runner.phase_score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds

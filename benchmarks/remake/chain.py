@@ -68,7 +68,7 @@ def chain(jobs: int = 2) -> list[Step]:
     searched = (MODEL, GAINS, DESIGNS, SUITES)
     scored = (*searched, POLICIES)
     identified = (*own, "identify", "--out", str(MODEL), *workers)
-    designs = tuple((*own, "design", "--controllers", name, "--again") for name in designable())
+    designs = tuple((*own, "design", "--controllers", name, "--recompute") for name in designable())
     exercise = ((*own, "exercise"), (*own, "safety"))
     run = Path("results/reproduction/scores.json")
     return [

@@ -1,4 +1,4 @@
-"""A nominal model turned around: the motor voltage that a motion needs.
+"""Inverse of a nominal model: the motor voltage that a motion needs.
 
 Station. The muscle's end moves at x = x0 - y, x' = -y'. Its balance of forces says which tension
 the cable must have, and the rotor's balance which load the drive must give:
@@ -38,7 +38,7 @@ TAKE_UP_S = 20e-3
 
 
 class Inverse(Protocol):
-    """A nominal model turned around."""
+    """Inverse of a nominal model."""
 
     def parts(self, period: float) -> int:
         """Into how many steps a control period (s) is divided."""

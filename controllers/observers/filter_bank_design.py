@@ -1,4 +1,4 @@
-"""What a bank of Kalman filters needs for a trial, computed before it.
+"""Gains and models of a bank of Kalman filters, computed before a trial.
 
 The muscle's damping is what is known least (the identified station's 95 % interval reaches from
 about none to twice the value) and what a fast loop depends on most. So the plant near its nominal

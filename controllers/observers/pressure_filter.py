@@ -1,4 +1,4 @@
-"""The muscle's pressure, filtered and looked ahead: what of it was not asked for.
+"""Filter and predict the muscle's pressure: the part of it that was not commanded.
 
 The regulator brings the pressure P to what it is commanded, C, and to what nobody asked for, J:
 

@@ -84,7 +84,7 @@ class StationInfo:
 
 
 class Measurement(NamedTuple):
-    """What the sensors said at one instant, in SI; extension and rotation from their zeros.
+    """The sensors' readings at one instant, in SI; extension and rotation from their zeros.
 
     Attributes:
         time: when it was taken, since the trial began (s).

@@ -55,7 +55,8 @@ def record(name, trial, given, refitted, truth):
         factor = SI_FACTORS[column.unit]
         misses = [rms(measured[:, index] - curve[:, index]) / factor for curve in curves]
         gaps[column.name] = Gap(*misses, floor=0.97 * misses[-1], held_out=True)
-    return TrialRecord(name, trial.time, measured, *curves, gaps, held_out=True)
+    columns = tuple(column.name for column in SIGNALS.values())
+    return TrialRecord(name, trial.time, measured, *curves, gaps, held_out=True, columns=columns)
 
 
 @pytest.fixture(scope="session")

@@ -12,6 +12,7 @@ from pma_gym.discovery.diagnosis import Diagnosis, TrialRecord
 from pma_gym.discovery.report.pictures import AFTER, BEFORE, MEASURED, after_name
 from pma_gym.discovery.report.text import signal_name, signal_unit
 from pma_gym.pages.figures import legend_below, picture, png
+from pma_gym.pages.interactive import InteractiveFigure, Trace
 from pma_gym.units import SI_FACTORS
 
 _MOST_SIGNALS = 2
@@ -50,6 +51,21 @@ def curves_picture(record: TrialRecord, diagnosis: Diagnosis) -> bytes:
         ]
         legend_below(drawn, handles, 3)
         return png(drawn)
+
+
+def curves_figure(record: TrialRecord, diagnosis: Diagnosis) -> InteractiveFigure:
+    """A trial's worst signal to zoom and hover: measured, before and after."""
+    signal = worst_signals(record)[0]
+    name = after_name(diagnosis) + (", held out" if record.held_out else "")
+    time = record.time.tolist()
+    curves = (("measured", record.measured, ""), ("model as given", record.before, BEFORE))
+    traces = [
+        Trace(label, time, _door(record, values, signal).tolist(), color)
+        for label, values, color in (*curves, (name, record.after, AFTER))
+    ]
+    caption = f"{signal_name(signal)} of {record.name}: drag to zoom, click a curve to hide it."
+    label = f"{signal_name(signal)} ({signal_unit(signal)})"
+    return InteractiveFigure("worst", caption, "time (s)", label, traces)
 
 
 def _draw(record: TrialRecord, signal: str, above: Axes, below: Axes) -> None:
