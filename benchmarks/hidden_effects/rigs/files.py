@@ -67,6 +67,10 @@ def _csv(rate: float, table: Table, names: LabNames) -> str:
     return "\n".join(rows) + "\n"
 
 
+WEAKEST = 0.01
+"""Least gain that a model file takes (N/V); the line only says how a force is written as volts."""
+
+
 def _slide(rig: Rig, limit: float) -> str:
     """Of a slide on a rigid drive, which has no key for a spring.
 
@@ -79,7 +83,7 @@ title = "What the lab believes"
 plant = "slide"
 
 [two_way_drive]
-gain_n_per_v = {_number(1.2 * limit / 5.0)}
+gain_n_per_v = {_number(max(1.2 * limit / 5.0, WEAKEST))}
 middle_v = 5
 
 [slide]

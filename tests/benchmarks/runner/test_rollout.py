@@ -15,6 +15,7 @@ from benchmarks.executors.executor import ThisProcess, run_all
 from benchmarks.reproduction.results import csv_text, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
+from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.reproduction import load_suite
 from pma_gym.plant.model import load_model
@@ -189,7 +190,7 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     assert process.returncode == 130, errors
     assert "Interrupted" in output and "of 9 cases are done" in " ".join(output.split())
     assert "Traceback" not in errors
-    rows = (out / "partial" / "scores.csv").read_text().splitlines()[1:]
+    rows = list(case_rows(out / JOURNAL))
     # The cases in progress are dropped: two are done when the fourth begins.
     assert 2 <= len(rows) < 9
     assert (out / "scores.csv").read_text() == "earlier\n"
