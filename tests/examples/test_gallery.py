@@ -53,7 +53,7 @@ def test_a_notebook_is_its_script(name):
 
 
 def test_the_page_of_examples_has_them_all():
-    page = (EXAMPLES.parent / "gallery.md").read_text(encoding="utf-8")
+    page = (EXAMPLES.parent / "reference" / "gallery.md").read_text(encoding="utf-8")
     for name in GALLERY:
         assert f"examples/{name}.py" in page
     for name in NOTEBOOKS:
