@@ -82,4 +82,4 @@ PRESSURE_TRANSDUCER = _sensor("pressure_transducer", "pressure", PressureTransdu
 POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)
 
 SENSORS: tuple[Effect, ...] = (LVDT, LOAD_CELL, PRESSURE_TRANSDUCER, POTENTIOMETER)
-"""All sensors, in the order of the catalogue."""
+"""All sensors, as the catalogue has them."""
