@@ -268,7 +268,7 @@ def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
         return True
-    if outcome.block in ("single", "faint", "pair"):
+    if outcome.block.startswith("single") or outcome.block in ("faint", "pair"):
         return not outcome.right
     if outcome.block in ("unknown", "undecidable"):
         return outcome.verdict != outcome.block

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
+from benchmarks.hidden_effects.generation.readout_noise import UGLY
 
 
 @dataclass(frozen=True)
@@ -75,6 +76,18 @@ _NOTHING = (
     Rate("a false name", lambda o: o.verdict == "effect"),
 )
 
+_SINGLE_UGLY = (
+    Rate("named right", lambda o: o.right, Target(least=0.88)),
+    Rate("right or in its group", lambda o: o.near),
+    Rate("confidently wrong", lambda o: o.wrong, Target(most=0.02)),
+    Rate("detected", lambda o: o.detected),
+)
+
+_NOTHING_UGLY = (
+    Rate("false alarm", lambda o: o.detected, Target(most=0.02)),
+    Rate("a false name", lambda o: o.verdict == "effect"),
+)
+
 _PARAMETERS = (
     Rate("right parameter named", lambda o: o.parameters, Target(least=0.95)),
     Rate("a new effect claimed", lambda o: o.detected, Target(most=0.02)),
@@ -116,11 +129,13 @@ RATES: dict[str, tuple[Rate, ...]] = {
     "parameters": _PARAMETERS,
     "pair": _PAIR,
     "unknown": _UNKNOWN,
+    **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
+    **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "undecidable": _UNDECIDABLE,
 }
 """By block."""
 
-GAP_BLOCKS = ("single", "faint", "parameters", "pair")
+GAP_BLOCKS = ("single", "faint", "parameters", "pair", *(f"single_{ugly}" for ugly in UGLY))
 """Blocks whose truth the catalogue holds, so that an amended model could close the gap."""
 
 GAP_MEDIAN, GAP_TENTH = Target(least=0.95), Target(least=0.80)
