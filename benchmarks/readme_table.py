@@ -16,11 +16,12 @@ import typer
 
 from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation.readme import diagnosis
-from benchmarks.reproduction.score import PHASES, UNITS
+from benchmarks.runner.phase_score import PHASES, UNITS
 from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parent.parent
-FILES = tuple(ROOT / name for name in ("README.md", "docs/benchmark.md", "docs/results.md"))
+PAGES = ("results.md", "measured.md", "notebook/reproduction.md")
+FILES = (ROOT / "README.md", *(ROOT / "docs" / name for name in PAGES))
 SCORES = ROOT / "results" / "reproduction" / "scores.json"
 
 Run = Mapping[str, Any]
@@ -80,10 +81,12 @@ def setting(run: Run) -> str:
 def speed(run: Run) -> str:
     """How long the run took."""
     info = run["run"]
+    before = info.get("cases_reused", 0)
+    reused = f" ({before} of the cases were done before)" if before else ""
     return (
         f"This run: {len(run['scores'])} cases and the bounds in {info['wall_time_s']:.0f} s with "
-        f"{info['jobs']} processes; {info['environment_steps_per_second']:.0f} environment steps a "
-        "second in one process."
+        f"{info['jobs']} processes{reused}; "
+        f"{info['environment_steps_per_second']:.0f} environment steps a second in one process."
     )
 
 
@@ -240,7 +243,7 @@ def main(
         bool, typer.Option("--kept", help="Only figures that docs/figures keeps; needs no run.")
     ] = False,
 ) -> None:
-    """Put a run's figures into README.md and docs/benchmark.md."""
+    """Put a run's figures into README.md and the pages of results."""
     try:
         run = None if kept else load_run(scores)
         texts = {path: path.read_text(encoding="utf-8") for path in FILES}

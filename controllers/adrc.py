@@ -1,4 +1,4 @@
-"""Active disturbance rejection: all that the model does not know is one state, and cancelled."""
+"""Active disturbance rejection: one observer state is all that the model lacks; it is cancelled."""
 
 from typing import NamedTuple
 
@@ -39,7 +39,7 @@ DEFAULTS = {
 
 
 class ADRC(ObserverFeedback[Settings]):
-    """Cancels an estimated disturbance, and is left with a known lag to control.
+    """Estimates and cancels the disturbance, then controls the known lag that remains.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
     lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`):

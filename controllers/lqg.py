@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 
 from controllers.controller import Reference
-from controllers.design.designs import designed, task_kind
+from controllers.design.designs import designed
 from controllers.models.cable import free_rotor
 from controllers.models.local_model import FINE, LocalModel, Stroke
 from controllers.models.nominal_motion import nominal_motion
@@ -121,11 +121,11 @@ class LQG:
         self._behind = 0.0
         self._gains = _scheduled(self._stroke, settings.effort)
         free = free_rotor(station, self._filter.order)
-        kind = task_kind(station)
         if free is not None:
             a = np.eye(len(free[0]), k=1)
             a[:, 0] = free[0]
-            lengths = station.model.parameters["rotor"].radius if kind != "rotation" else 1.0
+            turns = station.task.exercise is None and station.task.protocol.followed.is_angle
+            lengths = 1.0 if turns else station.model.parameters["rotor"].radius
             weight = lengths / self._stroke.models[0].gain
             self._free_gains = regulator(a, free[1], weight, settings.effort)
 

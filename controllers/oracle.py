@@ -1,4 +1,4 @@
-"""The bound to aim at: a predictive controller that knows the true station and where it stands.
+"""Bound to aim at: a predictive controller that knows the true station and its state.
 
 What it knows that no controller of a real station does: the station's own equations and numbers,
 its state, the memories of hysteresis and friction, the commands on their way to it, and the
@@ -46,7 +46,7 @@ PUSHES_V = np.append(0.0, np.geomspace(0.01, 10.0, 13))
 
 
 class Oracle:
-    """The predictive controller that knows everything but the future; see this module.
+    """Predictive control with the true station and state; a bound, not a rival.
 
     It drives no real station: it receives the environment (`receive`) before each `reset`.
 

@@ -149,7 +149,7 @@ class PolicyWithILC:
 
 
 class EarlierTrials:
-    """What the sensors said in earlier trials, and by how much the reference was moved then.
+    """Readings of earlier trials, and by how much the reference was moved then.
 
     The first trial is left out: its errors are still to be learned.
 

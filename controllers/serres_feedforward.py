@@ -45,7 +45,7 @@ class SerresFeedforward(VoltageTable):
                 f"rotation, got {station.task.name}, in which the {station.task.actuator} moves; "
                 "take improved_feedforward"
             )
-        rotation = station.task.protocol.quantity == "rotation"
+        rotation = station.task.protocol.followed.is_angle
         radius = PROFILE_RADIUS if rotation else 1.0
         pressure_kpa = station.pressure / 1e3
         samples = math.ceil(station.task.protocol.duration / SAMPLE_TIME - 1e-9) + 1

@@ -12,7 +12,7 @@ from pma_gym.tasks import TASKS
 
 
 class SerresReplay(VoltageTable):
-    """The voltages that the dissertation printed, played back as they stand.
+    """The voltages that the dissertation printed, unchanged.
 
     They follow the task's own reference, whatever reference is given, and exist at the pressures
     of the dissertation's trials alone. Those of rotation were computed for 45 mm at 90 deg.

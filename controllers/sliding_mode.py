@@ -56,7 +56,7 @@ class Surface(NamedTuple):
 
 
 class SlidingMode(ObserverFeedback[Settings]):
-    """Drives the error to a surface s = 0 on which it dies out, and holds it there.
+    """Drives the error to a surface s = 0, on which it decays, and holds it there.
 
     Near a place of the stroke the error e of the position against the nominal motion is that of one
     lag (motor) or two (regulator) behind a dead time (`controllers.models.lag_model`), x in what

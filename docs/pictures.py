@@ -73,7 +73,7 @@ def draw_hidden_effects() -> None:
 
 def draw_exercise() -> None:
     """The exercise device's moments, with the smallest configuration for the page's profile."""
-    page = (Path(__file__).parent / "exercise.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parent / "exercise-design.md").read_text(encoding="utf-8")
     block = re.search(r"```csv\n(.*?)```", page, flags=re.DOTALL)
     assert block is not None
     with tempfile.TemporaryDirectory() as folder:

@@ -1,5 +1,6 @@
 """`pma-gym convert`: a lab's files become a data set whose draft reads as the right trials."""
 
+import json
 import tomllib
 
 import numpy as np
@@ -81,3 +82,15 @@ def test_names_are_data(tmp_path, capsys):
     text = (folder / "dataset.toml").read_text()
     tomllib.loads(text)
     assert "\x1b" not in text + out
+
+
+def test_json_has_what_every_column_is_taken_for(tmp_path, capsys):
+    folder = lab(tmp_path / "lab")
+    code, out, _ = run(capsys, "convert", folder, "--model", "serres2008", "--json")
+    document = json.loads(out)
+    taken = {each["name"]: each["taken_for"] for each in document["columns"]}
+    assert code == 0 and taken["Kraft_kN"] == "load_n" and document["tables"] > 1
+    code, out, _ = run(capsys, "compare", folder, "--json")
+    misfit = json.loads(out)["misfit_rms"]
+    assert code == 0 and set(misfit) >= {"contraction_mm", "load_n"}
+    assert all(size > 0.0 for size in misfit.values())

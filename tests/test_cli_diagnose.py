@@ -246,3 +246,11 @@ def test_effects_of_ones_own_are_loaded_before_the_model(run, engine, tmp_path, 
     code, _, _ = run("diagnose", "lab", "--effect", "a.py", "--effect", "b.py")
     assert code == 0
     assert [path.name for path in loaded] == ["a.py", "b.py"]
+
+
+@pytest.mark.parametrize("command", ["diagnose", "fit"])
+def test_json_is_printed_instead_of_tables(run, engine, tmp_path, command):
+    code, out, _ = run(command, "lab", "--model", "serres2008", "--json")
+    name = "diagnosis" if command == "diagnose" else command
+    written = (tmp_path / f"lab-{name}" / f"{name}.json").read_text()
+    assert code == 0 and json.loads(out) == json.loads(written)

@@ -55,7 +55,7 @@ def test_a_mark_that_names_nothing_is_refused(generators):
 @pytest.mark.parametrize("name", CATALOGUE)
 def test_every_effect_has_its_law_and_parameters(page, name):
     effect = CATALOGUE[name]
-    section = re.split(r"^## ", page("physics/effects.md"), flags=re.MULTILINE)
+    section = re.split(r"^## ", page("reference/effect-catalogue.md"), flags=re.MULTILINE)
     (own,) = (text for text in section if text.startswith(f"{name} "))
     assert effect.port in own and effect.signature in own
     for stem, quantity in effect.quantities.items():
@@ -72,7 +72,7 @@ def test_every_effect_has_its_law_and_parameters(page, name):
 
 @pytest.mark.parametrize("name", shipped_models())
 def test_every_model_has_its_values_and_intervals(page, name):
-    model, text = load_model(name), page("physics/models.md")
+    model, text = load_model(name), page("reference/model-parameters.md")
     assert model.title in text
     own = text[re.search(rf"^##+ `{name}`$", text, re.MULTILINE).start() :]
     base = load_model("serres2008").parameters
@@ -89,7 +89,7 @@ def test_every_model_has_its_values_and_intervals(page, name):
 
 
 def test_every_error_of_the_source_is_listed(page):
-    text = page("physics/source.md")
+    text = page("reference/errata.md")
     single = [item for item in corrections() if not item.reason.startswith("printed as a fraction")]
     assert single and all(item.reason in text for item in single)
     wrong = [row for row in compare_all() if row.verdict == "wrong in print"]
@@ -98,14 +98,14 @@ def test_every_error_of_the_source_is_listed(page):
 
 
 def test_environments_page_is_complete(page):
-    text = page("environments.md")
+    text = page("reference/environment-options.md")
     names = [field.name for field in fields(Options)]
     for name in (*names, *REWARDS, *RANDOMISATIONS, *DISTURBANCES, *EVERY_TASK, *ENVIRONMENTS):
         assert f"`{name}`" in text
 
 
 def test_columns_and_controllers_are_listed(page):
-    assert all(f"`{name}`" in page("data.md") for name in BY_NAME)
+    assert all(f"`{name}`" in page("reference/data-files.md") for name in BY_NAME)
     assert all(f"`{name}`" in page("controllers.md") for name in CONTROLLERS)
 
 
@@ -122,7 +122,9 @@ EXAMPLES = [
     for number, (language, code) in enumerate(
         re.findall(r"```(python|bash)\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL)
     )
-    if not re.search(r"^(make|pip|python -m (benchmarks|rl_zoo3))", code, re.MULTILINE)
+    if not re.search(
+        r"^(make|pip|(\.venv/bin/)?python -m (benchmarks|rl_zoo3))", code, re.MULTILINE
+    )
 ]
 
 

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.examples.test_gallery import GALLERY
+
 ROOT = Path(__file__).resolve().parent.parent
 EXAMPLES = ROOT / "docs" / "examples"
 LIBRARIES = {"ppo_torch": "torch", "sb3_ppo": "stable_baselines3", "rllib_ppo": "ray.rllib"}
@@ -39,7 +41,7 @@ def test_it_runs_and_prints_its_error(name, tmp_path):
 def test_every_example_is_run_by_a_test_and_shown_on_a_page():
     page = (ROOT / "docs" / "other-libraries.md").read_text(encoding="utf-8")
     names = {path.stem for path in EXAMPLES.glob("*.py")}
-    assert names == {*LIBRARIES, "integral"}
+    assert names == {*LIBRARIES, *GALLERY, "integral"}
     for name in LIBRARIES:
         assert f"`python docs/examples/{name}.py`" in page
         assert f"<!-- generate: example {name} -->" in page

@@ -18,12 +18,15 @@ import pma_gym.cli
 from benchmarks import readme_table
 from benchmarks.hidden_effects.evaluation.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
-from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.runner.phase_score import PHASES, measured_score
 from benchmarks.suites.reproduction import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-RESULTS = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+RESULTS, RECORD = (
+    (ROOT / "docs" / name).read_text(encoding="utf-8")
+    for name in ("results.md", "notebook/reproduction.md")
+)
 FIRST_CONTROLLER = (ROOT / "docs" / "first-controller.md").read_text(encoding="utf-8")
 EXAMPLE = ROOT / "docs" / "examples" / "integral.py"
 
@@ -117,7 +120,8 @@ def test_the_package_carries_it():
 
 def table(name):
     """Header and rows of a block of figures."""
-    block = RESULTS.split(f"<!-- figures: {name} -->")[1].split("<!-- end of figures -->")[0]
+    _, after = (RESULTS + RECORD).split(f"<!-- figures: {name} -->")
+    block = after.split("<!-- end of figures -->")[0]
     lines = [line.strip("| ").split(" | ") for line in block.strip().splitlines()]
     return lines[0], lines[2:]
 

@@ -10,6 +10,7 @@ from types import TracebackType
 
 from benchmarks.bounds import achievable, open_loop
 from benchmarks.bounds.achievable import achievable_bound
+from benchmarks.executors.executor import Executor, run_all
 from benchmarks.executors.local import Background
 from benchmarks.files import write_text
 from benchmarks.runner.fingerprint import code_digest_with
@@ -65,6 +66,34 @@ class Bounds:
             self._known[trial] = self._computed(trial)
             self._write()
         return self._known[trial]
+
+    def compute(self, trials: Iterable[Trial], executor: Executor) -> tuple[dict[Trial, str], bool]:
+        """Compute bounds on an executor; each is kept as it is done.
+
+        Args:
+            trials: task and pressure (kPa) of each.
+            executor: where.
+        Returns:
+            Why those that failed have no bound, and whether all was run: Ctrl-C ends it.
+        """
+        missing = [trial for trial in trials if trial not in self._known]
+        failures: dict[Trial, str] = {}
+
+        def keep(index: int, result: object) -> None:
+            trial = missing[index]
+            if isinstance(result, BaseException):
+                failures[trial] = f"{type(result).__name__}: {result}"
+            else:
+                assert isinstance(result, float)
+                self._known[trial] = result
+                self._write()
+
+        works = [partial(self._compute, self._model, *trial) for trial in missing]
+        return failures, run_all(works, executor, keep)
+
+    def known(self, task: str, pressure_kpa: float) -> float | None:
+        """The bound (mm or deg) of a task at a pressure (kPa), if it is there."""
+        return self._known.get((task, pressure_kpa))
 
     def _computed(self, trial: Trial) -> float:
         running = self._running.pop(trial, None)

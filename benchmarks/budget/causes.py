@@ -40,6 +40,7 @@ from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.studies.tustin import cascade_transfer, inverse_recursion, tustin_recursion
 from pma_gym.studies.voltage_profile import MOTOR_RATE, SAMPLE_TIME, profile_model
+from pma_gym.tasks import EVERY_TASK
 
 Array = np.ndarray
 
@@ -73,7 +74,11 @@ ABSENT = {
 
 def causes_of(task: str) -> tuple[str, ...]:
     """The faults that a task can have."""
-    return tuple(cause for cause in CAUSES if task == "rotation" or cause not in OF_ROTATION)
+    return tuple(
+        cause
+        for cause in CAUSES
+        if EVERY_TASK[task].protocol.followed.is_angle or cause not in OF_ROTATION
+    )
 
 
 def without(model: Model, *parts: str) -> Model:
@@ -106,7 +111,7 @@ class OpenLoop:
 
     def __init__(self, plant: Plant, station: StationInfo) -> None:
         self.plant, self.station = plant, station
-        self.rotation = station.task.protocol.quantity == "rotation"
+        self.rotation = station.task.protocol.followed.is_angle
         self.profile = profile_model(station.pressure / 1e3)
         parameters = plant.model.parameters
         self.cable, self.drive, self.rotor = (parameters[n] for n in ("cable", "drive", "rotor"))

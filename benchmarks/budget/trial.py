@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.bounds.open_loop import open_loop_positions
 from benchmarks.budget.causes import OpenLoop, causes_of, without
-from benchmarks.reproduction.score import measured_score
+from benchmarks.runner.phase_score import measured_score
 from pma_gym.envs import StationInfo
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant

@@ -20,12 +20,15 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(profiles)
-    app.command()(budget)
-    app.command()(measured)
-    app.command()(voltages)
-    app.command()(studies)
-    app.command()(identify)
+    app.command(epilog="Example: python -m benchmarks profiles --out profiles.csv")(profiles)
+    app.command(epilog="Example: python -m benchmarks budget --out results/budget")(budget)
+    app.command(epilog="Example: python -m benchmarks measured --jobs 2")(measured)
+    app.command(
+        epilog="Example: python -m benchmarks voltages --controller improved_feedforward "
+        "--task rotation --pressure 400 --out volts.csv"
+    )(voltages)
+    app.command(epilog="Example: python -m benchmarks studies --out studies.csv")(studies)
+    app.command(epilog="Example: python -m benchmarks identify --out station.toml")(identify)
 
 
 def profiles(out: Out) -> None:

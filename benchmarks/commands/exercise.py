@@ -17,9 +17,11 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(exercise)
-    app.command()(safety)
-    app.command()(lag)
+    app.command(
+        epilog="Example: python -m benchmarks exercise --muscles 2 --diameter 20 --moment 10"
+    )(exercise)
+    app.command(epilog="Example: python -m benchmarks safety --episodes 100")(safety)
+    app.command(epilog="Example: python -m benchmarks lag --operators 1")(lag)
 
 
 def exercise(

@@ -21,15 +21,21 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command("hidden-effects")(hidden_effects)
-    app.command("hidden-effects-report")(hidden_effects_report)
+    app.command(
+        "hidden-effects",
+        epilog="Example: python -m benchmarks hidden-effects --block single --n 20",
+    )(hidden_effects)
+    app.command(
+        "hidden-effects-report",
+        epilog="Example: python -m benchmarks hidden-effects-report results/blocks/single-0",
+    )(hidden_effects_report)
 
 
 def hidden_effects(
     block: Annotated[
         str,
         typer.Option(
-            help="single, faint, nothing, parameters, pair, unknown, undecidable, or all."
+            help="single, faint, nothing, parameters, pair, unknown, undecidable, rigs, or all."
         ),
     ],
     n: Annotated[int, typer.Option("--n", min=1, help="Cases of a block; more extend the set.")],

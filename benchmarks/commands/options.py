@@ -70,9 +70,7 @@ OptionalOut = Annotated[Path | None, _OUT]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes.")]
 ExecutorOption = Annotated[
     ExecutorName,
-    typer.Option(
-        "--executor", help="local: processes here; ray: the cluster at RAY_ADDRESS, else one here."
-    ),
+    typer.Option("--executor", help="Here, or at RAY_ADDRESS."),
 ]
 LOCAL = ExecutorName.LOCAL
 Recompute = Annotated[bool, typer.Option("--recompute", help="Compute anew what other code made.")]

@@ -11,7 +11,7 @@ from benchmarks.commands.options import INTERRUPTED, RESULTS, Jobs, listed, refu
 
 def register(app: typer.Typer) -> None:
     """Add the command to the program."""
-    app.command()(remake)
+    app.command(epilog="Example: python -m benchmarks remake --list")(remake)
 
 
 def remake(

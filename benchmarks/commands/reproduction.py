@@ -21,31 +21,33 @@ from benchmarks.executors.executor import Executor
 
 def register(app: typer.Typer) -> None:
     """Make it what the program does without a command."""
-    app.callback()(reproduction)
+    app.callback(epilog="Example: python -m benchmarks --controllers pid --pressures 300")(
+        reproduction
+    )
 
 
 def reproduction(
     context: typer.Context,
-    out: Annotated[Path, typer.Option(help="Folder of the results.")] = RESULTS / "reproduction",
+    out: Annotated[Path, typer.Option(help="Folder.")] = RESULTS / "reproduction",
     controllers: Annotated[
-        str, typer.Option(help="Names or path/to/file.py:ClassName, by commas; all if empty.")
+        str, typer.Option(help="Names or file.py:Class by commas; else all.")
     ] = "",
     model: Annotated[
         str,
-        typer.Option(help="Models by commas: shipped names or TOML files; the suite's if empty."),
+        typer.Option(help="Names or TOML files by commas; else the suite's."),
     ] = "",
-    task: Annotated[str, typer.Option(help="displacement or rotation; both if empty.")] = "",
-    pressures: Annotated[str, typer.Option(help="Pressures in kPa by commas; all if empty.")] = "",
+    task: Annotated[str, typer.Option(help="displacement or rotation; else both.")] = "",
+    pressures: Annotated[str, typer.Option(help="In kPa by commas; else all.")] = "",
     jobs: Jobs = 2,
     executor: ExecutorOption = LOCAL,
 ) -> None:
-    """Run every controller through every trial and write the report (the main job)."""
+    """Run every controller through every trial and write the report."""
     if context.invoked_subcommand is not None:
         return
     try:
         code = reproduce(out, controllers, model, task, pressures, chosen_executor(executor, jobs))
     except KeyboardInterrupt:
-        print("Interrupted before the first case: nothing is measured or written", file=sys.stderr)
+        print("Interrupted before the first case; run it again", file=sys.stderr)
         code = INTERRUPTED
     raise typer.Exit(code)
 
@@ -56,7 +58,8 @@ def reproduce(
     """The main job; its exit code."""
     from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError, parse_controllers
-    from benchmarks.suites.reproduction import SuiteError, load_suite
+    from benchmarks.suites.reproduction import load_suite
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.plant.model import ModelError, load_model
     from pma_gym.terminal import SafeConsole
 
@@ -75,7 +78,7 @@ def reproduce(
 
 
 def _pressures(text: str) -> list[float]:
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.numerals import parse_numbers
 
     numbers = parse_numbers(text)

@@ -18,8 +18,12 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(tune)
-    app.command()(design)
+    app.command(
+        epilog="Example: python -m benchmarks tune --only '50hz*/rotation' --out gains.csv"
+    )(tune)
+    app.command(epilog="Example: python -m benchmarks design --controllers lqg --out designs.toml")(
+        design
+    )
 
 
 def tune(

@@ -10,8 +10,8 @@ from benchmarks.commands.options import OptionalOut, refuse
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(accuracy)
-    app.command()(speed)
+    app.command(epilog="Example: python -m benchmarks accuracy --out accuracy.txt")(accuracy)
+    app.command(epilog="Example: python -m benchmarks speed --quick --only single")(speed)
 
 
 def accuracy(out: OptionalOut = None) -> None:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.table import Table
 
 from benchmarks.commands.options import (
     INTERRUPTED,
@@ -16,16 +17,21 @@ from benchmarks.commands.options import (
     listed,
     refuse,
 )
-from benchmarks.commands.reproduction import reproduce
+from pma_gym.cli.options import JsonOption
+from pma_gym.cli.terminal import print_json
 
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(run)
-    app.command()(report)
-    app.command()(add)
-    app.command()(remove)
-    app.command()(suites)
+    app.command(
+        epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
+    )(run)
+    app.command(epilog="Example: python -m benchmarks report robust")(report)
+    # For those who work on the project: a user sees results, not what was aimed at.
+    app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")(targets)
+    app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
+    app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
+    app.command(epilog="Example: python -m benchmarks suites")(suites)
 
 
 def run(
@@ -41,19 +47,24 @@ def run(
 ) -> None:
     """Compare controllers on a frozen suite; an interrupted run goes on where it stopped."""
     from benchmarks.comparison.job import chosen, run_comparison
+    from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.terminal import SafeConsole
 
     places = chosen_executor(executor, jobs)
     try:
-        if suite == "reproduction":
-            every = "" if controllers == "all" else controllers
-            raise typer.Exit(reproduce(out or RESULTS / suite, every, "", "", "", places))
         frozen = frozen_suite(suite)
-        entries = chosen(frozen, controllers)
-        code = run_comparison(frozen, entries, out or RESULTS / frozen.name, places, SafeConsole())
+        folder = out or RESULTS / frozen.name
+        if isinstance(frozen, ReproductionSuite):
+            specs = [entry.spec for entry in chosen(frozen, controllers)]
+            selected = frozen.select(controllers=specs)
+            code = run_job(selected, folder, places, SafeConsole())
+        else:
+            entries = chosen(frozen, controllers)
+            code = run_comparison(frozen, entries, folder, places, SafeConsole())
     except (ControllerError, SuiteError) as error:
         refuse(error)
     except KeyboardInterrupt:
@@ -71,17 +82,57 @@ def report(
         Path | None, typer.Option(help="Folder of the page; that of the run if not given.")
     ] = None,
 ) -> None:
-    """Write a suite's leaderboard from the journal of its run."""
+    """Write a suite's page, its leaderboard, from the journal of its run."""
+    from benchmarks.executors.choice import local
     from benchmarks.report.publish import run_report
+    from benchmarks.reproduction.job import report_again
     from benchmarks.suites.frozen import frozen_suite
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.reproduction import ReproductionSuite
+    from benchmarks.suites.suite import SuiteError
 
     try:
         frozen = frozen_suite(suite)
         folder = results or RESULTS / frozen.name
-        print(f"Report: {run_report(frozen, folder, out or folder)}")
+        if isinstance(frozen, ReproductionSuite):
+            page = report_again(frozen, folder, out or folder, local(2))
+        else:
+            page = run_report(frozen, folder, out or folder)
+        print(f"Report: {page}")
     except SuiteError as error:
         refuse(error)
+
+
+def targets(
+    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
+    results: Annotated[
+        Path | None, typer.Option(help="Folder of the run; results/SUITE if not given.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Check a run against what its suite asks for; exit code 1 if a target is missed."""
+    from benchmarks.bounds.cache import Bounds
+    from benchmarks.report.leaderboard import read_leaderboard
+    from benchmarks.report.tables import verdict_table
+    from benchmarks.suites.frozen import frozen_suite
+    from benchmarks.suites.reproduction import SuiteError
+    from pma_gym.terminal import table_console
+
+    try:
+        frozen = frozen_suite(suite)
+        folder = results or RESULTS / frozen.name
+        with Bounds(frozen.model, folder) as bounds:
+            checks = read_leaderboard(frozen, folder, bounds).verdicts
+    except SuiteError as error:
+        refuse(error)
+    if as_json:
+        print_json([check.document() for check in checks])
+    else:
+        table = verdict_table(checks)
+        shown = Table(*table.header, title=table.title)
+        for row in table.rows:
+            shown.add_row(*row)
+        table_console().print(shown)
+    raise typer.Exit(1 if any(check.word == "missed" for check in checks) else 0)
 
 
 def add(
@@ -96,7 +147,7 @@ def add(
     from benchmarks.comparison.add import own_controller, run_add
     from benchmarks.runner.controller_spec import ControllerError
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
     from pma_gym.terminal import SafeConsole
 
     try:
@@ -122,7 +173,7 @@ def remove(
     from benchmarks.comparison.command_lines import report_command
     from benchmarks.comparison.remove import remove_controller
     from benchmarks.suites.frozen import frozen_suite, suite_names
-    from benchmarks.suites.reproduction import SuiteError
+    from benchmarks.suites.suite import SuiteError
 
     try:
         frozen = [frozen_suite(name) for name in listed(suite) or suite_names()]
@@ -135,9 +186,12 @@ def remove(
         refuse(error)
 
 
-def suites() -> None:
+def suites(as_json: JsonOption = False) -> None:
     """List the frozen suites: their versions, cases and controllers."""
-    from benchmarks.comparison.listing import print_suites
+    from benchmarks.comparison.listing import print_suites, suite_documents
     from pma_gym.terminal import SafeConsole
 
-    print_suites(SafeConsole())
+    if as_json:
+        print_json(suite_documents())
+    else:
+        print_suites(SafeConsole())

@@ -20,8 +20,13 @@ from benchmarks.commands.options import (
 
 def register(app: typer.Typer) -> None:
     """Add the commands to the program."""
-    app.command()(train)
-    app.command()(export)
+    app.command(
+        epilog="Example: python -m benchmarks train --algo ppo --task displacement --seed 1"
+    )(train)
+    app.command(
+        epilog="Example: python -m benchmarks export model.zip "
+        "--env pma_gym/IsokineticRotation-v0 --trust"
+    )(export)
 
 
 def train(
@@ -29,8 +34,7 @@ def train(
     task: Annotated[
         str,
         typer.Option(
-            help="displacement, rotation, exercise (isokinetic), isotonic_exercise or "
-            "profile_exercise; others with a preset of one's own."
+            help="displacement, rotation, exercise, isotonic_exercise or profile_exercise."
         ),
     ],
     preset: Annotated[
@@ -38,19 +42,19 @@ def train(
     ] = "increment",
     seed: Annotated[int, typer.Option(min=0, help="Same seed, same policy.")] = 0,
     seeds: Annotated[
-        int, typer.Option(min=1, help="So many seeds from --seed on, each in a folder of its own.")
+        int, typer.Option(min=1, help="So many seeds from --seed on, a folder each.")
     ] = 1,
     steps: Annotated[
         int | None, typer.Option(min=1, help="Control steps; the preset's if not given.")
     ] = None,
     out: Annotated[
         Path | None,
-        typer.Option(help="Folder; results/training/PRESET-ALGO/TASK-SEED if not given."),
+        typer.Option(help="Else results/training/PRESET-ALGO/TASK-SEED."),
     ] = None,
     device: Annotated[str, typer.Option(help="Of PyTorch: cpu, cuda.")] = "cpu",
     threads: Annotated[int, typer.Option(min=1, help="Of PyTorch and the environments.")] = 1,
     patience: Annotated[
-        int, typer.Option(min=0, help="End after so many validations without progress; 0: never.")
+        int, typer.Option(min=0, help="Validations without progress, then end; 0: never.")
     ] = 0,
     jobs: Jobs = 1,
     executor: ExecutorOption = LOCAL,
@@ -100,7 +104,7 @@ def export(
     model: Annotated[Path, typer.Argument(help="Zip that Stable-Baselines3 saved.")],
     env: Annotated[str, typer.Option(help="Id of the environment that it was trained on.")],
     env_kwargs: Annotated[str, typer.Option(help="Its keyword arguments, as JSON.")] = "{}",
-    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; found out if empty.")] = "",
+    algo: Annotated[str, typer.Option(help="ppo, sac, td3 or tqc; read off if empty.")] = "",
     vecnormalize: Annotated[
         Path | None, typer.Option(help="Its statistics, if it was trained in a VecNormalize.")
     ] = None,

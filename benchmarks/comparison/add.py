@@ -19,7 +19,8 @@ from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import PendingCases, compile_kernels, execute, pending_cases
 from benchmarks.runner.provenance import check_folder, run_info, write_run
 from benchmarks.runner.user_controller import MAKE_S, probe
-from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.reproduction import ReproductionSuite
+from benchmarks.suites.suite import FrozenSuite, SuiteError
 from controllers import CONTROLLERS
 
 ENOUGH = 3
@@ -76,9 +77,16 @@ def run_add(
         console: where to print.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
+    Raises:
+        SuiteError: a suite without a leaderboard.
     """
     failed = False
     for suite in suites:
+        if isinstance(suite, ReproductionSuite):
+            raise SuiteError(
+                f"suite {suite.name} has a report of its own and no leaderboard; run "
+                f"python -m benchmarks --controllers {spec.source}"
+            )
         out = results / suite.name
         check_folder(suite, out)
         todo = pending_cases(suite, [suite.entry(spec)], out)

@@ -4,7 +4,7 @@ import shlex
 from pathlib import Path
 
 from benchmarks.files import RESULTS
-from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.suite import FrozenSuite
 
 
 def run_command(suite: FrozenSuite, folder: Path) -> str:

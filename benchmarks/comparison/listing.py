@@ -4,18 +4,14 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.runner.case import cases
-from benchmarks.suites.frozen import FrozenSuite, frozen_suite, suite_names
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.suites.suite import FrozenSuite
 
 
 def print_suites(console: Console) -> None:
     """A table of the suites and of who is compared on them."""
     table = Table("suite", "version", "stations", "episodes", "cases", "tasks")
     frozen = [frozen_suite(name) for name in suite_names()]
-    main = load_suite()
-    count = len(list(main.cases()))
-    models = ", ".join(main.models)
-    table.add_row(main.name, str(main.version), models, "17 a model", str(count), "2")
     for suite in frozen:
         table.add_row(
             suite.name,
@@ -31,6 +27,24 @@ def print_suites(console: Console) -> None:
         console.print(f"{suite.name}: {suite.title} ({_control(suite)})", highlight=False)
         console.print(f"  tasks: {', '.join(suite.tasks)}", highlight=False)
         console.print(f"  controllers: {names}", highlight=False)
+
+
+def suite_documents() -> list[dict[str, object]]:
+    """The frozen suites for programs: version, size, tasks and controllers."""
+    return [
+        {
+            "name": suite.name,
+            "version": suite.version,
+            "title": suite.title,
+            "stations": len(suite.stations),
+            "episodes": len(suite.episodes),
+            "cases": len(cases(suite, suite.entries)),
+            "tasks": list(suite.tasks),
+            "controllers": [entry.spec.name for entry in suite.entries],
+            "control_rate_hz": suite.control_rate_hz,
+        }
+        for suite in map(frozen_suite, suite_names())
+    ]
 
 
 def _control(suite: FrozenSuite) -> str:

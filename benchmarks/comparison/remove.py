@@ -7,8 +7,7 @@ from pathlib import Path
 
 from benchmarks.runner.journal import JOURNAL, rewriting
 from benchmarks.runner.provenance import read_run, write_run
-from benchmarks.suites.frozen import FrozenSuite
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.suite import FrozenSuite, SuiteError
 
 
 def remove_controller(name: str, suites: Sequence[FrozenSuite], results: Path) -> dict[Path, int]:

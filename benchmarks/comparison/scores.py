@@ -15,7 +15,7 @@ from benchmarks.runner.case import BY_LIMIT, Row
 from benchmarks.runner.controller_spec import ControllerError
 from benchmarks.runner.execution import PendingCases, identity, row_identity
 from benchmarks.runner.user_controller import LateError
-from benchmarks.suites.frozen import Entry
+from benchmarks.suites.suite import Entry
 
 SCORES = "scores.csv"
 

@@ -203,8 +203,9 @@ def json_text(document: dict[str, Any]) -> str:
 def fingerprint() -> str:
     """Of all code that a record depends on: the package's and the generator's."""
     here = Path(__file__).parent
-    folders = (here, here / "generation", here / "physics", here / "evaluation")
-    return code_digest_with([file for folder in folders for file in sorted(folder.glob("*.py"))])
+    folders = (here / "generation", here / "physics", here / "rigs", here / "evaluation")
+    files = [file for folder in folders for file in sorted(folder.rglob("*.py"))]
+    return code_digest_with([*sorted(here.glob("*.py")), *files])
 
 
 class Progress:

@@ -16,8 +16,8 @@ from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
+from pma_gym.plant.rigs import RIGS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def _compared(held: Sequence[Array], logged: Sequence[Logged]) -> dict[str, Arra
     by_figure: dict[str, list[float]] = {name: [] for name in FIGURES}
     for simulated, each in zip(held, logged, strict=True):
         for name, (signal, plus, minus, unit) in FIGURES.items():
-            channel = OUTPUTS.index(signal)
+            channel = RIGS["station"].outputs.index(signal)
             if {plus, minus} & set(each.missing[channel].tolist()):
                 continue
             off = simulated[channel] - each.measured[channel]
@@ -116,7 +116,7 @@ def limit_errors(model: Model, data: Dataset) -> dict[str, Array]:
         model: as it is.
         data: trials of I3; those without a load are passed over.
     """
-    loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
+    loaded = [each for each in data.trials if each.trial.measures("angle")]
     errors = _errors(model, loaded, [each.trial for each in loaded])
     at_load = _errors(model, loaded, [_at_measured_load(each.trial, model) for each in loaded])
     return {**errors, AT_LOAD: at_load["extension_mm"]}
@@ -139,7 +139,7 @@ def _errors(
         model,
         trials,
         some,
-        tuple(white_noise(1.0) for _ in OUTPUTS),
+        tuple(white_noise(1.0) for _ in RIGS["station"].outputs),
         np.array([np.inf]),
         own={path: [float(each.order or 0.0) for each in loaded] for path in _repeats(model)},
     )
@@ -167,7 +167,7 @@ def rms(errors: Array) -> float:
 def repeat_scatter(data: Dataset) -> dict[str, float]:
     """Rms of I3's rows about the mean of their repeats, in file units, by `FIGURES`."""
     groups: dict[str, list[int]] = {}
-    loaded = [each for each in data.trials if "rotation" in each.trial.measurements]
+    loaded = [each for each in data.trials if each.trial.measures("angle")]
     for i, each in enumerate(loaded):
         groups.setdefault(each.repeat_of or each.name, []).append(i)
     scatter = {}

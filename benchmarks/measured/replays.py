@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.reproduction.execution import Execution, Outcome, run_case
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise
-from benchmarks.reproduction.results import Results
+from benchmarks.reproduction.results import Results, scores_of
+from benchmarks.runner.case import cases, run_case
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.reproduction import Suite, load_suite
+from benchmarks.suites.reproduction import ReproductionSuite, load_suite
 
 PHASE_NAMES = {
     "displacement": "displacement (tables 21, 22)",
@@ -46,7 +46,7 @@ class Replay:
     errors: tuple[ReplayError, ...] = ()
 
 
-def replays(model: Path | str, suite: Suite | None = None) -> list[Replay]:
+def replays(model: Path | str, suite: ReproductionSuite | None = None) -> list[Replay]:
     """Replay the printed voltages on a model, open loop.
 
     Args:
@@ -57,20 +57,16 @@ def replays(model: Path | str, suite: Suite | None = None) -> list[Replay]:
     """
     suite = suite or load_suite()
     suite = suite.select([str(model)], [_replay(suite)])
-    outcomes = tuple(_outcome(suite, case) for case in suite.cases())
-    results = Results(suite, Execution(outcomes, {}, True), {})
+    rows = [run_case(case) for case in cases(suite, suite.entries)]
+    results = Results(suite, scores_of(suite, rows))
     return [
         _summary(task, phase, errors)
         for (task, phase), errors in all_replay_errors(results, str(model)).items()
     ]
 
 
-def _outcome(suite: Suite, case) -> Outcome:  # noqa: ANN001
-    return run_case(case, suite)
-
-
-def _replay(suite: Suite) -> ControllerSpec:
-    return next(each for each in suite.controllers if each.name == suite.targets.replay)
+def _replay(suite: ReproductionSuite) -> ControllerSpec:
+    return next(each for each in suite.controllers if each.name == suite.goals.replay)
 
 
 def _summary(task: str, phase: str, errors: Sequence[ReplayError]) -> Replay:

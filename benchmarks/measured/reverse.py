@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, least_squares
 
 from benchmarks.reproduction.rotation_reading import reading
-from benchmarks.reproduction.score import PHASES, measured_score
+from benchmarks.runner.phase_score import PHASES, measured_score
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
@@ -25,10 +25,11 @@ from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.metrics import PHASE_DURATION, regression
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.memory_start import memory_at_start
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import RIGS
+from pma_gym.tasks import EVERY_TASK
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
@@ -242,7 +243,7 @@ class Summary:
                     np.sqrt(score.residual_mean_square) * unit,
                 ]
                 pressures += 3 * [pressure]
-                rotation += 3 * [task == "rotation"]
+                rotation += 3 * [EVERY_TASK[task].protocol.followed.is_angle]
         return cls(trials, tasks, np.array(pressures), np.array(rotation), np.array(figures))
 
     def residuals(self, whitened: WhitenedResiduals, at: Array) -> Array:
@@ -251,7 +252,7 @@ class Summary:
 
     def beside(self, model: Model, free: Sequence[str]) -> WhitenedResiduals:
         """The trials beside a model, as one that simulates them at parameters."""
-        noise = tuple(white_noise(1.0) for _ in OUTPUTS)
+        noise = tuple(white_noise(1.0) for _ in RIGS["station"].outputs)
         return WhitenedResiduals(model, self.trials, free, noise, np.full(len(free), np.inf))
 
     def left(
@@ -267,11 +268,11 @@ class Summary:
             return np.full(self.figures.shape, 1e3)
         residuals = []
         for signals, trial, task in zip(held, self.trials, self.tasks, strict=True):
-            contraction = signals[OUTPUTS.index("contraction")]
+            contraction = signals[RIGS["station"].outputs.index("contraction")]
             position = (
                 (contraction[0] - contraction) * 1e3
                 if task == "displacement"
-                else read(signals[OUTPUTS.index("rotation")]) * pulley() * 1e3
+                else read(signals[RIGS["station"].outputs.index("rotation")]) * pulley() * 1e3
             )
             for number in range(len(PHASES[task])):
                 begin = PHASE_DURATION * number

@@ -59,9 +59,7 @@ def _error(seen: Dataset, unseen: Dataset, figure: str, at_load: bool) -> float:
 
 def _rows(data: Dataset, figure: str, at_load: bool) -> tuple[Array, Array]:
     """What is known of each row, shape (rows, 2), and its figure in file units, shape (rows,)."""
-    trials: Sequence[Trial] = [
-        each.trial for each in data.trials if "rotation" in each.trial.measurements
-    ]
+    trials: Sequence[Trial] = [each.trial for each in data.trials if each.trial.measures("angle")]
     signal, plus, minus, unit = FIGURES[figure]
     read = np.array([each.measurements[signal] for each in trials])
     values = (read[:, plus] - read[:, minus]) / SI_FACTORS[unit]

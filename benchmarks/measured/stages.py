@@ -15,14 +15,16 @@ from pma_gym.document_shape import check_shape, shape_of
 from pma_gym.documents import read_json
 
 ELSEWHERE = (
-    "reproduction/execution",
     "reproduction/replay",
     "reproduction/results",
-    "reproduction/score",
     "reproduction/targets",
+    "runner/case",
     "runner/controller_spec",
+    "runner/phase_score",
     "runner/rollout",
+    "suites/frozen",
     "suites/reproduction",
+    "suites/suite",
 )
 """Modules of the benchmark, beside its own, that a stage depends on."""
 

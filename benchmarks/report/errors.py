@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from benchmarks.report.statistics import Draws, resample
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.frozen import NOMINAL, Entry, Episode, FrozenSuite
+from benchmarks.suites.suite import NOMINAL, Entry, Episode, FrozenSuite
 from controllers.design.designs import kind_of
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.tasks import EVERY_TASK, Task, named_task

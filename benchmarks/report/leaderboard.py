@@ -14,8 +14,7 @@ from benchmarks.report.standings import Standings
 from benchmarks.report.tables import standings_table
 from benchmarks.report.verdicts import Verdict, bounds_needed, verdicts
 from benchmarks.runner.provenance import check_run, finished_rows, read_run
-from benchmarks.suites.frozen import Entry, FrozenSuite
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import StationInfo
 from pma_gym.pages.notebook import notebook_html

@@ -1,6 +1,7 @@
 """The leaderboard's page: what stands on it, in which order, with which words."""
 
 from benchmarks.report.errors import PERCENT, is_bound, task_of
+from benchmarks.report.interactive import case_figures
 from benchmarks.report.leaderboard import Leaderboard
 from benchmarks.report.loop_plots import loop_plot, loop_title, margin_table
 from benchmarks.report.plot_style import styles_of
@@ -14,7 +15,6 @@ from benchmarks.report.tables import (
     spending_table,
     standings_table,
     tasks_table,
-    verdict_table,
 )
 from benchmarks.report.tracking_cost import spending
 from benchmarks.runner.fingerprint import code_digest
@@ -25,16 +25,14 @@ _RANKS = (
     "1–3 means that these controllers cannot be told apart. Intervals come from 2000 resamples of "
     "what was drawn at random, stations or noise, the same for all controllers. “Over the best” "
     "compares two controllers on the same stations and so resolves far finer differences than "
-    "their two intervals. A failed case counts as an error of the whole range. `docs/scores.md` "
-    "defines every figure."
+    "their two intervals. A failed case counts as an error of the whole range. "
+    "`docs/reference/score-definitions.md` defines every figure."
 )
 
 
 def page_blocks(leaderboard: Leaderboard) -> list[Block]:
     """The whole page."""
     blocks = _opening(leaderboard)
-    if leaderboard.verdicts:
-        blocks += [Heading("Targets"), verdict_table(leaderboard.verdicts)]
     blocks += _ranking_blocks(leaderboard)
     blocks += _obstacle_blocks(leaderboard)
     blocks += _picture_blocks(leaderboard)
@@ -176,6 +174,7 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
             "higher and further left, the better. Bands: 95 %, of each point by itself.",
         ),
         Picture("pressures", "Median error by pressure, on a logarithmic scale."),
+        *case_figures(_shown(leaderboard, pooled=False), styles_of(leaderboard.labels)),
     ]
 
 

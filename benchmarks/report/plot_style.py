@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from benchmarks.suites.reproduction import Suite
+from benchmarks.suites.reproduction import ReproductionSuite
 
 Dashes = Literal["-", "--", "-.", ":"]
 
@@ -60,7 +60,7 @@ class Style:
     line: Dashes = "-"
 
 
-def controller_styles(suite: Suite) -> dict[str, Style]:
+def controller_styles(suite: ReproductionSuite) -> dict[str, Style]:
     """A style for each controller of a suite, by name."""
     return styles_of({controller.name: controller.label for controller in suite.controllers})
 

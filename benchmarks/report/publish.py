@@ -4,19 +4,17 @@ import csv
 import io
 import shutil
 from collections.abc import Callable
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.bounds.cache import Bounds
 from benchmarks.executors.local import Background
 from benchmarks.files import write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import loop_pictures, page_blocks, score_pictures
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
-from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.suite import FrozenSuite
 from pma_gym.cli.progress import StepProgress
 from pma_gym.pages.document import to_html, to_markdown
 
@@ -39,8 +37,8 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> Path:
     Raises:
         SuiteError: there are no results of this suite and version.
     """
-    with Bounds(suite.model, out) as bounds, StepProgress() as progress:
-        return write_leaderboard(read_leaderboard(suite, results, bounds), out, progress)
+    with StepProgress() as progress:
+        return write_leaderboard(read_leaderboard(suite, results), out, progress)
 
 
 def write_leaderboard(
@@ -55,18 +53,14 @@ def write_leaderboard(
     Returns:
         The page.
     """
-    leaderboard.start_bounds()
-    # Without the bounds, which are computed in processes of their own.
-    with Background(partial(score_pictures, replace(leaderboard, bounds=None))) as plots:
+    with Background(partial(score_pictures, leaderboard)) as plots:
         _compute(leaderboard, progress)
         progress("plots", 0, 2)
         of_loops = loop_pictures(leaderboard)
         progress("plots", 1, 2)
         pictures = plots.result() | of_loops
         progress("plots", 2, 2)
-    progress("achievable bounds", 0, 1)
     blocks = page_blocks(leaderboard)
-    progress("achievable bounds", 1, 1)
     texts = {
         TEXT: to_markdown(blocks, pictures, PLOTS),
         PAGE: to_html(blocks, pictures),

@@ -49,6 +49,11 @@ class Verdict(NamedTuple):
             return "—"
         return "met" if self.got.estimate <= self.most else "missed"
 
+    def document(self) -> dict[str, object]:
+        """The target for programs."""
+        got = None if self.got is None else float(self.got.estimate)
+        return {"target": self.what, "limit": self.most, "got": got, "verdict": self.word}
+
 
 def verdicts(
     targets: tuple[Target, ...],

@@ -1,47 +1,34 @@
-"""The main job: run a suite, write its results, say how it went."""
+"""The main job: run the reproduction, write its results, say how it went."""
 
-import shlex
-import shutil
-import sys
-import time
-from collections.abc import Callable
-from dataclasses import asdict, replace
-from datetime import UTC, datetime
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    TextColumn,
-    TimeElapsedColumn,
-)
 
+from benchmarks.bounds.cache import Bounds
 from benchmarks.executors.executor import Executor
-from benchmarks.files import write_bytes, write_text
-from benchmarks.reproduction.execution import Execution, compile_models, execute
-from benchmarks.reproduction.page import report_blocks, report_pictures
-from benchmarks.reproduction.replay import all_replay_errors
-from benchmarks.reproduction.results import Results, csv_text, json_text
-from benchmarks.reproduction.rotation_reading import entries
-from benchmarks.reproduction.summary import print_failures, print_summary
-from benchmarks.reproduction.targets import check_targets
-from benchmarks.runner.environment_info import environment_info
-from benchmarks.suites.reproduction import Suite
-from pma_gym.pages.document import to_html, to_markdown
+from benchmarks.reproduction.pictured import pictured_trials
+from benchmarks.reproduction.report import write_report
+from benchmarks.reproduction.results import Results, Score, scores_of
+from benchmarks.reproduction.summary import print_summary
+from benchmarks.runner.execution import pending_cases
+from benchmarks.runner.provenance import check_run, read_run
+from benchmarks.runner.run import FAILED, INTERRUPTED, SuiteRun, run_missing, say_interrupted
+from benchmarks.suites.reproduction import ReproductionSuite
+from benchmarks.suites.suite import SuiteError
 
-PLOTS = "plots"
-PARTIAL = "partial"
-FAILED, INTERRUPTED = 1, 130
-"""Exit codes."""
+_OF_THE_SUITE = ("schema", "suite", "contenders", "complete", "code")
+"""Entries of `run.json` that `scores.json` says otherwise."""
+
+_TIMES = ("steps", "step_seconds", "seconds")
 
 
-def run_job(suite: Suite, out: Path, executor: Executor, console: Console) -> int:
-    """Run every case of a suite and write scores and report.
+def run_job(suite: ReproductionSuite, out: Path, executor: Executor, console: Console) -> int:
+    """Run what is missing of a suite, and write its report.
 
-    Files of an earlier run stay whole until this one ends and replaces them. Ctrl-C drops the cases
-    in progress and writes those that are done to `partial/` in the same folder.
+    Files of an earlier report stay whole until this one replaces them.
 
     Args:
         suite: what to run.
@@ -50,141 +37,88 @@ def run_job(suite: Suite, out: Path, executor: Executor, console: Console) -> in
         console: where to print.
     Returns:
         Exit code: 0, 1 if a case failed, 130 if it was interrupted.
-    Raises:
-        KeyboardInterrupt: Ctrl-C before the cases began: nothing is written.
     """
-    began = time.perf_counter()
-    info = environment_info() | {
-        "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "command": shlex.join(["python", "-m", "benchmarks", *sys.argv[1:]]),
-        "jobs": executor.jobs,
-    }
-    # Now, so that a folder that cannot be made ends the job before it has run.
-    out.mkdir(parents=True, exist_ok=True)
-    console.print(_greeting(suite, out, executor.jobs), highlight=False)
-    with console.status("compiling the models"):
-        compile_models(suite)
-    with _progress(console) as progress:
-        execution = execute(suite, executor, _advance(progress, suite))
-    info |= _speed(execution)
-    if not execution.complete:
-        info["wall_time_s"] = time.perf_counter() - began
-        return _leave_partial(Results(suite, execution, info), out, console)
+    run = run_missing(suite, suite.entries, out, executor, console)
+    if not run.complete:
+        return INTERRUPTED
     try:
-        with console.status("writing the report"):
-            results = _write_results(Results(suite, execution, info), out, began)
-    except KeyboardInterrupt:
-        return _leave_partial(Results(suite, execution, info), out, console)
-    try:
+        results = _reported(suite, run, out, executor, console)
         print_summary(results, out / "report.html", console)
     except KeyboardInterrupt:
-        console.print(f"Interrupted when all was done: the report is in {out}.", highlight=False)
+        say_interrupted(run, out, console)
         return INTERRUPTED
     return FAILED if results.failures else 0
 
 
-def _greeting(suite: Suite, out: Path, jobs: int) -> str:
-    count = len(list(suite.cases()))
-    words = f"Suite {suite.name} version {suite.version}: {count} cases, {jobs} at a time"
-    if (out / "scores.json").exists():
-        words += f"\nstarting fresh; the earlier results in {out} are replaced when this ends"
-    if (out / PARTIAL).exists():
-        words += f"\nan interrupted run's {out / PARTIAL} is not used"
-    return words
+def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Executor) -> Path:
+    """Write the report of a run that is in a folder; nothing is scored.
+
+    Args:
+        suite: what was run.
+        folder: of the run.
+        out: folder of the page; may be the same.
+        executor: where what the page needs beside the rows is computed.
+    Returns:
+        The page.
+    Raises:
+        SuiteError: not all of the suite is there.
+    """
+    todo, info = pending_cases(suite, suite.entries, folder), read_run(folder)
+    if todo.missing or not info.get("complete"):
+        raise SuiteError(
+            f"{folder} lacks {len(todo.missing)} of {len(todo.cases)} cases of suite {suite.name}; "
+            f"run them: python -m benchmarks run --suite {suite.source} --out {folder}"
+        )
+    check_run(folder, info, suite.source)
+    out.mkdir(parents=True, exist_ok=True)
+    run = SuiteRun(todo, list(todo.known.values()), info, 0.0, complete=True)
+    write_report(_results(suite, run, folder, executor), out)
+    return out / "report.html"
 
 
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[last]}", markup=False),
-        console=console,
-    )
+def _reported(
+    suite: ReproductionSuite, run: SuiteRun, out: Path, executor: Executor, console: Console
+) -> Results:
+    """The results of a run, with their report."""
+    run.info["cases_reused"] = len(run.todo.known)
+    with console.status("driving the trials that are drawn, computing the achievable bounds"):
+        results = _results(suite, run, out, executor)
+    run.finish(out)
+    info = {**results.info, "wall_time_s": run.info["wall_time_s"]}
+    results = replace(results, info=info)
+    with console.status("writing the report"):
+        write_report(results, out)
+    return results
 
 
-def _advance(progress: Progress, suite: Suite) -> Callable[[str, bool], None]:
-    """A bar that a finished case moves on, and a count of those that failed."""
-    total = len(list(suite.cases())) + len(suite.pressures_kpa.get("rotation", ()))
-    bar = progress.add_task("cases and bounds", total=total, last="")
-    failures = 0
+def _results(suite: ReproductionSuite, run: SuiteRun, folder: Path, executor: Executor) -> Results:
+    """What the report is made of: scores, bounds, and the trials that it draws.
 
-    def done(name: str, failed: bool) -> None:
-        nonlocal failures
-        failures += failed
-        words = f" ({failures} failed)" if failures else ""
-        progress.update(bar, advance=1, last=name + words)
+    Raises:
+        KeyboardInterrupt: Ctrl-C; bounds that are done stay in the folder.
+    """
+    scores = scores_of(suite, run.rows)
+    failed = {score.case.name for score in scores if score.failure}
+    pictured = pictured_trials(suite, run.todo, failed, executor)
+    pressures = suite.pressures_kpa.get("rotation", ())
+    with Bounds(suite.models[0], folder) as bounds:
+        failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)
+        known = {p: bound for p in pressures if (bound := bounds.known("rotation", p)) is not None}
+    if not complete:
+        raise KeyboardInterrupt
+    reasons = {pressure: why for (_, pressure), why in failures.items()}
+    return Results(suite, scores, _info(run, scores), known, reasons, pictured)
 
-    return done
 
-
-def _speed(execution: Execution) -> dict[str, float]:
-    """Control steps in all, and a second: of the environment alone, and of whole cases."""
-    scores = [outcome.score for outcome in execution.outcomes if not outcome.score.failure]
-    steps = sum(score.steps for score in scores)
-    inside = sum(score.step_seconds for score in scores)
-    whole = sum(score.seconds for score in scores)
-    return {
+def _info(run: SuiteRun, scores: Sequence[Score]) -> dict[str, Any]:
+    """What the report says of a run: how it was made, and how fast its cases were."""
+    last = next(iter(run.info["contenders"].values()))
+    info = {name: value for name, value in run.info.items() if name not in _OF_THE_SUITE}
+    info |= {name: last[name] for name in ("command", "started")}
+    times = [score.times for score in scores if score.times]
+    steps, inside, whole = (sum(each[name] for each in times) for name in _TIMES)
+    return info | {
         "environment_steps": steps,
         "environment_steps_per_second": steps / inside if inside else 0.0,
         "case_steps_per_second": steps / whole if whole else 0.0,
     }
-
-
-def _write_results(results: Results, out: Path, began: float) -> Results:
-    """Write everything; the results with the time that they took."""
-    pictures = report_pictures(results)
-    info = dict(results.info)
-    # What is left to do takes a fraction of a second.
-    info["wall_time_s"] = time.perf_counter() - began
-    results = replace(results, info=info)
-    checks = check_targets(results)
-    blocks = report_blocks(results, checks)
-    texts = {
-        "report.md": to_markdown(blocks, pictures, PLOTS),
-        "report.html": to_html(blocks, pictures),
-        "scores.csv": csv_text(results.scores),
-    }
-    replay = [
-        asdict(error)
-        for errors in all_replay_errors(results, results.suite.models[0]).values()
-        for error in errors
-    ]
-    targets = [asdict(check) | {"verdict": check.verdict} for check in checks]
-    texts["scores.json"] = json_text(
-        results,
-        targets=targets,
-        replay_errors=replay,
-        rotation_reading=entries(results.suite.models[0]) if replay else [],
-    )
-    # All is computed before anything is replaced, so that no folder mixes two runs.
-    shutil.rmtree(out / PLOTS, ignore_errors=True)
-    for name, image in pictures.items():
-        write_bytes(out / PLOTS / f"{name}.png", image)
-    for name, text in texts.items():
-        write_text(out / name, text)
-    shutil.rmtree(out / PARTIAL, ignore_errors=True)
-    return results
-
-
-def _leave_partial(results: Results, out: Path, console: Console) -> int:
-    """Write the scores of an interrupted run beside the last whole run's, and say so."""
-    folder = out / PARTIAL
-    if not results.scores:
-        console.print(
-            "Interrupted before the first case was done: nothing was measured, and "
-            f"nothing is written to {out}. Run again for the whole.",
-            highlight=False,
-        )
-        return INTERRUPTED
-    write_text(folder / "scores.csv", csv_text(results.scores))
-    write_text(folder / "scores.json", json_text(results))
-    total = len(list(results.suite.cases()))
-    console.print(
-        f"Interrupted: {len(results.scores)} of {total} cases are done; their scores "
-        f"are in {folder}. There is no report of a part; run again for the whole.",
-        highlight=False,
-    )
-    print_failures(results, console)
-    return INTERRUPTED

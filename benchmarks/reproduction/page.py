@@ -7,10 +7,10 @@ from benchmarks.reproduction.plots import actual_against_ideal_plot, tracking_pl
 from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.replay_page import replay_blocks
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import PHASES
 from benchmarks.reproduction.summary_plots import replay_plot, rmse_plot
 from benchmarks.reproduction.tables import regression_table, rmse_table, target_table
 from benchmarks.reproduction.targets import Check
+from benchmarks.runner.phase_score import PHASES
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import load_model
 
@@ -117,6 +117,8 @@ def _failure_blocks(results: Results) -> list[Block]:
 def _origin_blocks(results: Results) -> list[Block]:
     """How the run can be made again."""
     info: Mapping[str, Any] = results.info
+    reused = info.get("cases_reused", 0)
+    went_on = f"; {reused} cases were done before" if reused else ""
     git = info["git"]
     state = {True: "with changes that are not committed", False: "clean", None: ""}[git["dirty"]]
     rows = [
@@ -125,7 +127,7 @@ def _origin_blocks(results: Results) -> list[Block]:
         ["Machine", f"{info['platform']}, {info['processors']} processors"],
         ["Started", str(info["started"])],
         ["Command", f"`{info['command']}`"],
-        ["Wall time", f"{info['wall_time_s']:.1f} s with {info['jobs']} processes"],
+        ["Wall time", f"{info['wall_time_s']:.1f} s with {info['jobs']} processes{went_on}"],
         [
             "Environment steps",
             f"{info['environment_steps']}; in one process "

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.report.plot_style import MEASURED, REFERENCE, Style, controller_styles
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import UNITS, measured_score
+from benchmarks.runner.phase_score import UNITS, measured_score
 from pma_gym.data.protocol import PROTOCOLS, Protocol
 from pma_gym.data.trial import Trial
 from pma_gym.metrics import phase_times

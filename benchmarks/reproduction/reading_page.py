@@ -8,7 +8,7 @@ from benchmarks.reproduction.rotation_reading import (
     mean_absolute_error,
     read_trials,
 )
-from benchmarks.reproduction.score import PHASES
+from benchmarks.runner.phase_score import PHASES
 from pma_gym.pages.document import Block, Heading, Paragraph, TextTable
 from pma_gym.plant.plant import Plant
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import PHASES, PhaseScore, measured_score
+from benchmarks.runner.phase_score import PHASES, PhaseScore, measured_score
 from pma_gym.data.serres2008 import load_table
 
 QUANTITIES = ("slope", "intercept", "mean", "rmse", "line_error", "scatter")
@@ -60,7 +60,7 @@ def replay_errors(results: Results, model: str, task: str, phase: str) -> list[R
     """Errors of the replay on a model, trial by trial; failed cases are left out."""
     errors = []
     for pressure in results.suite.pressures_kpa.get(task, ()):
-        replay = results.suite.targets.replay
+        replay = results.suite.goals.replay
         simulated = results.phase(model, replay, task, pressure, phase)
         if simulated is not None:
             measured = measured_score(task, phase, pressure)

@@ -6,9 +6,9 @@ from statistics import fmean
 from benchmarks.reproduction.reading_page import reading_blocks
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import measured_score
 from benchmarks.reproduction.score_parts import parts_explained, parts_table
 from benchmarks.reproduction.tables import replay_table
+from benchmarks.runner.phase_score import measured_score
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import shipped_models
 
@@ -56,7 +56,7 @@ def _origin(model: str) -> str:
 
 def displacement_verdict(results: Results, errors: Sequence[ReplayError]) -> str:
     """Whether the model predicts the displacement trials better than the simple prediction."""
-    line = results.suite.targets.simple_prediction
+    line = results.suite.goals.simple_prediction
     got = summarise(errors).absolute
     better = [_NAMES[name] for name in _NAMES if got[name] < line[name]]
     worse = [_NAMES[name] for name in _NAMES if got[name] >= line[name]]
@@ -72,7 +72,7 @@ def displacement_verdict(results: Results, errors: Sequence[ReplayError]) -> str
 
 def _against_simple_prediction(results: Results, errors: Sequence[ReplayError]) -> TextTable:
     """Mean absolute errors over the displacement trials beside the line to beat."""
-    line = results.suite.targets.simple_prediction
+    line = results.suite.goals.simple_prediction
     means = summarise(errors)
     rows = [
         [

@@ -4,14 +4,15 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, fields
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from functools import cached_property
 from typing import Any
 
-from benchmarks.reproduction.execution import Execution
-from benchmarks.reproduction.score import PHASES, UNITS, PhaseScore, Score, measured_score
-from benchmarks.suites.reproduction import Suite
+from benchmarks.runner.case import Case, Row, cases
+from benchmarks.runner.execution import identity, row_identity
+from benchmarks.runner.phase_score import PHASES, UNITS, PhaseScore, measured_score
+from benchmarks.suites.reproduction import ReproductionSuite
 from pma_gym.data.trial import Trial
 
 SCHEMA = 1
@@ -25,41 +26,80 @@ CSV_COLUMNS = (
 
 
 @dataclass(frozen=True)
+class Score:
+    """A case and its figures.
+
+    Attributes:
+        case: what was run.
+        seed: of its episode.
+        phases: figures by phase; none if it failed.
+        failure: why it has no figures; empty if it has.
+        times: control steps that it took (`steps`), time inside them (`step_seconds`, s) and of
+            the whole case (`seconds`, s); empty if it failed.
+    """
+
+    case: Case
+    seed: int
+    phases: Mapping[str, PhaseScore]
+    failure: str
+    times: Mapping[str, float]
+
+    @classmethod
+    def of(cls, case: Case, row: Row) -> "Score":
+        """A row of the journal."""
+        phases = {name: PhaseScore(**figures) for name, figures in row.get("lines", {}).items()}
+        return cls(case, row["seed"], phases, row["failure"], row.get("times", {}))
+
+    @property
+    def key(self) -> tuple[str, str, str, float]:
+        """Model, controller, task and pressure (kPa)."""
+        episode = self.case.episode
+        return self.model, self.case.spec.name, episode.task, episode.pressure_kpa
+
+    @property
+    def model(self) -> str:
+        """Name or path of the model."""
+        suite = self.case.suite
+        assert isinstance(suite, ReproductionSuite)
+        return suite.models[self.case.episode.station]
+
+
+def scores_of(suite: ReproductionSuite, rows: Iterable[Row]) -> list[Score]:
+    """Scores in the order of the results: models, controllers, tasks, pressures."""
+    by_case = {row_identity(row): row for row in rows}
+    order = {entry.spec.name: at for at, entry in enumerate(suite.entries)}
+    wanted = sorted(
+        cases(suite, suite.entries), key=lambda case: (case.episode.station, order[case.spec.name])
+    )
+    return [Score.of(case, by_case[its]) for case in wanted if (its := identity(case)) in by_case]
+
+
+@dataclass(frozen=True)
 class Results:
     """A run of a suite.
 
     Attributes:
-        suite: what was to be run.
-        execution: what became of its cases, and the bounds.
+        suite: what was run.
+        scores: of its cases, in the suite's order.
         info: versions, commit, machine, times.
+        bounds: smallest RMSE (deg) achievable in phase III of rotation, by pressure (kPa).
+        bound_failures: why others have none, by pressure (kPa).
+        pictured: trials that are drawn, by controller, task and pressure (kPa).
     """
 
-    suite: Suite
-    execution: Execution
-    info: Mapping[str, Any]
-
-    @property
-    def complete(self) -> bool:
-        """Whether every case of the suite was run."""
-        return self.execution.complete
-
-    @property
-    def bounds(self) -> dict[float, float]:
-        """Smallest RMSE (deg) achievable in phase III of rotation, by pressure (kPa)."""
-        bounds = self.execution.bounds.items()
-        return {p: bound.rmse_deg for p, bound in bounds if bound.rmse_deg is not None}
-
-    @cached_property
-    def scores(self) -> list[Score]:
-        """Scores in the suite's order."""
-        return [outcome.score for outcome in self.execution.outcomes]
+    suite: ReproductionSuite
+    scores: Sequence[Score] = ()
+    info: Mapping[str, Any] = field(default_factory=dict)
+    bounds: Mapping[float, float] = field(default_factory=dict)
+    bound_failures: Mapping[float, str] = field(default_factory=dict)
+    pictured: Mapping[tuple[str, str, float], Trial] = field(default_factory=dict)
 
     @property
     def failures(self) -> list[tuple[str, str]]:
         """Name and reason of every case or bound that has no figures."""
-        cases = [(score.case.name, score.failure) for score in self.scores if score.failure]
-        bounds = [(b.name, b.failure) for b in self.execution.bounds.values() if b.failure]
-        return cases + bounds
+        failed = [(score.case.name, score.failure) for score in self.scores if score.failure]
+        bounds = self.bound_failures.items()
+        return failed + [(f"achievable bound at {p:g} kPa", why) for p, why in bounds]
 
     def failure_reasons(self) -> list[tuple[str, str]]:
         """Each reason of failures once, after the first name that it struck and how many more."""
@@ -74,9 +114,9 @@ class Results:
     @cached_property
     def _phases(self) -> dict[tuple[str, str, str, float, str], PhaseScore]:
         return {
-            (s.case.model, s.case.controller.name, s.case.task, s.case.pressure_kpa, phase): figures
-            for s in self.scores
-            for phase, figures in s.phases.items()
+            (*score.key, phase): figures
+            for score in self.scores
+            for phase, figures in score.phases.items()
         }
 
     def phase(
@@ -86,12 +126,11 @@ class Results:
         return self._phases.get((model, controller, task, pressure, phase))
 
     def trials(self, task: str, pressure: float) -> dict[str, Trial]:
-        """The kept trials of the first model, by controller."""
+        """The trials of the first model that are drawn, by controller."""
         return {
-            outcome.score.case.controller.name: outcome.trial
-            for outcome in self.execution.outcomes
-            if outcome.trial is not None
-            and (outcome.score.case.task, outcome.score.case.pressure_kpa) == (task, pressure)
+            entry.spec.name: self.pictured[key]
+            for entry in self.suite.entries
+            if (key := (entry.spec.name, task, pressure)) in self.pictured
         }
 
 
@@ -101,14 +140,14 @@ def csv_text(scores: Iterable[Score]) -> str:
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(CSV_COLUMNS)
     for score in scores:
-        case = score.case
-        head = [case.model, case.controller.name, case.task, f"{case.pressure_kpa:g}"]
+        model, controller, task, pressure = score.key
+        head = [model, controller, task, f"{pressure:g}"]
         for phase, figures in score.phases.items():
-            row = [*head, phase, UNITS[case.task], score.seed]
+            row = [*head, phase, UNITS[task], score.seed]
             writer.writerow([*row, *(repr(getattr(figures, name)) for name in FIGURES), ""])
         if score.failure:
             blank = [""] * len(FIGURES)
-            writer.writerow([*head, "", UNITS[case.task], score.seed, *blank, score.failure])
+            writer.writerow([*head, "", UNITS[task], score.seed, *blank, score.failure])
     return out.getvalue()
 
 
@@ -122,7 +161,7 @@ def json_text(results: Results, **more: object) -> str:
     suite = results.suite
     document = {
         "schema": SCHEMA,
-        "complete": results.complete,
+        "complete": True,
         "suite": {
             "name": suite.name,
             "version": suite.version,
@@ -144,20 +183,20 @@ def json_text(results: Results, **more: object) -> str:
 
 
 def _entry(score: Score) -> dict[str, object]:
-    case = score.case
+    model, controller, task, pressure = score.key
     return {
-        "model": case.model,
-        "controller": case.controller.name,
-        "task": case.task,
-        "pressure_kpa": case.pressure_kpa,
-        "unit": UNITS[case.task],
+        "model": model,
+        "controller": controller,
+        "task": task,
+        "pressure_kpa": pressure,
+        "unit": UNITS[task],
         "seed": score.seed,
         "failure": score.failure or None,
         "phases": {phase: asdict(figures) for phase, figures in score.phases.items()},
     }
 
 
-def _measured(suite: Suite) -> list[dict[str, object]]:
+def _measured(suite: ReproductionSuite) -> list[dict[str, object]]:
     """The dissertation's own trials, as far as the suite repeats them."""
     return [
         {

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.reproduction.score import PHASES, PhaseScore, measured_score, score_trial
+from benchmarks.runner.phase_score import PHASES, PhaseScore, measured_score, score_trial
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
 from pma_gym.metrics import PHASE_SAMPLES, SAMPLE_RATE_HZ

@@ -3,8 +3,8 @@
 from statistics import fmean
 
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import UNITS, PhaseScore, measured_score
 from benchmarks.reproduction.tables import MISSING, RULE
+from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
 from pma_gym.pages.document import Paragraph, TextTable
 
 PARTS = ("rmse", "line_error", "scatter")
@@ -15,7 +15,7 @@ _NAMES = ("RMSE", "line part", "scatter")
 
 def parts_table(results: Results, task: str, phase: str) -> TextTable:
     """RMSE, its part in the regression line and its part about it, measured and replayed."""
-    unit, replay = UNITS[task], results.suite.targets.replay
+    unit, replay = UNITS[task], results.suite.goals.replay
     pressures = results.suite.pressures_kpa[task]
     measured = [measured_score(task, phase, pressure) for pressure in pressures]
     model = results.suite.models[0]

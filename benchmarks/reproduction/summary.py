@@ -7,9 +7,9 @@ from rich.console import Console
 from rich.table import Table
 
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import PHASES, UNITS
 from benchmarks.reproduction.tables import columns
 from benchmarks.reproduction.targets import check_targets
+from benchmarks.runner.phase_score import PHASES, UNITS
 
 _COLOURS = {"met": "green", "missed": "red", "no figure": "dim"}
 

@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 from benchmarks.report.plot_style import BOUND, MEASURED, controller_styles
 from benchmarks.reproduction.replay import QUANTITIES, all_replay_errors, summarise
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import PHASES, UNITS, measured_score
+from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
 from pma_gym.pages.figures import legend_below, picture, png
 
 _GREY = "#666666"
@@ -62,7 +62,7 @@ def rmse_plot(results: Results, task: str) -> bytes:
 def replay_plot(results: Results) -> bytes:
     """Signed errors of the replay: a row a quantity, a column a phase, a bar a trial."""
     errors = all_replay_errors(results, results.suite.models[0])
-    color = controller_styles(results.suite)[results.suite.targets.replay].color
+    color = controller_styles(results.suite)[results.suite.goals.replay].color
     with picture(11.0, 12.4) as figure:
         axes: Any = figure.subplots(len(QUANTITIES), len(errors), sharex="col", squeeze=False)
         for column, ((task, phase), trials) in enumerate(errors.items()):

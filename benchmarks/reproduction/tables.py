@@ -5,8 +5,8 @@ from statistics import fmean
 
 from benchmarks.reproduction.replay import QUANTITIES, ReplayError, summarise
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.score import UNITS, PhaseScore, measured_score
 from benchmarks.reproduction.targets import Check
+from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
 from benchmarks.suites.reproduction import MEASURED
 from pma_gym.pages.document import TextTable
 

@@ -1,6 +1,7 @@
 """One case: a controller drives one episode of a suite, and a row has its figures."""
 
-from dataclasses import dataclass, replace
+import time
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,9 @@ from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.runner.figures import Episode as Measured
 from benchmarks.runner.figures import figures
 from benchmarks.runner.isolated_controller import Isolated, driver
+from benchmarks.runner.phase_score import score_trial
 from benchmarks.runner.rollout import Rollout, rollout
-from benchmarks.suites.frozen import Entry, Episode, FrozenSuite, frozen_suite
+from benchmarks.suites.suite import Entry, Episode, FrozenSuite
 from pma_gym.engine.options import nominal_model
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import Model
@@ -39,19 +41,19 @@ class Case:
     """A controller and an episode of a suite.
 
     Attributes:
-        suite: name of the suite, or path of its file.
+        suite: the suite.
         spec: who drives.
         episode: what it drives.
     """
 
-    suite: str
+    suite: FrozenSuite
     spec: ControllerSpec
     episode: Episode
 
     @property
     def name(self) -> str:
         """What tells it from the suite's others: `pid/17/rotation/300/0`."""
-        return f"{self.spec.name}/{self.episode.name}"
+        return self.suite.case_name(self.episode, self.spec.name)
 
 
 def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
@@ -61,10 +63,10 @@ def cases(suite: FrozenSuite, entries: tuple[Entry, ...]) -> list[Case]:
     interrupted compares them all. Tasks that a controller cannot do by its rule are left out.
     """
     return [
-        Case(suite.source, entry.spec, episode)
+        Case(suite, entry.spec, episode)
         for episode in suite.episodes
         for entry in entries
-        if entry.does(episode.task)
+        if suite.runs(entry, episode)
     ]
 
 
@@ -79,25 +81,45 @@ def run_case(case: Case, model: Model | None = None) -> Row:
     Raises:
         Exception: whatever the controller or the environment raised.
     """
-    suite, spec = frozen_suite(case.suite), case.spec
-    environment = PMAEnv(
-        task=case.episode.task,
-        model=model or suite.station(case.episode.station).model,
-        pressure_kpa=case.episode.pressure_kpa,
-        **suite.environment,
-    )
-    controller = driver(spec, environment.options.period)
-    nominal = nominal_model(environment.task, suite.nominal)
-    seed = suite.seed_of(case.episode)
-    done = rollout(environment, controller, seed, nominal, reveal=spec.is_bound)
-    if isinstance(controller, Isolated):
-        done = replace(done, act_seconds=np.array(controller.act_seconds))
+    began = time.perf_counter()
+    done, environment = drive(case, model)
     share, farthest = done.clipped
     clipped = {"clipped_share": share, "clipped_v": farthest}
     if done.ended_by:
         end = f"ended after {done.steps * done.period:.4g} s {BY_LIMIT}: {done.ended_by}"
         return blank_row(case) | {"failure": end} | clipped
-    return blank_row(case) | _figures(done, environment) | clipped
+    row = blank_row(case) | _figures(done, environment) | clipped
+    if not case.suite.has_lines:
+        return row
+    lines = score_trial(done.trial, case.episode.task)
+    row["lines"] = {phase: asdict(score) for phase, score in lines.items()}
+    times = {"steps": done.steps, "step_seconds": done.step_seconds}
+    return row | {"times": times | {"seconds": time.perf_counter() - began}}
+
+
+def drive(case: Case, model: Model | None = None) -> tuple[Rollout, PMAEnv]:
+    """What happens in a case's episode, and the environment that it happened in.
+
+    Args:
+        case: the case.
+        model: the station's own; drawn anew if not given.
+    Raises:
+        Exception: whatever the controller or the environment raised.
+    """
+    suite, spec, episode = case.suite, case.spec, case.episode
+    environment = PMAEnv(
+        task=episode.task,
+        model=model or suite.station(episode.station).model,
+        pressure_kpa=episode.pressure_kpa,
+        **suite.environment,
+    )
+    controller = driver(spec, environment.options.period, suite.keep_pace)
+    nominal = nominal_model(environment.task, suite.nominal_of(episode.station))
+    seed = suite.seed_of(episode, spec.name)
+    done = rollout(environment, controller, seed, nominal, reveal=spec.is_bound)
+    if isinstance(controller, Isolated):
+        done = replace(done, act_seconds=np.array(controller.act_seconds))
+    return done, environment
 
 
 def _figures(done: Rollout, environment: PMAEnv) -> Row:
@@ -113,13 +135,13 @@ def _figures(done: Rollout, environment: PMAEnv) -> Row:
 
 def blank_row(case: Case) -> Row:
     """A case's row without figures."""
-    suite, episode = frozen_suite(case.suite), case.episode
+    suite, episode = case.suite, case.episode
     return {
         "suite": suite.name,
         "version": suite.version,
         "controller": case.spec.name,
         **episode._asdict(),
-        "seed": suite.seed_of(episode),
+        "seed": suite.seed_of(episode, case.spec.name),
         "failure": "",
     }
 

@@ -1,20 +1,18 @@
 """Who is scored: a controller of the registry, a class in somebody's own file, or a policy."""
 
 import difflib
-import importlib.util
 import inspect
-import sys
 import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import ModuleType
 
 import controllers.controller
 from controllers import CONTROLLERS
 from controllers.controller import Controller
 from controllers.policies.policy_file import PolicyError, policy_pair
 from controllers.policy import POLICIES, Policy, ShippedPolicy, shipped_policies
+from pma_gym.cli.controller_source import ControllerSourceError, class_in_file
 
 PROTOCOL = Path(controllers.controller.__file__)
 """File that says what a controller is."""
@@ -193,42 +191,13 @@ def _own_name(controller: Controller) -> str:
 
 
 def _class_of(spec: ControllerSpec) -> type:
-    """The contender's class, from its file."""
-    module = _module(Path(spec.path))
-    controller_class = getattr(module, spec.name, None)
-    if isinstance(controller_class, type):
-        return controller_class
-    classes = [
-        name
-        for name, value in vars(module).items()
-        if isinstance(value, type) and value.__module__ == module.__name__
-    ]
-    has = f"it has {', '.join(classes)}" if classes else "it has no class"
-    raise ControllerError(f"{spec.path} has no class {spec.name!r}; {has}")
-
-
-def _module(path: Path) -> ModuleType:
-    """The file as a module of its own name; imported once in each process."""
-    if not path.is_file():
-        raise ControllerError(f"there is no file {path}; check the name and the folder")
-    name = f"contender_{path.resolve().as_posix()}"
-    if name in sys.modules:
-        return sys.modules[name]
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ControllerError(f"{path} is no Python file; its name must end in .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
+    """The controller's class, from its file."""
+    path = Path(spec.path)
     try:
-        spec.loader.exec_module(module)
-    except Exception as error:
-        del sys.modules[name]
-        where = raised_at(error, path)
-        at = f" ({where})" if where else ""
-        raise ControllerError(
-            f"cannot import {path}: {type(error).__name__}: {error}{at}"
-        ) from error
-    return module
+        return class_in_file(path, spec.name)
+    except ControllerSourceError as error:
+        where = raised_at(error.__cause__, path) if error.__cause__ else ""
+        raise ControllerError(f"{error} ({where})" if where else str(error)) from error
 
 
 def raised_at(error: BaseException, path: Path) -> str:

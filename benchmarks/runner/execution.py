@@ -10,7 +10,7 @@ from benchmarks.executors.failures import ProcessDied
 from benchmarks.runner.case import Case, Row, cases, failed_row, run_case
 from benchmarks.runner.fingerprint import key
 from benchmarks.runner.journal import JOURNAL, Journal, case_rows
-from benchmarks.suites.frozen import Entry, Episode, FrozenSuite
+from benchmarks.suites.suite import Entry, Episode, FrozenSuite
 from pma_gym.envs import PMAEnv
 
 Identity = tuple[str, Episode]

@@ -78,7 +78,7 @@ class Episode(NamedTuple):
 
 @dataclass(frozen=True)
 class Figures:
-    """All figures of an episode; `docs/scores.md` defines them.
+    """All figures of an episode; `docs/reference/score-definitions.md` defines them.
 
     Attributes:
         unit: of the errors, mm or deg.

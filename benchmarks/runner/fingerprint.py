@@ -7,7 +7,7 @@ from importlib import metadata
 from pathlib import Path
 
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.frozen import FrozenSuite
+from benchmarks.suites.suite import FrozenSuite
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -27,11 +27,13 @@ SOURCES = (
     "benchmarks/suites/feasibility.py",
     "benchmarks/runner/case.py",
     "benchmarks/runner/figures.py",
+    "benchmarks/runner/phase_score.py",
     "benchmarks/runner/user_controller.py",
     "benchmarks/runner/isolated_controller.py",
     "benchmarks/suites/recipe.py",
     "benchmarks/suites/stations.py",
     "benchmarks/suites/frozen.py",
+    "benchmarks/suites/suite.py",
 )
 """Files that a figure may depend on. Pages and statistics are made from rows, and are not here."""
 

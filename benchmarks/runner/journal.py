@@ -11,13 +11,14 @@ import time
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import TracebackType
 
 from benchmarks.runner.case import Row
 from benchmarks.runner.damaged_results import say_damaged
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.runner.phase_score import PhaseScore
+from benchmarks.suites.suite import SuiteError
 from pma_gym.document_shape import Maybe, Real, ShapeError, Whole, check_shape
 from pma_gym.documents import parse_json
 from pma_gym.files import replace_file
@@ -57,6 +58,13 @@ _FIGURES = {
         )
     },
     "exercise?": {"*": Maybe(Real())},
+    "lines?": {
+        "*": {
+            **{entry.name: Real() for entry in fields(PhaseScore)},
+            "largest_error": Maybe(Real()),
+        }
+    },
+    "times?": {"steps": Whole(), "step_seconds": Real(), "seconds": Real()},
 }
 """Shape of the figures of a case that has some."""
 

@@ -16,8 +16,7 @@ from benchmarks.runner.environment_info import environment_info
 from benchmarks.runner.execution import PendingCases, row_identity
 from benchmarks.runner.fingerprint import code_digest
 from benchmarks.runner.journal import JOURNAL, case_rows
-from benchmarks.suites.frozen import Entry, FrozenSuite
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.suite import Entry, FrozenSuite, SuiteError
 from pma_gym.document_shape import ShapeError, Whole, check_shape
 from pma_gym.documents import read_json
 

@@ -90,7 +90,7 @@ class Rollout:
     @property
     def _zero(self) -> float:
         """What the position is counted from, as trials count it (m or rad)."""
-        return self.start if self.task.protocol.quantity == "contraction" else 0.0
+        return self.start if self.task.protocol.followed.shortens else 0.0
 
 
 def make_environment(

@@ -1,7 +1,7 @@
-"""Puts a run's figures into docs/speed.md: `python -m benchmarks.speed.page [FILE]`.
+"""Puts a run's figures into the pages on speed: `python -m benchmarks.speed.page [FILE]`.
 
 A block of figures stands between `<!-- figures: NAME -->` and `<!-- end of figures -->`; nobody
-types one in. `--check` changes nothing and fails if the page is not as the run would have it.
+types one in. `--check` changes nothing and fails if a page is not as the run would have it.
 """
 
 import re
@@ -18,7 +18,7 @@ from benchmarks.speed.report.tables import SpeedTable, sentences, speed_tables
 from pma_gym.documents import read_json
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "speed.md"
+PAGES = (ROOT / "docs" / "speed.md", ROOT / "docs" / "notebook" / "speed.md")
 RUN = ROOT / "results" / "speed.json"
 ABSENT = "Not measured in this run."
 
@@ -70,20 +70,23 @@ def main(
         bool, typer.Option("--check", help="Change nothing; fail on a difference.")
     ] = False,
 ) -> None:
-    """Put a run's figures into docs/speed.md."""
+    """Put a run's figures into docs/speed.md and its record in the notebook."""
     try:
         run = load_run(file)
     except RunError as error:
         print(f"error: {error}", file=sys.stderr)
         raise typer.Exit(2) from None
-    text = PAGE.read_text(encoding="utf-8")
-    content = refreshed(text, run)
-    if content == text:
-        return
-    if not check:
-        write_text(PAGE, content)
-    print(f"{PAGE.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
-    raise typer.Exit(1 if check else 0)
+    changed = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        content = refreshed(text, run)
+        if content != text:
+            changed.append(page)
+            if not check:
+                write_text(page, content)
+            print(f"{page.relative_to(ROOT)}: {'differs' if check else 'refreshed'}")
+    if check and changed:
+        raise typer.Exit(1)
 
 
 def _markdown(table: SpeedTable) -> str:

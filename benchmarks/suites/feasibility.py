@@ -94,7 +94,7 @@ def _falls_short(
 ) -> str:
     """Why a ramp does not reach the end of a task's range; empty if it does."""
     quantity, unit = task.protocol.quantity, task.protocol.unit
-    position = truth[quantity] - (start if quantity == "contraction" else 0.0)
+    position = truth[quantity] - (start if task.protocol.followed.shortens else 0.0)
     there = int(np.argmax(position >= task.protocol.span))
     if position[there] < task.protocol.span:
         return f"it only reaches {position.max() / SI_FACTORS[unit]:.3g} {unit}"

@@ -1,31 +1,29 @@
-"""Frozen suites: what is run on which stations, read from a file that pins every number."""
+"""Reads frozen suites from files that pin every number."""
 
 import difflib
 import hashlib
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.recipe import Recipe, parse_recipe
-from benchmarks.suites.reproduction import SUITES, SuiteError
-from benchmarks.suites.stations import DrawnStation, draw_station
-from benchmarks.suites.target import Target, parse_target
-from controllers.design import designs
+from benchmarks.suites.reproduction import GOAL_FIGURES, Goals, ReproductionSuite
+from benchmarks.suites.suite import NOMINAL, SUITES, Entry, EpisodePlan, FrozenSuite, SuiteError
+from benchmarks.suites.target import parse_target
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options
 from pma_gym.limits import LimitError
-from pma_gym.plant.model import Model, is_path, load_model, missing_file
+from pma_gym.plant.model import is_path, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
 
 SCHEMA = 2
-"""Of the files of suites that compare controllers; `reproduction.toml` has schema 1."""
+"""Of the files."""
 
-UNFROZEN = ("title", "controllers", "targets", "only_by_name")
+UNFROZEN = ("title", "controllers", "targets", "only_by_name", "reproduction")
 """Entries of a suite's file that move no figure: they may change without a new version."""
 
 MOST_EPISODES = 1_000_000
@@ -67,197 +65,37 @@ _SHAPE = {
         },
         1,
     ),
-    "controllers": ListOf({"name": str, "title": str, "only?": ListOf(str)}),
+    "controllers": ListOf(
+        {"name": str, "title": str, "only?": ListOf(str), "models?": ListOf(str)}
+    ),
     "targets?": ListOf(
         {"figure": str, "measure": str, "most?": Maybe(Real()), "controllers?": ListOf(str)}
     ),
     "only_by_name?": bool,
+    "reproduction?": {
+        "models": ListOf(str, 1),
+        "pictured_kpa": _TABLE_OF_NUMBERS,
+        "goals": {
+            "replay": str,
+            "feedback": ListOf(str),
+            "simple_prediction": {"slope": Real(), "intercept": Real(), "rmse": Real()},
+            **{name: Real() for name in GOAL_FIGURES},
+        },
+    },
 }
 """Shape of a suite's file."""
 
 _LINE_FORM = "a line is a table, [stations], or name = value; see benchmarks/suites/robust.toml"
 
-NOMINAL = -1
-"""Number of the station that is as its model."""
-
-
-class Episode(NamedTuple):
-    """What happens on a station: a task at a pressure, with noise of its own.
-
-    Attributes:
-        station: number of the station; `NOMINAL` for the one that is as its model.
-        task: name of the task.
-        pressure_kpa: gauge pressure (kPa).
-        repeat: which of the episodes that differ in their noise alone.
-    """
-
-    station: int
-    task: str
-    pressure_kpa: float
-    repeat: int
-
-    @property
-    def name(self) -> str:
-        """What tells it from the others: `17/rotation/300/0`."""
-        return f"{self.station}/{self.task}/{self.pressure_kpa:g}/{self.repeat}"
-
-
-class EpisodePlan(NamedTuple):
-    """Trials that are dealt to the stations in turn, so that each comes equally often.
-
-    Attributes:
-        tasks: names of the tasks.
-        pressures_kpa: pressures of each of them (kPa).
-        per_station: how many trials a station gets; all of them if 0.
-        repeats: episodes of each, with noise of their own.
-    """
-
-    tasks: tuple[str, ...]
-    pressures_kpa: tuple[float, ...]
-    per_station: int = 0
-    repeats: int = 1
-
-    def trials(self, number: int) -> list[tuple[str, float]]:
-        """Task and pressure (kPa) of what the station of a number gets, evenly spread.
-
-        >>> Deal(("rotation",), (275, 300, 350, 400), per_station=2).trials(1)
-        [('rotation', 300), ('rotation', 400)]
-        """
-        deck = [(task, pressure) for task in self.tasks for pressure in self.pressures_kpa]
-        taken = self.per_station or len(deck)
-        chosen = {(number + round(k * len(deck) / taken)) % len(deck) for k in range(taken)}
-        return [deck[at] for at in sorted(chosen)]
-
-
-class Entry(NamedTuple):
-    """A controller of a suite.
-
-    Attributes:
-        spec: who.
-        only: tasks that it can do; all if empty.
-    """
-
-    spec: ControllerSpec
-    only: tuple[str, ...] = ()
-
-    def does(self, task: str) -> bool:
-        """Whether it can do a task."""
-        return not self.only or task in self.only
-
-
-@dataclass(frozen=True, eq=False)
-class FrozenSuite:
-    """Stations, episodes on them, and who is compared.
-
-    Attributes:
-        source: name of the suite, or path of its file, by which it is loaded again.
-        name: what results call it.
-        title: one line for people.
-        version: changes whenever a number does.
-        seed: every episode's seed is derived from it.
-        model: name of the model that controllers receive.
-        environment: keyword arguments of the environments.
-        stations: numbers of the stations, in order.
-        recipe: how stations are drawn; None if only the nominal one is there.
-        episode_plans: which trials they get.
-        entries: who is compared, in the order of the tables.
-        targets: what is asked of them.
-        digest: of all numbers, controllers and targets apart.
-        only_by_name: whether it is so long that it runs only where it is named.
-    """
-
-    source: str
-    name: str
-    title: str
-    version: int
-    seed: int
-    model: str
-    environment: Mapping[str, Any]
-    stations: tuple[int, ...]
-    recipe: Recipe | None
-    episode_plans: tuple[EpisodePlan, ...]
-    entries: tuple[Entry, ...]
-    targets: tuple[Target, ...]
-    digest: str
-    only_by_name: bool = False
-
-    @cached_property
-    def episodes(self) -> tuple[Episode, ...]:
-        """Every episode, station by station."""
-        return tuple(
-            Episode(station, task, pressure, repeat)
-            for at, station in enumerate(self.stations)
-            for plan in self.episode_plans
-            for task, pressure in plan.trials(at)
-            for repeat in range(plan.repeats)
-        )
-
-    @property
-    def control_rate_hz(self) -> float:
-        """Control steps a second (Hz)."""
-        return float(self.environment["control_rate_hz"])
-
-    @property
-    def tasks(self) -> tuple[str, ...]:
-        """Names of its tasks."""
-        return tuple(dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks))
-
-    def seed_of(self, episode: Episode) -> int:
-        """An episode's seed, the same for every controller: they are compared under one noise."""
-        digest = hashlib.sha256(f"{self.seed}:{episode.name}".encode()).digest()
-        return int.from_bytes(digest[:4], "big")
-
-    def station(self, number: int) -> DrawnStation:
-        """A station by its number."""
-        if number == NOMINAL:
-            return DrawnStation(self.nominal, (), ())
-        assert self.recipe is not None
-        return _station(self.recipe, number)
-
-    @cached_property
-    def nominal(self) -> Model:
-        """The model that controllers receive."""
-        return load_model(self.model)
-
-    def entry(self, spec: ControllerSpec) -> Entry:
-        """The suite's entry of a controller; one of its own for a controller it does not have.
-
-        Raises:
-            SuiteError: none of the suite's tasks is of a kind that the controller can do.
-        """
-        for entry in self.entries:
-            if entry.spec.source == spec.source:
-                return entry
-        kinds = spec.kinds
-        able = tuple(task for task in self.tasks if kind_of(task) in kinds)
-        if kinds and not able:
-            there = sorted({kind_of(task) for task in self.tasks})
-            raise SuiteError(
-                f"{spec.name} does {', '.join(sorted(kinds))} alone, and suite {self.name} "
-                f"has {', '.join(there)}; name another controller, or another suite"
-            )
-        return Entry(spec, able)
-
-
-def kind_of(task: str) -> str:
-    """Kind of a task of a suite."""
-    known = named_task(task)
-    assert known is not None
-    return designs.kind_of(known)
-
-
-@lru_cache(maxsize=4096)
-def _station(recipe: Recipe, number: int) -> DrawnStation:
-    return draw_station(recipe, number)
-
 
 def suite_names() -> list[str]:
     """Names of the frozen suites that come with the benchmark."""
-    return [path.stem for path in sorted(SUITES.glob("*.toml")) if _schema(path) == SCHEMA]
+    return [path.stem for path in sorted(SUITES.glob("*.toml"))]
 
 
-def _schema(path: Path) -> object:
-    return read_toml(path).get("schema")
+def comparison_names() -> list[str]:
+    """Names of the suites that have a leaderboard: all but the reproduction."""
+    return [n for n in suite_names() if not isinstance(frozen_suite(n), ReproductionSuite)]
 
 
 @lru_cache(maxsize=16)
@@ -316,22 +154,43 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
     if "of" in stations:
         frozen["of"] = frozen_suite(stations["of"]).digest
     parse_options(document["environment"])
-    return FrozenSuite(
-        source=source,
-        name=document["name"],
-        title=document["title"],
-        version=document["version"],
-        seed=document["seed"],
-        model=document["model"],
-        environment=dict(document["environment"]),
-        stations=numbers,
-        recipe=_recipe(stations, document["model"]),
-        episode_plans=episode_plans,
-        entries=tuple(_entry(entry) for entry in document["controllers"]),
-        targets=tuple(parse_target(given) for given in document.get("targets", ())),
-        digest=_digest(json.dumps(frozen, sort_keys=True)),
-        only_by_name=document.get("only_by_name", False),
+    common: dict[str, Any] = {
+        "source": source,
+        "name": document["name"],
+        "title": document["title"],
+        "version": document["version"],
+        "seed": document["seed"],
+        "model": document["model"],
+        "environment": dict(document["environment"]),
+        "stations": numbers,
+        "recipe": _recipe(stations, document["model"]),
+        "episode_plans": episode_plans,
+        "entries": tuple(_entry(entry) for entry in document["controllers"]),
+        "targets": tuple(parse_target(given) for given in document.get("targets", ())),
+        "digest": _digest(json.dumps(frozen, sort_keys=True)),
+        "only_by_name": document.get("only_by_name", False),
+    }
+    if "reproduction" in document:
+        return _reproduction(document["reproduction"], common)
+    return FrozenSuite(**common)
+
+
+def _reproduction(given: Mapping[str, Any], common: Mapping[str, Any]) -> ReproductionSuite:
+    """A suite on several models, with the report of the reproduction.
+
+    Args:
+        given: the file's `[reproduction]`.
+        common: what any suite has.
+    """
+    goals = given["goals"] | {"feedback": tuple(given["goals"]["feedback"])}
+    suite = ReproductionSuite(
+        **common,
+        frozen_digest=common["digest"],
+        models=(common["model"],),
+        pictured_kpa={task: tuple(kpa) for task, kpa in given["pictured_kpa"].items()},
+        goals=Goals(**goals),
     )
+    return suite.on(given["models"])
 
 
 def _recipe(stations: Mapping[str, Any], model: str) -> Recipe | None:
@@ -360,7 +219,8 @@ def _episode_plan(given: Mapping[str, Any]) -> EpisodePlan:
 
 
 def _entry(given: Mapping[str, Any]) -> Entry:
-    return Entry(ControllerSpec(given["name"], given["title"]), tuple(given.get("only", ())))
+    spec = ControllerSpec(given["name"], given["title"])
+    return Entry(spec, tuple(given.get("only", ())), tuple(given.get("models", ())))
 
 
 def _digest(text: str) -> str:

@@ -1,34 +1,35 @@
-"""What the benchmark runs: the frozen suite, and its cases."""
+"""The suite of the dissertation's trials: several models, and goals of its own."""
 
 import hashlib
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from benchmarks.runner.controller_spec import ControllerSpec
-from pma_gym.documents import read_toml
-from pma_gym.tasks import TASKS
-
-SUITES = Path(__file__).parent
-SCHEMA = 1
+from benchmarks.suites.stations import DrawnStation
+from benchmarks.suites.suite import Entry, Episode, EpisodePlan, FrozenSuite, SuiteError
+from pma_gym.plant.model import Model, dump_model, is_path, load_model
 
 MEASURED = "Measured"
 """What the tables call the dissertation's own trials."""
 
-
-class SuiteError(ValueError):
-    """A selection that the suite cannot make; the message says what there is."""
+GOAL_FIGURES = (
+    *("displacement_rmse_mm", "rotation_moving_rmse_deg"),
+    *("return_above_bound_deg", "wall_time_s"),
+)
+"""Goals that are one number."""
 
 
 @dataclass(frozen=True)
-class Targets:
+class Goals:
     """Figures that the job is measured by; see the suite's file.
 
     Attributes:
         replay: name of the controller that repeats the dissertation's trials.
-        feedback: names of the controllers that the RMSE targets speak of.
+        feedback: names of the controllers that the RMSE goals speak of.
         simple_prediction: the replay's mean absolute errors to beat: slope (mm/s), intercept (mm)
             and rmse (mm).
         displacement_rmse_mm: largest RMSE in displacement.
@@ -46,88 +47,101 @@ class Targets:
     wall_time_s: float
 
 
-@dataclass(frozen=True)
-class Case:
-    """One trial to run: a controller at a pressure on a model.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ReproductionSuite(FrozenSuite):
+    """Controllers x models x the dissertation's trials; every model is one of the stations.
 
     Attributes:
-        model: name or path of the model.
-        controller: who drives.
-        task: `displacement` or `rotation`.
-        pressure_kpa: gauge pressure (kPa).
-    """
-
-    model: str
-    controller: ControllerSpec
-    task: str
-    pressure_kpa: float
-
-    @property
-    def name(self) -> str:
-        """What tells it from the others, wherever its files lie: `station/pid/rotation/300`."""
-        return "/".join(
-            (Path(self.model).stem, self.controller.name, self.task, f"{self.pressure_kpa:g}")
-        )
-
-
-@dataclass(frozen=True)
-class Suite:
-    """Controllers x models x trials, and how they are run.
-
-    Attributes:
-        name: what the results' folder is called.
-        version: changes whenever figures may.
-        seed: every case's seed is derived from it.
-        control_rate_hz: control steps a second (Hz).
-        noise: sensor noise and quantisation.
-        models: names or paths; the first is the one that targets speak of.
-        controllers: in the order of columns.
-        pressures_kpa: by task.
-        pictured_kpa: by task, those whose trials are drawn.
-        targets: figures to reach.
-        only: models that a controller runs on, by its name; all models if it is not there.
+        frozen_digest: of all numbers but the models.
+        models: names or paths, in the order of the stations; the first is the one that goals
+            speak of.
+        pictured_kpa: by task, pressures whose trials are drawn.
+        goals: figures to reach.
         selected: whether something was left out or added.
     """
 
-    name: str
-    version: int
-    seed: int
-    control_rate_hz: float
-    noise: bool
+    frozen_digest: str
     models: tuple[str, ...]
-    controllers: tuple[ControllerSpec, ...]
-    pressures_kpa: Mapping[str, tuple[float, ...]]
     pictured_kpa: Mapping[str, tuple[float, ...]]
-    targets: Targets
-    only: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    selected: bool = field(default=False)
+    goals: Goals
+    selected: bool = False
+
+    keep_pace: ClassVar[bool] = False
+    has_lines: ClassVar[bool] = True
+
+    def __reduce__(self) -> tuple[Callable[..., FrozenSuite], tuple[object, ...]]:
+        """Pickled as its source and its models: controllers and trials come with each case."""
+        return _read, (self.source, self.models)
+
+    @property
+    def controllers(self) -> tuple[ControllerSpec, ...]:
+        """Who is compared, in the order of columns."""
+        return tuple(entry.spec for entry in self.entries)
+
+    @property
+    def noise(self) -> bool:
+        """Whether sensors have noise and quantisation."""
+        return bool(self.environment.get("noise", True))
+
+    @property
+    def pressures_kpa(self) -> dict[str, tuple[float, ...]]:
+        """Pressures of the trials (kPa), by task."""
+        return {task: plan.pressures_kpa for plan in self.episode_plans for task in plan.tasks}
 
     def does(self, controller: ControllerSpec, model: str) -> bool:
         """Whether a controller runs on a model."""
-        return model in self.only.get(controller.name, (model,))
+        return any(
+            entry.spec == controller and (not entry.models or model in entry.models)
+            for entry in self.entries
+        )
 
-    def cases(self) -> Iterator[Case]:
-        """Every case, in the order of the results."""
-        for model in self.models:
-            for controller in self.controllers:
-                if not self.does(controller, model):
-                    continue
-                for task, pressures in self.pressures_kpa.items():
-                    for pressure in pressures:
-                        yield Case(model, controller, task, pressure)
+    def runs(self, entry: Entry, episode: Episode) -> bool:
+        """Whether a controller runs an episode: on its models, the tasks that it can do."""
+        model = self.models[episode.station]
+        return entry.does(episode.task) and (not entry.models or model in entry.models)
 
-    def seed_of(self, case: Case) -> int:
+    def station(self, number: int) -> DrawnStation:
+        """A model by its place."""
+        return DrawnStation(self.nominal_of(number), (), ())
+
+    def nominal_of(self, number: int) -> Model:
+        """The very model: controllers of this suite know their station exactly."""
+        return self._loaded[number]
+
+    @cached_property
+    def _loaded(self) -> tuple[Model, ...]:
+        return tuple(map(load_model, self.models))
+
+    def seed_of(self, episode: Episode, controller: str = "") -> int:
         """A case's own seed: the same wherever and in whatever order it runs.
 
-        Cases share no noise, and adding a case leaves the others as they are.
+        Cases share no noise, and adding a case leaves the others unchanged.
         """
-        digest = hashlib.sha256(f"{self.seed}:{case.name}".encode()).digest()
+        name = self.case_name(episode, controller)
+        digest = hashlib.sha256(f"{self.seed}:{name}".encode()).digest()
         return int.from_bytes(digest[:4], "big")
 
-    def is_pictured(self, case: Case) -> bool:
-        """Whether the report draws this case's trial."""
-        pictured = self.pictured_kpa[case.task]
-        return case.model == self.models[0] and case.pressure_kpa in pictured
+    def case_name(self, episode: Episode, controller: str) -> str:
+        """What tells a case from the others, wherever its files lie: `station/pid/rotation/300`."""
+        model = Path(self.models[episode.station]).stem
+        return f"{model}/{controller}/{episode.task}/{episode.pressure_kpa:g}"
+
+    def is_pictured(self, episode: Episode) -> bool:
+        """Whether the report draws an episode's trials."""
+        return episode.station == 0 and episode.pressure_kpa in self.pictured_kpa[episode.task]
+
+    def on(self, models: Sequence[str]) -> "ReproductionSuite":
+        """The suite on these models; of a user's file its content counts as a number of the suite.
+
+        Raises:
+            ModelError: a file that is no model.
+        """
+        names = tuple(dict.fromkeys(map(str, models)))
+        texts = [dump_model(load_model(name)) if is_path(name) else name for name in names]
+        digest = hashlib.sha256("\n".join([self.frozen_digest, *texts]).encode()).hexdigest()[:16]
+        return replace(
+            self, models=names, model=names[0], stations=tuple(range(len(names))), digest=digest
+        )
 
     def select(
         self,
@@ -135,21 +149,29 @@ class Suite:
         controllers: Sequence[ControllerSpec] = (),
         tasks: Sequence[str] = (),
         pressures_kpa: Sequence[float] = (),
-    ) -> "Suite":
+    ) -> "ReproductionSuite":
         """The suite with other models or controllers, or fewer trials; empty leaves as is.
 
         Raises:
             SuiteError: a task or pressure that the suite does not have.
         """
         changed: dict[str, Any] = {}
-        if models:
-            changed["models"] = tuple(dict.fromkeys(models))
         if controllers:
-            changed["controllers"] = _distinct(controllers)
+            changed["entries"] = self._entries_of(controllers)
         if tasks or pressures_kpa:
-            changed["pressures_kpa"] = self._trials(tasks, pressures_kpa)
+            trials = self._trials(tasks, pressures_kpa)
+            changed["episode_plans"] = tuple(EpisodePlan((t,), kpa) for t, kpa in trials.items())
         same = all(getattr(self, name) == value for name, value in changed.items())
-        return replace(self, **changed, selected=self.selected or not same)
+        suite = self.on(models) if models else self
+        same = same and suite.models == self.models
+        return replace(suite, **changed, selected=self.selected or not same)
+
+    def _entries_of(self, controllers: Sequence[ControllerSpec]) -> tuple[Entry, ...]:
+        known = {entry.spec.source: entry for entry in self.entries}
+        return tuple(
+            known.get(spec.source, Entry(spec))._replace(spec=spec)
+            for spec in _distinct(controllers)
+        )
 
     def _trials(
         self, tasks: Sequence[str], pressures: Sequence[float]
@@ -171,36 +193,24 @@ class Suite:
         return {task: left for task, left in trials.items() if left}
 
 
-def load_suite(name: str = "reproduction") -> Suite:
-    """A suite that comes with the benchmark.
+def load_suite(name: str = "reproduction") -> ReproductionSuite:
+    """The suite of the reproduction.
 
     >>> suite = load_suite()
-    >>> len(list(suite.cases()))
-    153
+    >>> suite.models, len(suite.episodes)
+    (('station', 'cascade'), 34)
     """
-    document = read_toml(SUITES / f"{name}.toml")
-    if document["schema"] != SCHEMA:
-        raise SuiteError(f"{name}.toml has schema {document['schema']}, known is {SCHEMA}")
-    unknown = set(document["tasks"]) - set(TASKS)
-    if unknown:
-        raise SuiteError(f"{name}.toml has unknown tasks: {', '.join(sorted(unknown))}")
-    targets = dict(document["targets"])
-    targets["feedback"] = tuple(targets["feedback"])
-    entries = [dict(entry) for entry in document["controllers"]]
-    only = {e["name"]: tuple(e.pop("models")) for e in entries if "models" in e}
-    return Suite(
-        name=document["name"],
-        version=document["version"],
-        seed=document["seed"],
-        control_rate_hz=document["control_rate_hz"],
-        noise=document["noise"],
-        models=tuple(document["models"]),
-        controllers=tuple(ControllerSpec(**entry) for entry in entries),
-        pressures_kpa={t: tuple(v["pressures_kpa"]) for t, v in document["tasks"].items()},
-        pictured_kpa={t: tuple(v["pictured_kpa"]) for t, v in document["tasks"].items()},
-        targets=Targets(**targets),
-        only=only,
-    )
+    suite = _read(name)
+    assert isinstance(suite, ReproductionSuite)
+    return suite
+
+
+def _read(source: str, models: Sequence[str] = ()) -> FrozenSuite:
+    # That module builds suites of this class.
+    from benchmarks.suites.frozen import frozen_suite
+
+    suite = frozen_suite(source)
+    return suite.on(models) if models and isinstance(suite, ReproductionSuite) else suite
 
 
 def _distinct(controllers: Sequence[ControllerSpec]) -> tuple[ControllerSpec, ...]:

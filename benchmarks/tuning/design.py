@@ -39,8 +39,9 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_all
 from benchmarks.files import write_text
 from benchmarks.runner.rollout import Rollout, rollout
-from benchmarks.suites.frozen import FrozenSuite, frozen_suite
+from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.stations import draw_station
+from benchmarks.suites.suite import FrozenSuite
 from benchmarks.tuning.choice import chosen
 from benchmarks.tuning.cost import TARGETS, VARIATION_WEIGHT_S_PER_V
 from benchmarks.tuning.tune import CONTROLLERS as TUNED

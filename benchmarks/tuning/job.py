@@ -60,5 +60,5 @@ class Job:
     @property
     def start_factor(self) -> float:
         """`START_FACTOR` for a PID that brings the cable back to slack, else 1."""
-        slack = "cable" in self.model.parameters and self.protocol.quantity == "rotation"
+        slack = "cable" in self.model.parameters and self.protocol.followed.is_angle
         return START_FACTOR if slack and self.controller == PID.name else 1.0

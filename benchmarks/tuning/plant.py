@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from controllers.models.voltage import nominal_offset
+from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import StationInfo
 from pma_gym.plant.condition import Condition
@@ -16,7 +17,6 @@ from pma_gym.plant.forms.linear import linearize_at, operating_point
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import Actuator
 
-SENSORS = {"extension": "lvdt", "rotation": "potentiometer", "contraction": "lvdt"}
 """Sensor by what is followed."""
 
 STROKES = (0.05, 0.5, 0.95)
@@ -45,7 +45,7 @@ def linearised(station: StationInfo, shares: Iterable[float] = STROKES) -> list[
     plant, task = Plant(station.model), station.task
     moved_by_motor = task.actuator == "motor"
     # Of the dissertation's displacement only the way out is asked for.
-    both = ("relaxing", "contracting") if task.protocol.quantity != "extension" else ("relaxing",)
+    both = ("relaxing", "contracting") if not task.protocol.followed.lengthens else ("relaxing",)
     places = []
     for share in shares:
         try:
@@ -63,7 +63,7 @@ def _pulled(
     """The plant held by the motor at a share of the stroke, at the trial's pressure."""
     protocol, parameters = station.task.protocol, station.model.parameters
     stroke = share * protocol.span
-    if protocol.quantity == "rotation":
+    if protocol.followed.is_angle:
         stroke *= parameters["rotor" if "rotor" in parameters else "servo"].radius
     zero = plant.settle(0.0, pressure=station.pressure).zero_contraction
     return operating_point(plant, station.pressure, zero - stroke)
@@ -107,7 +107,7 @@ def sampled(
     """
     quantity = station.task.protocol.quantity
     one: Any = place.system[quantity, f"{actuator or station.task.actuator}_voltage"]
-    sensor = station.model.parameters.get(SENSORS[quantity])
+    sensor = station.model.parameters.get(SIGNALS[quantity].sensor)
     if sensor is not None:
         one = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0]) * one
     held: Any = control.ss(control.sample_system(one, station.period, method="zoh"))

@@ -1,4 +1,4 @@
-"""Least squares over a plan of voltages within limits, for a model that tries 16 plans at once."""
+"""Least squares over a voltage sequence within limits, for a model that simulates 16 at once."""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -27,7 +27,7 @@ TIE = 1e-9
 
 
 class Space(NamedTuple):
-    """What is searched: changes of a plan by blocks of periods.
+    """Search space: changes of a voltage sequence by blocks of periods.
 
     Attributes:
         blocks: block of every period, shape (periods,), 0, 0, 1, ... without gaps.

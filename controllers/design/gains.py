@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from controllers.design.designs import loop_name, must_give_a_position, nearest_loop, task_kind
+from pma_gym.data.signals import SIGNALS
 from pma_gym.documents import read_json
 from pma_gym.envs import StationInfo
 from pma_gym.units import SI_FACTORS
@@ -124,7 +125,7 @@ def scheduled_gains(controller: str, station: StationInfo, path: Path = GAINS_FI
 
 
 def _unit(quantity: str) -> str:
-    return "deg" if quantity == "rotation" else "mm"
+    return "deg" if SIGNALS[quantity].is_angle else "mm"
 
 
 @cache

@@ -1,4 +1,4 @@
-"""How far a predictive controller looks ahead, and at which times it counts errors there."""
+"""Prediction horizon: its length, and the times at which errors count."""
 
 from typing import NamedTuple
 
@@ -18,7 +18,7 @@ SPARSE_S = 0.01
 
 
 class Horizon(NamedTuple):
-    """The time that is looked ahead, by rows of a prediction.
+    """The prediction horizon, by rows of a prediction.
 
     Attributes:
         parts: scored samples a period.

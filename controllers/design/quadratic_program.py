@@ -15,7 +15,7 @@ Problem = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
 class BoundedProgram:
-    """Least v' H v / 2 + q' v with low <= v <= high, again and again with other numbers.
+    """Minimise v' H v / 2 + q' v with low <= v <= high, repeatedly with other numbers.
 
     If what minimises without limits keeps them, it is the answer, and found as the solution of
     H v = -q. Else OSQP searches, from the last answer on. It is set up when it is first needed and

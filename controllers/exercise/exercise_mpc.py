@@ -41,7 +41,7 @@ ANGLE, MOMENT = Settings(effort=1e-4), Settings(effort=3e-3)
 
 
 class ExerciseMPC:
-    """Foresees the joint and chooses the pressures that it will need.
+    """Predicts the joint and chooses the pressures that it will need.
 
     From what the observers (`controllers.exercise.leg_observer`) make of the last reading, with the
     commands on their way, it foresees the errors e of the coming half second, linear in the

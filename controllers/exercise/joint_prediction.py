@@ -1,4 +1,4 @@
-"""What an exercise's joint is predicted to do, and the quadratic program that is made of it.
+"""Prediction of an exercise's joint, and the quadratic program built on it.
 
 All are deviations from now, but speeds and the operator's slope. The moment that the pressure makes
 stands in place of the pressure, q = h (P - P_0), u = h (P_c + g - P_0), h the change of the moment

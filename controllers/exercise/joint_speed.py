@@ -1,4 +1,4 @@
-"""The joint's speed in an exercise, by the sensors."""
+"""The joint's speed in an exercise, estimated from the sensors."""
 
 import math
 

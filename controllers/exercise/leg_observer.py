@@ -1,4 +1,4 @@
-"""What moves in an exercise, by Kalman filters of fixed gains: the leg, and the regulator.
+"""Kalman filters of fixed gain for the leg and the regulator of an exercise.
 
     theta' = w,   I w' = M_h - M - D w,   M_h' = s,   s' = -s / fade + white
     e' = white,   angle = theta,   (extension + tension / k) / r = theta + e
@@ -22,7 +22,7 @@ from pma_gym.envs import Measurement, StationInfo
 
 
 class ProcessNoise(NamedTuple):
-    """What the filters take for unknown, in SI; assumptions, found by trying.
+    """Process noise of the filters, in SI; assumptions, chosen by trial.
 
     Attributes:
         operator: change of the operator's moment (N m per s^0.5).

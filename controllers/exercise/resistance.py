@@ -1,4 +1,4 @@
-"""What an exercise resists with: the nominal device at rest, its cable set as the trial began."""
+"""Static moment of the nominal exercise device, its cable set as the trial began."""
 
 import math
 from collections.abc import Callable
@@ -107,7 +107,7 @@ def exercise_of(name: str, station: StationInfo, prescribed: bool | None = None)
 
 
 class Arrival:
-    """Whether the pressure comes to what was commanded, or something holds it.
+    """Whether the pressure reaches its command.
 
     The nominal regulator is a lag: believed' = (commanded - believed) / tau.
 

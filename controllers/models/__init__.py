@@ -1,1 +1,1 @@
-"""ModelKey models: the plant as controllers know it, its inverse, its linear and reduced forms."""
+"""Nominal models: the plant as controllers know it, its inverse, its linear and reduced forms."""

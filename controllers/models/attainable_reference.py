@@ -1,4 +1,4 @@
-"""What a feed-forward aims at: the reference, but for what no actuator can follow.
+"""The reference of a feed-forward, without what no actuator can follow.
 
 A jump takes time. The plant goes as its voltage can drive it,
 

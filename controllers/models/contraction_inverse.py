@@ -1,4 +1,4 @@
-"""A nominal station turned around where the regulator moves: the voltage that a contraction needs.
+"""Inverse of a nominal station moved by the regulator: the voltage that a contraction needs.
 
 The motor holds a load L. What the muscle must give along the contraction x says which pressure it
 needs, and the regulator's lag which pressure must be asked for:

@@ -1,4 +1,4 @@
-"""A nominal model turned around: the motor voltage that a motion needs.
+"""Inverse of a nominal model: the motor voltage that a motion needs.
 
 Station. The muscle's end moves at x = x0 - y, x' = -y'. Its balance of forces says which tension
 the cable must have, and the rotor's balance which load the drive must give:
@@ -38,7 +38,7 @@ TAKE_UP_S = 20e-3
 
 
 class Inverse(Protocol):
-    """A nominal model turned around."""
+    """Inverse of a nominal model."""
 
     def parts(self, period: float) -> int:
         """Into how many steps a control period (s) is divided."""
@@ -86,7 +86,7 @@ class StationInverse:
     def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, shape (steps,)."""
         parts = self.parts(station.period)
-        rotation = station.task.protocol.quantity == "rotation"
+        rotation = station.task.protocol.followed.is_angle
         tension, extension = self.follow(wanted, station.period / parts, station.pressure, rotation)
         wound = self.rotor.radius * wanted if rotation else extension
         load = self._mean_load(tension, extension, wound, station.period, parts)
@@ -189,7 +189,7 @@ class CascadeInverse:
     def along(self, wanted: np.ndarray, station: StationInfo) -> np.ndarray:
         """Motor voltage (V) of every control period of a motion, from its middle."""
         ends, middle = wanted[::2], wanted[1::2]
-        if station.task.protocol.quantity == "rotation":
+        if station.task.protocol.followed.is_angle:
             return self._mapped(self.parameters["servo"].radius * middle, station.pressure)
         rate = np.diff(ends) / station.period
         # The muscle relaxes where the motor is ahead of it, as where y rises.

@@ -32,7 +32,7 @@ FASTEST = 0.37
 
 
 class LagDeadTimeModel(NamedTuple):
-    """LagDeadTimeModel and dead time at a place of the stroke.
+    """One or two lags and a dead time at a place of the stroke.
 
     Attributes:
         gain: g (m/V or rad/V).

@@ -16,11 +16,12 @@ from typing import NamedTuple
 import numpy as np
 
 from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.data.signals import SIGNALS, is_pressure
 from pma_gym.engine.options import motor_at_rest
 from pma_gym.envs import StationInfo
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.forms.linear import FOLLOWING
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import RIGS
 
 STEP, PRESSURE_STEP, VOLTAGE_STEP = 1e-7, 100.0, 1e-4
 """Steps of the central differences: m, rad or 1/s of them; Pa; V."""
@@ -175,7 +176,7 @@ def _derivatives(
 
 
 def _step(name: str) -> float:
-    return PRESSURE_STEP if "pressure" in name else STEP
+    return PRESSURE_STEP if is_pressure(name) else STEP
 
 
 def _rates(plant: Plant, states: np.ndarray, inputs: np.ndarray) -> np.ndarray:
@@ -201,7 +202,7 @@ def _sensors(plant: Plant, kept: list[int], seen: dict[str, np.ndarray]) -> np.n
     """Extension, rotation and pressure as sensors say them, by the kept states."""
     rows = []
     for name in ("contraction", "rotation", "pressure"):
-        at = plant.sensor_columns[OUTPUTS.index(name)]
+        at = plant.sensor_columns[RIGS["station"].outputs.index(name)]
         row = seen[name] if at < 0 else np.eye(len(kept))[kept.index(at)]
-        rows.append(-row if name == "contraction" else row)
+        rows.append(-row if SIGNALS[name].shortens else row)
     return np.array(rows)

@@ -24,6 +24,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from controllers.models.voltage import VOLTAGE_LIMIT
+from pma_gym.data.signals import SIGNALS
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.solver import equilibria_at
 from pma_gym.plant.forms.linear import linearize_at
@@ -45,9 +46,6 @@ LARGEST_ERROR = 3e-3
 """Largest error of a reduced model's step response, as a share of its end."""
 
 LARGEST_ORDER = 4
-
-SENSORS = {"extension": "lvdt", "contraction": "lvdt", "rotation": "potentiometer"}
-"""Sensor by what is followed."""
 
 
 _SEARCHED = 201
@@ -127,7 +125,7 @@ def stroke_models(
     systems = [
         [linearize_at(plant, *rest, direction) for rest in rests] for direction in directions
     ]
-    sensor = plant.model.parameters.get(SENSORS[quantity])
+    sensor = plant.model.parameters.get(SIGNALS[quantity].sensor)
     rate = 2.0 * math.pi * sensor.bandwidth if sensor is not None else None
     sampled = [
         [_sampled(system, quantity, actuator, rate, period) for system in row] for row in systems

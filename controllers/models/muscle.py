@@ -1,4 +1,4 @@
-"""The muscle of a nominal plant on its own, moved at will: what the inverses follow."""
+"""The muscle of a nominal plant alone, at a prescribed motion; the inverses use it."""
 
 import math
 
@@ -9,7 +9,7 @@ from pma_gym.plant.plant import Plant
 
 
 class Muscle:
-    """The muscle of a plant on its own, moved at will.
+    """The muscle of a plant alone, at a prescribed motion.
 
     Args:
         plant: the plant.

@@ -1,4 +1,4 @@
-"""Trials on the nominal plant before the real one: what comes of voltages, and better voltages."""
+"""Simulate a trial on the nominal plant beforehand, and improve its voltages."""
 
 import numpy as np
 

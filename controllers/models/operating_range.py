@@ -5,8 +5,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from controllers.models.local_model import SENSORS, Stroke, stroke_models
+from controllers.models.local_model import Stroke, stroke_models
 from controllers.models.model_key import ModelKey
+from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import StationInfo
 from pma_gym.plant import sensors
 from pma_gym.plant.plant import Plant
@@ -59,9 +60,8 @@ def rest_voltages(station: StationInfo) -> tuple[float, float]:
 
 def sensor_of(station: StationInfo, quantity: str) -> tuple[float, float]:
     """Lag (s) and noise (m or rad), the DAQ's rounding included, of the sensor of a quantity."""
-    name = SENSORS[quantity]
-    _, calibration = sensors.SENSORS[name]
+    name = SIGNALS[quantity].sensor
     sensor = station.model.parameters.get(name)
     lag = 1.0 / (2.0 * math.pi * sensor.bandwidth) if sensor is not None else 0.0
     level = sensor.noise if sensor is not None else 0.0
-    return lag, math.hypot(level, calibration.resolution / math.sqrt(12.0))
+    return lag, math.hypot(level, sensors.SENSORS[name].resolution / math.sqrt(12.0))

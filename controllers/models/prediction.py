@@ -1,4 +1,4 @@
-"""What a plant will do under several plans of voltages at once, from where it stands now."""
+"""Predict a plant under several voltage sequences at once, from its present state."""
 
 from typing import NamedTuple
 
@@ -21,7 +21,7 @@ class Commands(NamedTuple):
 
 
 class Prediction:
-    """Simulates up to 16 plans from one condition, in the memory of the plans before.
+    """Simulates up to 16 voltage sequences from one state, and reuses the memory of earlier ones.
 
     The same compiled plant as `Plant.step`, with its arrays made once: of a prediction's 30 us,
     making them anew would be 200.

@@ -1,4 +1,4 @@
-"""A Kalman filter of how far the plant is from its nominal motion, and of what pushes it there.
+"""Kalman filter of the deviation from the nominal motion, and of the disturbance behind it.
 
 In deviations from the nominal motion the plant is, near a place of the stroke,
 

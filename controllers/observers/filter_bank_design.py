@@ -1,4 +1,4 @@
-"""What a bank of Kalman filters needs for a trial, computed before it.
+"""Gains and models of a bank of Kalman filters, computed before a trial.
 
 The muscle's damping is what is known least (the identified station's 95 % interval reaches from
 about none to twice the value) and what a fast loop depends on most. So the plant near its nominal
@@ -107,7 +107,7 @@ def bank_design(
         jolt: standard deviation of a force at the slide that lasts a period (N).
     """
     step, command, drift, force = _sampled(motion, station)
-    rotates = station.task.protocol.quantity == "rotation"
+    rotates = station.task.protocol.followed.is_angle
     radius = getattr(station.model.parameters.get("rotor"), "radius", 1.0)
     seen = np.concatenate([motion.sensors, np.zeros((3, len(UNKNOWNS)))], axis=1)
     # The sensor that the task does not ask for is off by the gap.
@@ -177,7 +177,7 @@ def _process_noise(
 def _sensor_noise(station: StationInfo) -> np.ndarray:
     """Variances of LVDT, potentiometer and pressure transducer, the DAQ's rounding included."""
     levels = sensors.noise_levels(station.model)
-    rounding = [line.resolution / math.sqrt(12.0) for _, line in sensors.SENSORS.values()]
+    rounding = sensors.resolutions(station.model) / math.sqrt(12.0)
     return (levels**2 + np.square(rounding))[[0, 1, 3]]
 
 

@@ -1,4 +1,4 @@
-"""What controllers on a lag observer have in common: what they send, and their linear law."""
+"""Common part of controllers on a lag observer: the voltage they send, and their linear law."""
 
 from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, Generic, NamedTuple, TypeVar

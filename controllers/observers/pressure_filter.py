@@ -1,4 +1,4 @@
-"""The muscle's pressure, filtered and looked ahead: what of it was not asked for.
+"""Filter and predict the muscle's pressure: the part of it that was not commanded.
 
 The regulator brings the pressure P to what it is commanded, C, and to what nobody asked for, J:
 
@@ -12,8 +12,8 @@ pressure will be when a command comes into force.
 
 import math
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import StationInfo
-from pma_gym.plant import sensors
 
 INNOVATION_GATE = 4.5
 """Standard deviations of a reading beyond which J has jumped, or the transducer has an offset."""
@@ -27,7 +27,7 @@ DRIFT_PA = 500.0
 PROCESS_NOISE_PA = 50.0
 """Standard deviation of the pressure's own change in a period (Pa): what moves it but C and J."""
 
-NAME = "pressure_transducer"
+PRESSURE = SIGNALS["pressure"]
 
 
 class PressureFilter:
@@ -43,8 +43,8 @@ class PressureFilter:
 
     def __init__(self, station: StationInfo) -> None:
         parameters = station.model.parameters
-        sensor, (_, calibration) = parameters.get(NAME), sensors.SENSORS[NAME]
-        rounding = calibration.resolution / math.sqrt(12.0)
+        sensor = parameters.get(PRESSURE.sensor)
+        rounding = PRESSURE.resolution / math.sqrt(12.0)
         self._noise = (0.0 if sensor is None else sensor.noise) ** 2 + rounding**2
         self._sensor_lag = 0.0 if sensor is None else 0.5 / (math.pi * sensor.bandwidth)
         self._lag = parameters["regulator_lag"].time_constant

@@ -1,4 +1,4 @@
-"""What stands between a policy and a station: readings become entries, actions become volts."""
+"""Connect a policy to a station: readings become entries, actions become volts."""
 
 import math
 from collections import deque

@@ -1,4 +1,4 @@
-"""Many pilots side by side: the same entries and voltages as `PolicyAdapter`, in arrays."""
+"""Many policy adapters side by side: the entries and voltages of `PolicyAdapter`, in arrays."""
 
 from collections.abc import Callable
 

@@ -51,7 +51,7 @@ LARGEST_LAYER = 65536
 
 
 class PolicyError(ValueError):
-    """A policy file that cannot be used; the message says which, why and the mend."""
+    """A policy file that cannot be used; the message says which, why and the fix."""
 
 
 def parsed_document(text: bytes) -> dict[str, Any]:

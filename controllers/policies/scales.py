@@ -3,6 +3,7 @@
 from typing import Any
 
 from pma_gym.data.protocol import Protocol
+from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.observation import ROTATION_SCALE, Prescribed
 from pma_gym.envs import StationInfo
 from pma_gym.tasks import Task
@@ -64,9 +65,9 @@ class Scales:
             volts: motor voltage in force then (V), if the task is the motor's.
         """
         extension, rotation, load, pressure = reading
-        if self.quantity == "rotation":
+        if SIGNALS[self.quantity].is_angle:
             own, other = rotation, extension / self.radius
-        elif self.quantity == "contraction":
+        elif SIGNALS[self.quantity].shortens:
             own, other = -extension, -self.radius * rotation
         else:
             own, other = extension, self.radius * rotation

@@ -1,4 +1,4 @@
-"""The weights of a policy file: tensors by name, held against the words beside them."""
+"""The weights of a policy file: tensors by name, checked against the JSON beside them."""
 
 import hashlib
 from collections.abc import Mapping

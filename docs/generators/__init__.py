@@ -41,6 +41,7 @@ from generators.hidden_effects import (
     hidden_rounds,
     hidden_seconds,
     hidden_sizes,
+    hidden_summary,
     hidden_ways,
 )
 from generators.models import differences, identification, misfit, parameters, shipped
@@ -68,7 +69,7 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(suites, episode_plans, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
         *(hidden_ways, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
-        hidden_confused,
+        *(hidden_confused, hidden_summary),
         *(policies_shipped, policies_judged, policies_trained),
         *(policies_ablations, policies_robustness, policies_operators),
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),

@@ -41,10 +41,13 @@ def _command(called: str, command: Any) -> str:  # noqa: ANN401 - typer does not
     words += [f"{p.opts[0]} {p.name.upper()}" for p in options if p.required]
     words += ["[OPTIONS]"] if any(not p.required for p in options) else []
     text = " ".join((command.help or "").split())
+    example = (command.epilog or "").removeprefix("Example: ")
     parts = [f"### {called}", text, f"```text\n{' '.join(words)}\n```"]
     if command.params:
         rows = [[_names(p), _default(p), p.help or ""] for p in (*given, *options)]
         parts.append(table(["Argument", "Default", "What"], rows))
+    if example:
+        parts.append(f"```bash\n{example}\n```")
     return "\n\n".join(parts)
 
 

@@ -3,20 +3,16 @@
 from importlib import resources
 
 from generators.text import code, number, table
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import COLUMNS, RAW_COLUMNS
 from pma_gym.units import SI_FACTORS
 
-_MEANINGS = {
-    "time": "since the start; required, strictly increasing",
-    "motor_voltage": "command to the motor's drive",
-    "regulator_voltage": "command to the pressure regulator",
-    "load_command": "load asked of the drive, in place of the motor voltage",
-    "pressure_command": "gauge pressure asked for, in place of the regulator voltage",
-    "contraction": "shortening from the resting length, LVDT",
-    "rotation": "pulley angle, potentiometer; 0 at the start, grows as the motor winds in",
-    "load": "cable tension, load cell",
-    "pressure": "gauge pressure, transducer",
-}
+_TIME = "since the start; required, strictly increasing"
+
+
+def _meaning(quantity: str) -> str:
+    """What a column holds, in words."""
+    return SIGNALS[quantity].meaning if quantity in SIGNALS else _TIME
 
 
 def columns() -> str:
@@ -26,7 +22,7 @@ def columns() -> str:
             code(column.name),
             column.unit,
             column.kind,
-            _MEANINGS[column.quantity],
+            _meaning(column.quantity),
             "" if column.limits is None else f"{column.limits[0]:g} to {column.limits[1]:g}",
         ]
         for column in COLUMNS

@@ -7,6 +7,7 @@ from typing import Any
 from benchmarks.hidden_effects.baselines.comparison import COLUMNS
 from benchmarks.hidden_effects.baselines.registry import WAYS
 from benchmarks.hidden_effects.bound import detected, identified
+from benchmarks.hidden_effects.evaluation.readme import diagnosis
 from benchmarks.hidden_effects.evaluation.summary import report_blocks
 from generators.text import code, table
 from pma_gym.pages.document import TextTable, to_markdown
@@ -23,6 +24,11 @@ def hidden_rates() -> str:
     every = report_blocks(_read("hidden-effects"))
     tables = [each for each in every if isinstance(each, TextTable)]
     return to_markdown(tables[:1], {}, "")
+
+
+def hidden_summary() -> str:
+    """The rate of each block that says most."""
+    return diagnosis()
 
 
 def hidden_cases(block: str) -> str:

@@ -43,7 +43,7 @@ def trials() -> str:
 
 def targets() -> str:
     """What a run is measured by."""
-    wanted = load_suite().targets
+    wanted = load_suite().goals
     simple = wanted.simple_prediction
     feedback = " and ".join(code(name) for name in wanted.feedback)
     rows = [

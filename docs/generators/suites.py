@@ -1,7 +1,8 @@
 """The frozen suites: what they run, on which stations."""
 
 from benchmarks.runner.case import cases
-from benchmarks.suites.frozen import FrozenSuite, frozen_suite, suite_names
+from benchmarks.suites.frozen import frozen_suite, suite_names
+from benchmarks.suites.suite import FrozenSuite
 from generators.text import code, number, table
 
 

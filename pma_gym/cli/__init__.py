@@ -10,11 +10,18 @@ import numpy as np
 import typer
 
 from pma_gym.cli.comparison import compare
+from pma_gym.cli.completion import NamedModel, dissertation_tasks, model_names
 from pma_gym.cli.convert import convert
 from pma_gym.cli.discovery import diagnose, fit
-from pma_gym.cli.information import print_installation, print_model
-from pma_gym.cli.options import StrictTyper
-from pma_gym.cli.terminal import console, read, say
+from pma_gym.cli.information import (
+    installation,
+    model_document,
+    print_installation,
+    print_model,
+    print_version,
+)
+from pma_gym.cli.options import JsonOption, StrictTyper
+from pma_gym.cli.terminal import console, print_json, read, say
 from pma_gym.cli.watch import watch
 from pma_gym.data.files.trial_files import check_writable, place_in_file, write_trial
 from pma_gym.data.trial import Trial, TrialError
@@ -25,17 +32,15 @@ from pma_gym.tasks import broken_limit
 from pma_gym.terminal import safe_streams
 
 app = StrictTyper(
-    add_completion=False,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     help="A pneumatic muscle's test station, simulated.",
+    epilog="Example: pma-gym watch --task rotation --video rotation.gif",
 )
 
 _PRESSURE_TOLERANCE = 1.0
 """Rounding of a settled pressure (Pa) that is no extrapolation."""
-
-ModelOption = Annotated[str, typer.Option(help="Shipped name or TOML file.")]
 
 
 class Hold(StrEnum):
@@ -45,7 +50,20 @@ class Hold(StrEnum):
     ZERO = "zero"
 
 
-@app.command()
+@app.callback()
+def program(
+    version: Annotated[
+        bool,
+        typer.Option("--version", help="Print the version.", callback=print_version, is_eager=True),
+    ] = False,
+) -> None:
+    """A pneumatic muscle's test station, simulated."""
+
+
+@app.command(
+    short_help="Run a command file through a model.",
+    epilog="Example: pma-gym simulate ramp.csv --out trial.csv --seed 1",
+)
 def simulate(
     commands: Annotated[
         Path, typer.Argument(help="A file with time and commands: CSV, XLSX, Parquet...")
@@ -53,7 +71,7 @@ def simulate(
     out: Annotated[
         Path, typer.Option(help="File to write, in a folder that exists: .csv, .parquet or .xlsx.")
     ],
-    model: ModelOption = "station",
+    model: NamedModel = "station",
     noise: Annotated[bool, typer.Option(help="Sensor noise and quantisation.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
     hold: Annotated[
@@ -81,34 +99,67 @@ def simulate(
     print(f"{len(trial)} samples, {trial.duration:.6g} s, on {plant.model.name} {noisy}: {out}")
 
 
-@app.command()
+@app.command(
+    short_help="Score a logged trial as the dissertation does.",
+    epilog="Example: pma-gym evaluate trial.csv --task displacement",
+)
 def evaluate(
     trial: Annotated[Path, typer.Argument(help="A log: CSV, XLSX, Parquet, LVM, MAT, TDMS...")],
-    task: Annotated[str, typer.Option(help="displacement or rotation.")],
+    task: Annotated[
+        str, typer.Option(help="displacement or rotation.", autocompletion=dissertation_tasks)
+    ],
+    as_json: JsonOption = False,
 ) -> None:
     """Give a logged trial its rows of tables 20-22 or 24-30: regression, variance and RMSE."""
     # Imported here: the studies bring python-control along, and that brings matplotlib.
     from pma_gym.studies import evaluation
 
-    evaluation.print_evaluation(evaluation.evaluate(read(trial), task), console())
+    rows = evaluation.evaluate(read(trial), task)
+    if as_json:
+        print_json(rows.documents())
+    else:
+        evaluation.print_evaluation(rows, console())
 
 
-@app.command()
+@app.command(
+    short_help="Versions and models; a model's parameters.",
+    epilog="Example: pma-gym info --model station",
+)
 def info(
-    model: Annotated[str | None, typer.Option(help="Show this model's parameters.")] = None,
+    model: Annotated[
+        str | None,
+        typer.Option(help="Show this model's parameters.", autocompletion=model_names),
+    ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Versions, models and environments; or a model's effects and parameters."""
-    if model is None:
+    if as_json:
+        print_json(installation() if model is None else model_document(load_model(model)))
+    elif model is None:
         print_installation(console())
     else:
         print_model(load_model(model), console())
 
 
-app.command()(convert)
-app.command()(diagnose)
-app.command()(fit)
-app.command()(compare)
-app.command()(watch)
+app.command(
+    short_help="Draft dataset.toml for a lab's files.",
+    epilog="Example: pma-gym convert logs",
+)(convert)
+app.command(
+    short_help="Find where logs and model disagree, and why.",
+    epilog="Example: pma-gym diagnose logs --model station --jobs 4",
+)(diagnose)
+app.command(
+    short_help="Refit a model's parameters to logs.",
+    epilog="Example: pma-gym fit logs --model station --out fitted",
+)(fit)
+app.command(
+    short_help="Print the misfit of a model to logs.",
+    epilog="Example: pma-gym compare logs --model fitted/model.toml",
+)(compare)
+app.command(
+    epilog="Example: pma-gym watch --task rotation --controller controllers:PID --video pid.gif"
+)(watch)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -6,7 +6,9 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from pma_gym.cli.terminal import console, say, warnings_said
+from pma_gym.cli.completion import model_names
+from pma_gym.cli.options import JsonOption
+from pma_gym.cli.terminal import console, print_json, say, warnings_said
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.plant.model import load_model
 
@@ -20,12 +22,16 @@ def compare(
     ],
     model: Annotated[
         str | None,
-        typer.Option(help="Shipped name or TOML file; else the data set's own, else station."),
+        typer.Option(
+            help="Shipped name or TOML file; else the data set's own, else station.",
+            autocompletion=model_names,
+        ),
     ] = None,
     trials: Annotated[
         Path | None,
         typer.Option(help="trials.toml of a diagnosis or a fit: zeros and starts of the trials."),
     ] = None,
+    as_json: JsonOption = False,
 ) -> None:
     """Simulate a lab's trials with a model and print the misfit of every signal."""
     from pma_gym.discovery.fitting.trial_states import misfits, read_states
@@ -47,9 +53,13 @@ def compare(
             f"warning: {trials} has no state of {', '.join(absent[:3])}"
             f"{' and others' if len(absent) > 3 else ''}; they begin as the model says"
         )
+    sizes = misfits(named, compared, states)
+    if as_json:
+        print_json({"model": compared.name, "misfit_rms": sizes})
+        return
     table = Table("signal", title=f"Misfit of {compared.name} (rms)", title_justify="left")
     table.add_column("misfit", justify="right")
     table.add_column("unit")
-    for signal, size in misfits(named, compared, states).items():
+    for signal, size in sizes.items():
         table.add_row(signal_name(signal), figure(size), signal_unit(signal))
     console().print(table)

@@ -39,10 +39,10 @@ def controller_of(source: str) -> Runnable:
         raise ControllerSourceError(
             f"a controller is named file.py:Class or module:Class, got {source!r}"
         )
-    module = _from_file(Path(place)) if place.endswith(".py") else _imported(place)
-    made = getattr(module, name, None)
-    if not isinstance(made, type):
-        raise ControllerSourceError(f"{place} has no class {name!r}; it has {_classes(module)}")
+    if place.endswith(".py"):
+        made = class_in_file(Path(place), name)
+    else:
+        made = _class_of(_imported(place), place, name)
     try:
         controller: Any = made()
     except Exception as error:
@@ -59,12 +59,32 @@ def controller_of(source: str) -> Runnable:
     return controller
 
 
+def class_in_file(path: Path, name: str) -> type:
+    """A class of a file, which is run once in each process.
+
+    Raises:
+        ControllerSourceError: the file or the class is missing; or the file raised something, which
+            is the cause.
+    """
+    return _class_of(_from_file(path), str(path), name)
+
+
+def _class_of(module: ModuleType, place: str, name: str) -> type:
+    made = getattr(module, name, None)
+    if not isinstance(made, type):
+        raise ControllerSourceError(f"{place} has no class {name!r}; it has {_classes(module)}")
+    return made
+
+
 def _from_file(path: Path) -> ModuleType:
     if not path.is_file():
         raise ControllerSourceError(f"there is no file {path}; check the name and the folder")
-    name = f"watched_{path.resolve().as_posix()}"
+    name = f"controller_{path.resolve().as_posix()}"
+    if name in sys.modules:
+        return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
+    if spec is None or spec.loader is None:
+        raise ControllerSourceError(f"{path} is no Python file; its name must end in .py")
     module = importlib.util.module_from_spec(spec)
     # A dataclass looks up its module by name.
     sys.modules[name] = module

@@ -8,7 +8,9 @@ import typer
 from rich.table import Table
 from rich.text import Text
 
-from pma_gym.cli.terminal import console, say
+from pma_gym.cli.completion import model_names
+from pma_gym.cli.options import JsonOption
+from pma_gym.cli.terminal import console, print_json, say
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description
 from pma_gym.data.datasets.drafting import SeenColumn, draft, one_line, seen_columns
@@ -20,9 +22,14 @@ from pma_gym.plant.model import Model, load_model
 def convert(
     folder: Annotated[Path, typer.Argument(help="Folder of a lab's files, one a trial.")],
     model: Annotated[
-        str, typer.Option(help="Shipped name or TOML file of the model to check them with.")
+        str,
+        typer.Option(
+            help="Shipped name or TOML file of the model to check them with.",
+            autocompletion=model_names,
+        ),
     ] = "station",
     force: Annotated[bool, typer.Option("--force", help=f"Replace a {DESCRIPTION}.")] = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Show the columns of a lab's files and draft dataset.toml, to be read and corrected."""
     path = folder / DESCRIPTION
@@ -32,7 +39,8 @@ def convert(
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         columns, count = seen_columns(folder, Description())
-    console().print(_table(columns, count))
+    if not as_json:
+        console().print(_table(columns, count))
     title = folder.resolve().name
     # The draft itself is what is checked: it is what a diagnosis will read.
     older = path.read_bytes() if path.exists() else None
@@ -46,6 +54,10 @@ def convert(
         else:
             path.unlink(missing_ok=True)
         raise
+    if as_json:
+        seen = [_document(each) for each in columns]
+        print_json({"tables": count, "columns": seen, "checks": said, "written": str(path)})
+        return
     for words in said:
         say(f"check: {words}")
     print(f"Written {path}: read it, correct it, then: pma-gym diagnose {folder}")
@@ -78,6 +90,18 @@ def _checked(folder: Path, model: Model) -> list[str]:
         return said + list(check_dataset(dataset, model, stop=False).checked or ())
     except TrialError as error:
         return [*said, str(error)]
+
+
+def _document(column: SeenColumn) -> dict[str, object]:
+    """A column of the lab's files and what it is taken for."""
+    guess = column.guess
+    seen = {"name": column.name, "unit": column.unit, "from": column.low, "to": column.high}
+    return seen | {
+        "files": column.files,
+        "taken_for": guess.column.name if guess and column.chosen else None,
+        "factor": guess.factor if guess and column.chosen else None,
+        "reason": guess.why if guess else "no known column",
+    }
 
 
 def _table(columns: list[SeenColumn], count: int) -> Table:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pma_gym.cli.completion import model_names
+from pma_gym.cli.options import JsonOption
 from pma_gym.cli.progress import StepProgress
 from pma_gym.cli.results import Results
-from pma_gym.cli.terminal import say, warnings_said, warnings_said_at_once
+from pma_gym.cli.terminal import print_json, say, warnings_said, warnings_said_at_once
 from pma_gym.cli.time_left import DIAGNOSIS, FIT, TimeLeft
 from pma_gym.data.datasets.dataset import Dataset, read_dataset
 from pma_gym.files import OutputError
@@ -42,21 +44,22 @@ DatasetArgument = Annotated[
 ]
 ModelOption = Annotated[
     str | None,
-    typer.Option(help="Shipped name or TOML file; else the data set's own, else station."),
+    typer.Option(
+        help="Shipped name or TOML file; else the data set's own, else station.",
+        autocompletion=model_names,
+    ),
 ]
 OutOption = Annotated[
     Path | None, typer.Option(help="Folder for the results; else the data set's name and command.")
 ]
-SeedOption = Annotated[int, typer.Option(min=0, help="Seed of resampling and of starts.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of chance.")]
 JobsOption = Annotated[int, typer.Option(min=1, help="How many cores to use.")]
 EffectOption = Annotated[
     list[Path] | None, typer.Option(help="Python file with effects of your own; may be repeated.")
 ]
 ChecksOption = Annotated[
     bool,
-    typer.Option(
-        help="Stop where a column, or time_s, is certainly in another unit; else only warn."
-    ),
+    typer.Option(help="Stop where a unit is certainly wrong; else only warn."),
 ]
 ForceOption = Annotated[bool, typer.Option("--force", help="Replace an older result.")]
 
@@ -73,8 +76,9 @@ def diagnose(
         bool, typer.Option("--resume", help="Go on with a run that was interrupted.")
     ] = False,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
-    """Say where logs and model disagree, which effect is missing and how large it is."""
+    """Say where logs and model disagree, and which effect is missing."""
     results = Results(
         out or _default(dataset, "diagnosis"),
         ("model.toml", "trials.toml", "next.csv", "report.html", "diagnosis.json"),
@@ -103,6 +107,9 @@ def diagnose(
         results.write(files)
     from pma_gym.discovery.report.summary import diagnosis_summary
 
+    if as_json:
+        print_json(diagnosis.document())
+        return
     print(diagnosis_summary(diagnosis))
     _print_files(results)
 
@@ -116,6 +123,7 @@ def fit(
     effect: EffectOption = None,
     checks: ChecksOption = True,
     force: ForceOption = False,
+    as_json: JsonOption = False,
 ) -> None:
     """Refit a model's parameters to logs, without looking for new effects."""
     results = Results(out or _default(dataset, "fit"), ("model.toml", "trials.toml", "fit.json"))
@@ -139,6 +147,9 @@ def fit(
         )
     from pma_gym.discovery.report.summary import print_fit
 
+    if as_json:
+        print_json(kept)
+        return
     print_fit(refitted)
     _print_files(results)
 

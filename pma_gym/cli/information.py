@@ -2,29 +2,56 @@
 
 import platform
 from importlib import metadata
+from typing import Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
+from pma_gym import __version__
 from pma_gym.envs import ENVIRONMENTS
 from pma_gym.plant.model import Model, load_model, shipped_models
 
 _PACKAGES = ("pma-gym", "gymnasium", "numpy", "scipy", "llvmlite", "control")
 
 
+def print_version(wanted: bool) -> None:
+    """Print the version and end, if it is wanted: what `--version` does."""
+    if wanted:
+        print(f"pma-gym {__version__}")
+        raise typer.Exit
+
+
+def installation() -> dict[str, Any]:
+    """Versions, shipped models and registered environments."""
+    versions = {name: metadata.version(name) for name in _PACKAGES}
+    models = [load_model(name) for name in shipped_models()]
+    return {
+        "versions": {"python": platform.python_version(), **versions},
+        "models": [{"name": m.name, "plant": m.plant, "title": m.title} for m in models],
+        "environments": [{"id": name, "task": task} for name, task in ENVIRONMENTS.items()],
+    }
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """A model's effects and parameters, in the units of files."""
+    rows = [row._asdict() for row in model.rows()]
+    head = {"name": model.name, "plant": model.plant, "title": model.title}
+    return head | {"parameters": rows}
+
+
 def print_installation(console: Console) -> None:
     """Versions, shipped models and registered environments."""
+    known = installation()
     versions = Table("package", "version", title="Versions", title_justify="left")
-    versions.add_row("python", platform.python_version())
-    for name in _PACKAGES:
-        versions.add_row(name, metadata.version(name))
+    for package in known["versions"].items():
+        versions.add_row(*package)
     models = Table("model", "plant", "what", title="Models", title_justify="left")
-    for name in shipped_models():
-        model = load_model(name)
-        models.add_row(name, model.plant, model.title)
+    for model in known["models"]:
+        models.add_row(*model.values())
     environments = Table("environment", "task", title="Environments", title_justify="left")
-    for name, task in ENVIRONMENTS.items():
-        environments.add_row(name, task)
+    for environment in known["environments"]:
+        environments.add_row(*environment.values())
     for table in (versions, models, environments):
         console.print(table)
 

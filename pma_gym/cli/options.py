@@ -1,13 +1,17 @@
-"""Numbers on command lines: the one strict grammar of `pma_gym.numerals`."""
+"""Command lines as people expect them: strict numbers, and the nearest option to a misspelt one."""
 
-from collections.abc import Callable
-from typing import Any, get_args, get_type_hints
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from difflib import get_close_matches
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperCommand, TyperGroup
 
 from pma_gym.numerals import parse_number
 from pma_gym.printable import printable
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
 class StrictTyper(typer.Typer):
@@ -26,11 +30,39 @@ class _StrictCommand(TyperCommand):
         super().__init__(*given, **options)
         _make_strict(self)
 
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
+        with _nearest_option(self):
+            return super().parse_args(ctx, args)
+
 
 class _StrictGroup(TyperGroup):
     def __init__(self, *given: Any, **options: Any) -> None:
         super().__init__(*given, **options)
         _make_strict(self)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:  # noqa: ANN401
+        with _nearest_option(self):
+            return super().parse_args(ctx, args)
+
+
+@contextmanager
+def _nearest_option(command: Any) -> Iterator[None]:  # noqa: ANN401
+    """Name the nearest option of a command to one that it does not have."""
+    try:
+        yield
+    except Exception as error:
+        # Typer's own Click and the one it used before 0.20 have a class each.
+        if type(error).__name__ != "NoSuchOption":
+            raise
+        visible = [param for param in command.params if not getattr(param, "hidden", False)]
+        known = [name for param in visible for name in (*param.opts, *param.secondary_opts)]
+        options = [name for name in (*known, "--help") if name.startswith("-")]
+        given = error.option_name  # type: ignore[attr-defined]
+        near = get_close_matches(given, options, 1)
+        error.message = f"No such option: {printable(given[:60])}"  # type: ignore[attr-defined]
+        error.message += f". Did you mean {near[0]}?" if near else ""  # type: ignore[attr-defined]
+        error.possibilities = None  # type: ignore[attr-defined]
+        raise
 
 
 def _make_strict(command: Any) -> None:  # noqa: ANN401 - Typer brings its own Click since 0.20

@@ -1,5 +1,7 @@
 """What all commands share: tables on the terminal, messages beside them, trials from files."""
 
+import json
+import math
 import sys
 import warnings
 from collections.abc import Iterator
@@ -15,6 +17,19 @@ from pma_gym.terminal import SafeConsole, table_console
 def console() -> SafeConsole:
     """Where tables go; as wide as they need where nobody watches."""
     return table_console()
+
+
+def print_json(document: object) -> None:
+    """Print a document for programs; numbers that JSON lacks, such as infinity, are null."""
+    print(json.dumps(_finite(document), indent=1, allow_nan=False))
+
+
+def _finite(document: Any) -> Any:  # noqa: ANN401 - whatever JSON has
+    if isinstance(document, dict):
+        return {str(key): _finite(value) for key, value in document.items()}
+    if isinstance(document, list | tuple):
+        return [_finite(value) for value in document]
+    return None if isinstance(document, float) and not math.isfinite(document) else document
 
 
 def say(message: str) -> None:

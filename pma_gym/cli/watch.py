@@ -8,6 +8,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from pma_gym.cli.completion import NamedModel, task_names
 from pma_gym.cli.controller_source import controller_of
 from pma_gym.cli.film import FILMS, write_film
 from pma_gym.cli.terminal import read
@@ -30,23 +31,22 @@ def watch(
     controller: Annotated[
         str | None,
         typer.Option(
-            help="file.py:Class, module:Class, or a file of commands (CSV, XLSX...); without one "
-            "the voltage rises and falls slowly."
+            help="file.py:Class, module:Class, or a file of commands (CSV, XLSX...); else the "
+            "voltage rises and falls slowly."
         ),
     ] = None,
-    task: Annotated[str, typer.Option(help="Name of a task.")] = "displacement",
+    task: Annotated[
+        str, typer.Option(help="Name of a task.", autocompletion=task_names)
+    ] = "displacement",
     pressure: Annotated[float, typer.Option(help="Gauge pressure at the start (kPa).")] = 300.0,
-    model: Annotated[str, typer.Option(help="Shipped name or TOML file.")] = "station",
+    model: NamedModel = "station",
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise and of what is drawn.")] = 0,
     video: Annotated[
         Path | None, typer.Option(help="Write a film instead: a file ending in .mp4 or .gif.")
     ] = None,
     width: Annotated[int, typer.Option(help="Width of the picture (pixels).")] = 800,
 ) -> None:
-    """Watch a trial in a window at real time, or write it as a film.
-
-    Example: pma-gym watch --task rotation --controller controllers:PID --video pid.gif
-    """
+    """Watch a trial in a window at real time, or write it as a film."""
     if video is not None:
         _check_film(video)
     env = PMAEnv(

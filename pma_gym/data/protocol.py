@@ -9,6 +9,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.metrics import PHASE_DURATION, PHASE_SAMPLES, SAMPLE_RATE_HZ
 from pma_gym.pickling import Packed, packed
 from pma_gym.units import SI_FACTORS
@@ -150,6 +151,11 @@ class Protocol:
         other = replace(self, phases=tuple(replace(each, motion=motion) for each in self.phases))
         memo[id(self)] = other
         return other
+
+    @property
+    def followed(self) -> Signal:
+        """The signal of its quantity."""
+        return SIGNALS[self.quantity]
 
     @property
     def suffix(self) -> str:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_checks import (
     COMMANDS,
     check_commanded,
@@ -25,7 +26,7 @@ __all__ = ["COMMANDS", "MEASUREMENTS", "TRUTH", "Trial", "TrialError"]
 MEASUREMENTS = tuple(column.quantity for column in COLUMNS if column.kind == "measurement")
 """contraction (m), rotation (rad), load (N), pressure (Pa)."""
 
-TRUTH = (*MEASUREMENTS, "extension")
+TRUTH = (*MEASUREMENTS, *(s.reading for s in SIGNALS.values() if s.reading))
 """What a simulation knows without its sensors; extension in m."""
 
 Arrays = Mapping[str, NDArray[np.float64]]
@@ -118,6 +119,10 @@ class Trial:
             TrialError: rotation was not measured.
         """
         return self._measured("rotation")
+
+    def measures(self, quantity: str) -> bool:
+        """Whether it has a measurement of a physical quantity: "angle", "force", "pressure"..."""
+        return any(SIGNALS[name].measures == quantity for name in self.measurements)
 
     def plot(self) -> "Figure":
         """Commands and measurements over time, a panel a column, in the units of files.

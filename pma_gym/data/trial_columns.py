@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data import calibration
 from pma_gym.data.calibration import DAQ_LIMIT, DAQ_STEP, Calibration
+from pma_gym.data.signals import SIGNALS, VOLTAGE_RANGE, Signal
 from pma_gym.units import SI_FACTORS
+
+__all__ = ["VOLTAGE_RANGE", "Column", "ColumnMap", "SampleError", "Source", "TrialError"]
 
 ColumnMap = Mapping[str, str | Mapping[str, object]]
 """A lab's own column names to ours: `{"Weg": "contraction_mm"}`, or with a linear conversion,
@@ -56,6 +58,7 @@ class Column:
         quantity: what a `Trial` calls it; in SI there.
         limits: smallest and largest value in file units, where there are any.
         calibration: for a sensor's raw voltage, the line that decodes it.
+        starts_at_zero: a trial counts raw voltages from its own first reading.
     """
 
     name: str
@@ -64,6 +67,18 @@ class Column:
     quantity: str
     limits: tuple[float, float] | None = None
     calibration: Calibration | None = None
+    starts_at_zero: bool = False
+
+    @classmethod
+    def of(cls, signal: Signal) -> "Column":
+        """The column of a signal."""
+        return cls(signal.column, signal.unit, signal.kind, signal.name, signal.limits)
+
+    @classmethod
+    def raw(cls, signal: Signal) -> "Column":
+        """The column of the raw voltage of a signal's sensor."""
+        line, zero = signal.calibration, signal.starts_at_zero
+        return cls(signal.raw_column, "V", signal.kind, signal.name, _DAQ_RANGE, line, zero)
 
     def to_si(self, door: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in SI of values in file units."""
@@ -71,7 +86,7 @@ class Column:
             return door * SI_FACTORS[self.unit]
         values = self.calibration.from_volts(door)
         # A potentiometer's zero is its protractor's; a trial's rotation starts at 0.
-        return values - _first_measured(values) if self.quantity == "rotation" else values
+        return values - _first_measured(values) if self.starts_at_zero else values
 
     def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Values in file units that `to_si` takes back to the same bits, where such values exist.
@@ -89,32 +104,18 @@ class Column:
         return chosen
 
 
-VOLTAGE_RANGE = (0.0, 10.0)
-"""What the motor's drive and the regulator accept (V)."""
+_DAQ_RANGE = (-DAQ_LIMIT, DAQ_LIMIT)
+
+_IN_FILES = tuple(signal for signal in SIGNALS.values() if signal.kind != "derived")
 
 COLUMNS: tuple[Column, ...] = (
     Column("time_s", "s", "time", "time"),
-    Column("motor_voltage_v", "V", "command", "motor_voltage", VOLTAGE_RANGE),
-    Column("regulator_voltage_v", "V", "command", "regulator_voltage", VOLTAGE_RANGE),
-    Column("load_command_n", "N", "command", "load_command"),
-    Column("pressure_command_kpa", "kPa", "command", "pressure_command"),
-    Column("contraction_mm", "mm", "measurement", "contraction"),
-    Column("rotation_deg", "deg", "measurement", "rotation"),
-    Column("load_n", "N", "measurement", "load"),
-    Column("pressure_kpa", "kPa", "measurement", "pressure"),
+    *(Column.of(signal) for signal in _IN_FILES),
 )
 """What files hold, in the order in which they are written."""
 
-_DAQ_RANGE = (-DAQ_LIMIT, DAQ_LIMIT)
-
 RAW_COLUMNS: tuple[Column, ...] = tuple(
-    Column(name, "V", "measurement", quantity, _DAQ_RANGE, line)
-    for name, quantity, line in (
-        ("lvdt_v", "contraction", calibration.LVDT),
-        ("potentiometer_v", "rotation", calibration.POTENTIOMETER),
-        ("load_cell_v", "load", calibration.LOAD_CELL),
-        ("pressure_transducer_v", "pressure", calibration.PRESSURE_TRANSDUCER),
-    )
+    Column.raw(signal) for signal in _IN_FILES if signal.raw_column
 )
 """Raw sensor volts, which a file may hold instead; decoded on reading, never written."""
 

@@ -48,7 +48,6 @@ from pma_gym.discovery.verdict.unknown import (
     widest_scatter,
 )
 from pma_gym.discovery.verdict.worsened import worsened
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model, Note
 
 AT_LIMIT = 1e-6
@@ -225,7 +224,7 @@ def _misfits(findings: Findings) -> list[float]:
     left = residuals(
         findings.problem.whitened_residuals(findings.refitted.model), findings.refitted
     )
-    joined = [np.concatenate([part[channel] for part in left]) for channel in range(len(OUTPUTS))]
+    joined = [np.concatenate([part[channel] for part in left]) for channel in range(len(left[0]))]
     known = [values[np.isfinite(values)] for values in joined]
     return [float(np.sqrt(np.mean(each**2))) if each.size else np.nan for each in known]
 
@@ -432,10 +431,7 @@ def _worsened(
         BY_QUANTITY[name].name: findings.adequacy.signals[name].floor
         for name in findings.adequacy.signals
     }
-    floors = {
-        BY_QUANTITY[name].name: floor.level
-        for name, floor in zip(OUTPUTS, findings.floors, strict=True)
-    }
+    floors = {floor.signal.column: floor.level for floor in findings.floors}
     floors |= {signal: floor.level for signal, floor in levels.items() if floor is not None}
     return worsened(records, floors, findings.seed)
 

@@ -273,7 +273,7 @@ class ResidualLaw:
 
 @dataclass(frozen=True)
 class TrialRecord:
-    """One trial's curves, for the report; SI, shape (rows, 4) in the order of outputs, NaN = gap.
+    """One trial's curves, for the report; SI, shape (rows, signals), NaN = gap.
 
     Attributes:
         name: the trial's file, or its number.
@@ -285,6 +285,7 @@ class TrialRecord:
         gaps: by column name.
         held_out: see `after`.
         file: the log that it is a piece of, or its own name.
+        columns: of the signals, in their order.
     """
 
     name: str
@@ -296,6 +297,7 @@ class TrialRecord:
     gaps: Mapping[str, Gap]
     held_out: bool
     file: str = ""
+    columns: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from gymnasium import spaces
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.engine.options import Options
 from pma_gym.tasks import TASKS, MomentProfile, Task
 from pma_gym.units import SI_FACTORS
@@ -125,7 +126,7 @@ def measured_position(
     """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""
     if prescribed is not None:
         return prescribed.excess(reading("load"), reading("rotation"))
-    return -reading("extension") if quantity == "contraction" else reading(quantity)
+    return -reading("extension") if SIGNALS[quantity].shortens else reading(quantity)
 
 
 def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
@@ -133,7 +134,7 @@ def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
     span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
     volts = "10 V, -1.0 = 0 V"
     now, less, delayed = "reference now", "reference now less measured position", "position heard"
-    if task.protocol.quantity == "excess":
+    if task.protocol.followed.is_force:
         now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
         delayed = "excess of the moment heard"
     return [

@@ -3,15 +3,14 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 from pma_gym.codegen.graph import Kind, Value
 from pma_gym.engine.options import Options
+from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import PACE, Exercise, MomentProfile, Operator, OperatorState, Task
 
-Part = Literal["extension", "rotation", "load", "pressure"]
-PARTS: tuple[Part, ...] = ("extension", "rotation", "load", "pressure")
-"""What a reading consists of, in order."""
+PARTS: tuple[str, ...] = tuple(signal.reading or signal.name for signal in STATION.signals)
+"""What a reading consists of, in order: extension, rotation, load, pressure."""
 
 START = "start_contraction"
 """Place of the contraction that an episode began at (m), from which a regulator's task counts."""
@@ -19,7 +18,7 @@ START = "start_contraction"
 OPERATOR = "memory_operator"
 """Place of the force that an operator puts on the slide (N)."""
 
-TRUTH = ("contraction", "rotation", "load", "pressure")
+TRUTH = STATION.outputs
 """True outputs, in the order of the plant's."""
 
 

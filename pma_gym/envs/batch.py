@@ -1,4 +1,4 @@
-"""What a batch of environments is asked for and tells, in Gymnasium's form."""
+"""Arguments and infos of a batch of environments, in Gymnasium's form."""
 
 from collections.abc import Mapping, Sequence
 from numbers import Integral

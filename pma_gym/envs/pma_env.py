@@ -534,9 +534,9 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     def position(self) -> float:
         """True position that the task asks for (m, rad; N m for a moment's excess)."""
         truth = self.truth
-        if self.task.protocol.quantity == "contraction":
+        if self.task.protocol.followed.shortens:
             return truth["contraction"] - self._number(START)
-        if self.task.protocol.quantity == "excess":
+        if self.task.protocol.followed.is_force:
             return self._number("excess_nm")
         return truth[self.task.protocol.quantity]
 

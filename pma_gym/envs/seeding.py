@@ -1,4 +1,4 @@
-"""What Gymnasium's `np_random` and `np_random_seed` mean where episodes draw by a counter."""
+"""Gymnasium's `np_random` and `np_random_seed` for episodes that draw by a counter."""
 
 from collections.abc import Sequence
 from typing import Any

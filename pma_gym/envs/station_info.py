@@ -72,19 +72,19 @@ class StationInfo:
 
     def position(self, measurement: "Measurement") -> float:
         """The position that the task asks for, as the sensors say it (m, rad or N m)."""
-        quantity = self.task.protocol.quantity
-        if quantity == "rotation":
+        followed = self.task.protocol.followed
+        if followed.is_angle:
             return measurement.rotation
-        if quantity == "excess":
+        if followed.is_force:
             assert self.task.exercise and self.task.exercise.prescription
             return self.moment(measurement) - self.task.exercise.prescription.at(
                 measurement.rotation
             )
-        return -measurement.extension if quantity == "contraction" else measurement.extension
+        return -measurement.extension if followed.shortens else measurement.extension
 
 
 class Measurement(NamedTuple):
-    """What the sensors said at one instant, in SI; extension and rotation from their zeros.
+    """The sensors' readings at one instant, in SI; extension and rotation from their zeros.
 
     Attributes:
         time: when it was taken, since the trial began (s).

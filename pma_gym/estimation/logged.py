@@ -1,14 +1,15 @@
 """Measured trials as a fit reads them."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data import calibration
+from pma_gym.data.signals import Signal
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -19,15 +20,17 @@ class Logged:
     """A trial as a fit reads it.
 
     Attributes:
+        signals: what the rig's sensors measure, in the order of readings.
         time: times (s), shape (rows,).
         motor: motor voltage (V), shape (rows,).
         regulator: regulator voltage (V), shape (rows,).
-        measured: readings (m, rad, N, Pa), 0 where missing, shape (4, rows).
+        measured: readings (SI), 0 where missing, shape (signals, rows).
         missing: rows without a reading that counts, by output.
-        counts: 1 where a reading counts, else 0, shape (4, rows).
+        counts: 1 where a reading counts, else 0, shape (signals, rows).
         measures: whether there is any that does, by output.
     """
 
+    signals: tuple[Signal, ...]
     time: Array
     motor: Array
     regulator: Array
@@ -49,12 +52,13 @@ class Logged:
         """
         motor, regulator = sensors.voltages(model, trial)
         nothing = np.full(len(trial.time), np.nan)
-        measured = np.stack([trial.measurements.get(name, nothing) for name in OUTPUTS])
-        absent = np.isnan(measured) | _at_an_end(measured)
-        absent |= np.isin(OUTPUTS, model.rig.absent_outputs)[:, None]
+        signals = model.rig.signals
+        measured = np.stack([trial.measurements.get(each.name, nothing) for each in signals])
+        absent = np.isnan(measured) | _at_an_end(signals, measured)
         if absent.all():
             raise ValueError(f"trial {number} has no measurements to fit a model to")
         return cls(
+            signals,
             trial.time,
             motor,
             regulator,
@@ -63,6 +67,23 @@ class Logged:
             np.where(absent, 0.0, 1.0),
             [not row.all() for row in absent],
         )
+
+    def row(self, rows: Array, *measures: str) -> Array:
+        """The row of the first signal that measures one of some quantities; zeros without one.
+
+        Args:
+            rows: of the rig's signals, shape (signals, rows).
+            measures: quantities, as `Signal.measures` has them.
+        """
+        at = self.channel(*measures)
+        return np.zeros(rows.shape[-1]) if at is None else rows[at]
+
+    def channel(self, *measures: str) -> int | None:
+        """Which row is of the first signal that measures one of some quantities; None: no such."""
+        for channel, signal in enumerate(self.signals):
+            if signal.measures in measures:
+                return channel
+        return None
 
     @property
     def first(self) -> tuple[float, float]:
@@ -75,8 +96,12 @@ class Logged:
         return self.measured.size - sum(rows.size for rows in self.missing)
 
 
-def _at_an_end(measured: Array) -> NDArray[np.bool_]:
-    """Whether readings (SI), shape (4, rows), are the first or last that the DAQ has."""
-    lines = [line for _, line in sensors.SENSORS.values()]
-    volts = np.stack([line.to_volts(row) for line, row in zip(lines, measured, strict=True)])
+def _at_an_end(signals: Sequence[Signal], measured: Array) -> NDArray[np.bool_]:
+    """Whether readings (SI), shape (signals, rows), are the first or last that the DAQ has."""
+    volts = np.stack(
+        [
+            np.zeros(len(row)) if each.calibration is None else each.calibration.to_volts(row)
+            for each, row in zip(signals, measured, strict=True)
+        ]
+    )
     return np.abs(volts) >= calibration.DAQ_LIMIT - 1.5 * calibration.DAQ_STEP

@@ -20,7 +20,7 @@ from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.products import Signals, products
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import memory_start, sensors
-from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.equilibrium import solver
 from pma_gym.plant.model import Model, ModelError
 from pma_gym.plant.plant import Plant
@@ -87,7 +87,7 @@ class Residuals:
         free: the free parameters.
         start: their values in the model, in file units, shape (p,).
         count: number of residuals.
-        deviations: standard deviations of the sensors (m, rad, N, Pa), shape (4,).
+        deviations: standard deviations of the sensors (SI), shape (signals,).
         trials: number of trials.
         balanced: which of the parameters tried last balance the load where trials begin.
     Raises:
@@ -113,9 +113,7 @@ class Residuals:
         self.start: Array = self.plant.vector[places] / self._factors
         self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
         self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
-        steps = np.array([line.resolution for _, line in sensors.SENSORS.values()])
-        rounding = steps / math.sqrt(12.0)
-        self.deviations: Array = np.hypot(sensors.noise_levels(self.plant.model), rounding)
+        self.deviations: Array = sensors.deviations(self.plant.model)
         self.trials = len(trials)
         if not trials:
             raise ValueError("a fit needs at least one trial")
@@ -163,7 +161,7 @@ class Residuals:
         return Sums(float(total[0, 0]), total[1:, 0], total[1:, 1:])
 
     def each(self, values: Array) -> list[Array]:
-        """Residuals of each trial at parameters, shape (rows, 4) in the order of outputs.
+        """Residuals of each trial at parameters, shape (rows, signals) in the order of outputs.
 
         Raises:
             ValueError: the model cannot balance the load at the beginning of a trial.
@@ -171,7 +169,7 @@ class Residuals:
         return [differences[0] for differences in self._dense(values, np.ones(0), central=False)]
 
     def jacobian(self, values: Array, steps: Array, central: bool = False) -> list[Array]:
-        """Derivatives of each trial's residuals, shape (p, rows, 4), as `sums` uses them."""
+        """Derivatives of each trial's residuals, shape (p, rows, signals), as `sums` uses them."""
         trials = self._dense(values, steps, central)
         return [differences[1:] / steps[:, None, None] for differences in trials]
 
@@ -272,7 +270,7 @@ class Residuals:
         return memory_start.best_shares(changes[:-1], along, self._reaches[number])
 
     def _in_noise(self, logged: Logged, left: Array) -> Array:
-        """Differences (SI), shape (tried, 4, rows), in units of noise, shape (tried, numbers)."""
+        """Differences (SI), (tried, signals, rows), in units of noise, (tried, numbers)."""
         return (left / self.deviations[:, None]).reshape(len(left), -1)
 
     def _met_slide(self, space: Array, logged: Logged) -> Array:
@@ -328,12 +326,12 @@ class Residuals:
     ) -> Array:
         """Simulated minus measured, then what moving each parameter changes (SI).
 
-        Shape (1 + p, 4, rows).
+        Shape (1 + p, signals, rows).
         """
         held = self._held(states, zeros, vectors)
         count, rows = len(states), len(logged.time)
         moved = (count - 1) // 2 if central else count - 1
-        differences = np.zeros((1 + moved, len(OUTPUTS), rows))
+        differences = np.zeros((1 + moved, len(self.plant.outputs), rows))
         for channel, signal in enumerate(held):
             if not logged.measures[channel]:
                 continue
@@ -352,7 +350,7 @@ class Residuals:
         """What the sensors hold, shape (tried, rows) each."""
         columns, program = self.plant.sensor_columns, self.plant.program
         count, rows, _ = states.shape
-        truth = np.empty((count, rows, len(OUTPUTS)) if min(columns) < 0 else (0, 0, 0))
+        truth = np.empty((count, rows, len(self.plant.outputs)) if min(columns) < 0 else (0, 0, 0))
         for i, out in enumerate(truth):
             addresses = (vectors[i].ctypes.data, out.ctypes.data)
             program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)

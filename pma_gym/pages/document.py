@@ -3,11 +3,13 @@
 import base64
 import html
 import re
+import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
+from pma_gym.pages.interactive import InteractiveFigure, scripts
 from pma_gym.printable import printable
 
 
@@ -85,10 +87,13 @@ class Steps:
     items: Sequence[str]
 
 
-Block = Heading | Paragraph | TextTable | Picture | Callout | Formula | Steps
+Block = Heading | Paragraph | TextTable | Picture | InteractiveFigure | Callout | Formula | Steps
 
 _PAGE = Path(__file__).parent / "page.html"
 _GROUP = " | "
+
+DPI = 120
+"""Resolution of the PNGs (1/inch)."""
 
 
 def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: str) -> str:
@@ -119,13 +124,13 @@ def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: 
                 parts.append(_markdown_table(block))
             case Picture(name, caption) if name in pictures:
                 parts.append(f"![{caption}]({folder}/{name}.png)\n\n*{caption}*")
-            case Picture():
+            case Picture() | InteractiveFigure():
                 pass
     return printable("\n\n".join(parts)) + "\n"
 
 
 def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
-    """The blocks as one page that needs nothing else: pictures and style are inside.
+    """The blocks as one page that needs nothing else: pictures, figures and style are inside.
 
     Args:
         blocks: the report; the first is its heading.
@@ -135,8 +140,13 @@ def to_html(blocks: Sequence[Block], pictures: Mapping[str, bytes]) -> str:
     body = "\n".join(html_block(block, pictures) for block in blocks)
     page = _PAGE.read_text(encoding="utf-8")
     # Once and together: a title may hold `{body}`.
-    parts = {"{title}": html.escape(printable(title)), "{body}": printable(body)}
-    return re.sub(r"\{(?:title|body)\}", lambda match: parts[match[0]], page)
+    figures = [block for block in blocks if isinstance(block, InteractiveFigure)]
+    parts = {
+        "{title}": html.escape(printable(title)),
+        "{scripts}": scripts(figures),
+        "{body}": printable(body),
+    }
+    return re.sub(r"\{(?:title|scripts|body)\}", lambda match: parts[match[0]], page)
 
 
 def _markdown_table(table: TextTable) -> str:
@@ -183,10 +193,22 @@ def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             return _html_table(block)
         case Picture(name, caption) if name in pictures:
             data = base64.b64encode(pictures[name]).decode("ascii")
-            image = f'<img alt="{html.escape(caption)}" src="data:image/png;base64,{data}">'
+            alt = html.escape(caption)
+            width = _shown_width(pictures[name])
+            image = f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{data}">'
             return f"<figure>{image}<figcaption>{_inline(caption)}</figcaption></figure>"
+        case InteractiveFigure(name, caption):
+            plot = f'<div class="plot" id="figure-{html.escape(name)}"></div>'
+            words = f"<figcaption>{_inline(caption)}</figcaption>"
+            return f'<figure class="interactive">{plot}{words}</figure>'
         case _:
             return ""
+
+
+def _shown_width(image: bytes) -> int:
+    """Width of a PNG on the page (CSS pixels), at which its text is as large as it was drawn."""
+    (pixels,) = struct.unpack(">I", image[16:20])
+    return round(pixels * 96 / DPI)
 
 
 def _html_table(table: TextTable) -> str:

@@ -11,10 +11,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.backends.registry import BackendFilter, backend_registry
 from matplotlib.figure import Figure
 
-_WITHOUT_WINDOW = BackendFilter.NON_INTERACTIVE
+from pma_gym.pages.document import DPI
 
-DPI = 120
-"""Resolution of the PNGs (1/inch)."""
+_WITHOUT_WINDOW = BackendFilter.NON_INTERACTIVE
 
 _RULES: dict[Any, Any] = {
     "font.family": "DejaVu Sans",

@@ -7,15 +7,12 @@ import numpy as np
 
 from pma_gym.effects import Effect
 from pma_gym.effects.effect import Parameters
-from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.program import program, table, vector
 
 DEFAULT_TOLERANCE = 2.3e-4
 """Largest error of an internal step, as a share of the states' scales, chosen by measured error:
 `python -m benchmarks accuracy` holds the result against scipy at rtol 1e-11."""
-
-OUTPUTS = ("contraction", "rotation", "load", "pressure")
 
 
 class CompiledModel:
@@ -33,7 +30,8 @@ class CompiledModel:
         vector: tolerance and parameters, as compiled functions read them.
         table: what is fixed for a model, as compiled functions read it.
         states: names of the states, in the order of the state vector.
-        outputs: names of the true outputs: contraction (m), rotation (rad), load (N),
+        signals: what the rig's sensors measure, in the order of outputs.
+        outputs: names of the true outputs; of a station contraction (m), rotation (rad), load (N),
             pressure (Pa).
     """
 
@@ -53,11 +51,9 @@ class CompiledModel:
         self.states = list(self.program.states)
         self.vector = vector(self.model, tolerance)
         self.table = table(self.program, self.vector)
-        self.outputs = OUTPUTS
-        self.sensor_columns = [
-            self.states.index(f"lag_{name}") if f"lag_{name}" in self.states else -1
-            for name in sensors.SENSORS
-        ]
+        self.signals, self.outputs = self.model.rig.signals, self.model.rig.outputs
+        lags = [f"lag_{signal.sensor}" for signal in self.signals]
+        self.sensor_columns = [self.states.index(lag) if lag in self.states else -1 for lag in lags]
 
     def __reduce__(self) -> "tuple[type[CompiledModel], tuple[Model, float]]":
         """Copy and pickle by construction: compiled functions belong to their process."""
@@ -107,15 +103,20 @@ class CompiledModel:
             states: shape (rows, states).
             zero_contraction: contraction x0 that extension counts from (m).
         Returns:
-            contraction, rotation, load, pressure and extension (SI), shape (rows,) each.
+            What the rig's sensors measure, and what counts from a trial's start (SI), shape
+            (rows,) each: of a station contraction, rotation, load, pressure and extension.
         """
         states = np.ascontiguousarray(states, float)
-        out = np.empty((states.shape[0], len(OUTPUTS)))
+        out = np.empty((states.shape[0], len(self.outputs)))
         addresses = (a.ctypes.data for a in (self.vector, out))
         self.program.observe(len(states), states.ctypes.data, zero_contraction, *addresses)
-        truth = {name: out[:, i] for i, name in enumerate(OUTPUTS)}
-        truth["extension"] = zero_contraction - truth["contraction"]
-        return truth
+        truth = {name: out[:, i] for i, name in enumerate(self.outputs)}
+        counted = {
+            each.reading: zero_contraction - truth[each.name]
+            for each in self.signals
+            if each.reading
+        }
+        return truth | counted
 
     def extrapolates(self, pressure: float) -> bool:
         """Whether a pressure (Pa) lies outside what the model was identified on."""

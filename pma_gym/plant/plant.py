@@ -8,7 +8,7 @@ import numpy as np
 from pma_gym.data.trial import Trial
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
-from pma_gym.plant.compiled_model import OUTPUTS, CompiledModel
+from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition, check_voltages
 from pma_gym.plant.equilibrium.solver import equilibrium_at
 from pma_gym.plant.memory_start import begun_at
@@ -174,10 +174,10 @@ class Plant(CompiledModel):
         )
 
     def lagged(self, states: np.ndarray, truth: Mapping[str, np.ndarray]) -> np.ndarray:
-        """What the sensors hold before noise, shape (rows, 4): the lag's state, or the truth."""
+        """What the sensors hold before noise, (rows, signals): the lag's state, or the truth."""
         columns = [
             states[:, at] if at >= 0 else truth[name]
-            for at, name in zip(self.sensor_columns, OUTPUTS, strict=True)
+            for at, name in zip(self.sensor_columns, self.outputs, strict=True)
         ]
         return np.stack(columns, axis=1)
 

@@ -1,10 +1,13 @@
 """What the DAQ logs: lagged signals plus noise, through the calibrations, quantised."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from pma_gym.data import calibration
+from pma_gym.data.calibration import Calibration
+from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
 from pma_gym.effects.effect import Parameters
@@ -26,46 +29,66 @@ _NO_PUSH = (
 )
 """What to do about a load below 0."""
 
-SENSORS = {
-    "lvdt": ("contraction", calibration.LVDT),
-    "potentiometer": ("rotation", calibration.POTENTIOMETER),
-    "load_cell": ("load", calibration.LOAD_CELL),
-    "pressure_transducer": ("pressure", calibration.PRESSURE_TRANSDUCER),
+SENSORS: dict[str, Signal] = {
+    signal.sensor: signal for signal in SIGNALS.values() if signal.sensor and signal.is_measured
 }
-"""Sensor effects by name: the output each reads, and its calibration; in the order of outputs."""
+"""What each sensor measures, by the effect that it is."""
+
+DAQ_CHANNELS = 4
+"""Least channels that noise is drawn for at every row, so that a seed gives a sensor the same noise
+in a rig that has fewer."""
 
 
 def noise_levels(model: Model) -> np.ndarray:
-    """Standard deviations of the four sensors (m, rad, N, Pa); 0 for one without noise."""
-    sensors = [model.parameters.get(name) for name in SENSORS]
+    """Standard deviations of a rig's sensors (SI), in the order of its signals; 0 without noise."""
+    sensors = [model.parameters.get(signal.sensor) for signal in model.rig.signals]
     return np.array([getattr(sensor, "noise", 0.0) for sensor in sensors])
 
 
-def read(lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Readings of the four sensors.
+def resolutions(model: Model) -> np.ndarray:
+    """Steps in which a rig's signals are read (SI), in their order; 0 where none is known."""
+    return np.array([signal.resolution for signal in model.rig.signals])
+
+
+def deviations(model: Model) -> np.ndarray:
+    """Standard deviations of a rig's readings (SI): its sensors' noise and the DAQ's rounding."""
+    return np.hypot(noise_levels(model), resolutions(model) / np.sqrt(12.0))
+
+
+def read(
+    signals: Sequence[Signal], lagged: np.ndarray, levels: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
+    """Readings of sensors.
 
     Args:
-        lagged: what the sensors hold, shape (..., 4) (SI).
-        levels: standard deviations, shape (4,).
-        normals: standard normal numbers, shape (..., 4).
+        signals: what they measure.
+        lagged: what the sensors hold, shape (..., signals) (SI).
+        levels: standard deviations, shape (signals,).
+        normals: standard normal numbers, shape (..., signals).
     Returns:
-        Readings in SI, quantised to whole steps of the DAQ and held to its range.
+        Readings in SI; those that go through the DAQ quantised to its steps and held to its range.
     """
-    return reading(lagged, levels, normals, _GAINS, _OFFSETS)
+    noisy = [
+        reading(lagged[..., i], levels[i], normals[..., i], signal.calibration)
+        for i, signal in enumerate(signals)
+    ]
+    return np.stack(noisy, axis=-1)
 
 
-def reading(lagged: Any, level: Any, normal: Any, gain: Any, offset: Any) -> Any:  # noqa: ANN401
+def reading(lagged: Any, level: Any, normal: Any, line: Calibration | None) -> Any:  # noqa: ANN401
     """One sensor's reading, of numbers, arrays or traced values.
 
     Args:
         lagged: what the sensor holds (SI).
         level: standard deviation of its noise (SI).
         normal: standard normal number.
-        gain: of its calibration (V per SI).
-        offset: of its calibration (V).
+        line: its calibration at the DAQ; None for a sensor that is not read by it.
     """
-    volts = (lagged + level * normal) * gain + offset
-    return (calibration.quantise(volts) - offset) * (1.0 / gain)
+    noisy = lagged + level * normal
+    if line is None:
+        return noisy
+    volts = noisy * line.gain + line.offset
+    return (calibration.quantise(volts) - line.offset) * (1.0 / line.gain)
 
 
 def measure(
@@ -75,15 +98,15 @@ def measure(
 
     Args:
         model: the model whose sensors measure.
-        lagged: what the sensors hold, shape (rows, 4) (SI).
+        lagged: what the sensors hold, shape (rows, signals) (SI).
         generator: source of the noise, or None.
     """
-    readings = lagged
+    readings, signals = lagged, model.rig.signals
     if generator is not None:
-        readings = read(lagged, noise_levels(model), generator.standard_normal(lagged.shape))
-    absent = model.rig.absent_outputs
-    names = [name for name, _ in SENSORS.values()]
-    return {name: readings[:, i] for i, name in enumerate(names) if name not in absent}
+        channels = max(len(signals), DAQ_CHANNELS)
+        normals = generator.standard_normal((len(lagged), channels))[:, : len(signals)]
+        readings = read(signals, lagged, noise_levels(model), normals)
+    return {signal.name: readings[:, i] for i, signal in enumerate(signals)}
 
 
 def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
@@ -128,7 +151,7 @@ def _voltage(
         raise SampleError(
             f"{column.name} must lie in {least:g} to {most:g} {column.unit}, what {voltage}_v of "
             f"up to {highest:g} V gives; {{place}} has {came:g}; "
-            + (_NO_PUSH if wish == "load_command" and wished[at] < 0.0 == least else _MENDS[wish]),
+            + (_NO_PUSH if SIGNALS[wish].is_force and wished[at] < 0.0 == least else _MENDS[wish]),
             at,
         )
     return np.clip(volts, *VOLTAGE_RANGE)
@@ -147,7 +170,3 @@ def _command(trial: Trial, name: str) -> np.ndarray | None:
         )
     last = np.maximum.accumulate(np.where(np.isnan(values), 0, np.arange(len(values))))
     return values[last]
-
-
-_GAINS = np.array([line.gain for _, line in SENSORS.values()])
-_OFFSETS = np.array([line.offset for _, line in SENSORS.values()])

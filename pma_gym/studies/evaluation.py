@@ -145,7 +145,7 @@ def print_evaluation(rows: Evaluations, console: Console) -> None:
 def _position(trial: Trial, protocol: Protocol, use_truth: bool) -> NDArray[np.float64]:
     """The position that the task asks for (m or rad), shape of the trial's time."""
     if not use_truth:
-        return trial.extension if protocol.quantity == "extension" else trial.rotation
+        return trial.extension if protocol.followed.lengthens else trial.rotation
     if protocol.quantity not in trial.truth:
         raise TrialError(
             f"the trial has no true {protocol.quantity}: only a simulation's Trial has it, a file "

@@ -78,7 +78,7 @@ class _Balance:
 
     def __init__(self, task: Task, plant: Plant, pressure: float) -> None:
         self.plant, self.pressure, self.load = plant, pressure, task.load
-        self.rotates = task.protocol.quantity == "rotation"
+        self.rotates = task.protocol.followed.is_angle
         self.parameters = plant.model.parameters
         self.wanted = task.protocol.reference(_times(task))
 

@@ -57,7 +57,7 @@ class Task:
         self._check_reference()
 
     def _check_mover(self) -> None:
-        if (self.actuator == "regulator") != (self.protocol.quantity == "contraction"):
+        if (self.actuator == "regulator") != (self.protocol.followed.shortens):
             raise ValueError(
                 f"task {self.name}: the regulator contracts (quantity contraction) and the motor "
                 f"pulls (extension or rotation), got {self.protocol.quantity} by the "
@@ -99,7 +99,7 @@ class Task:
         words = self.name.replace("_", " ")
         if self.name in TASKS:
             return f"Isokinetic {words}"
-        contracts = self.protocol.quantity == "contraction"
+        contracts = self.protocol.followed.shortens
         return words.capitalize() + (" contraction" if contracts else "")
 
     @property

@@ -65,7 +65,6 @@ def test_next_to_nothing_is_changed_where_the_cable_is_slack(plant):
     error = plant.response(np.ones(400))
     got = plant.change(error, taut, cutoff=5.0)
     # Just before it comes tight a voltage still counts for what follows.
-    # Measured: 0.0122.
     assert np.abs(got[:40]).max() < 0.0125
     assert np.abs(got[:60]).max() < 0.4
     assert got[80:300] == pytest.approx(1.0, abs=0.05)
@@ -118,17 +117,13 @@ def drawn(task, pressure_kpa, seed, **loop):
     ), env.station.model
 
 
-@pytest.mark.parametrize(
-    ("loop", "worse"),
-    # Measured at 100 Hz: the first trial is 1.91 times as far off as of who knows the station.
-    [({}, 1.9), ({"control_rate_hz": 50.0, "action_delay_s": 0.02}, 2.0)],
-)
-def test_noise_floor_is_reached_in_ten_trials(loop, worse):
+@pytest.mark.parametrize("loop", [{}, {"control_rate_hz": 50.0, "action_delay_s": 0.02}])
+def test_noise_floor_is_reached_in_ten_trials(loop):
     """As well as the same controller that was told the true model, within a fifth."""
     env, nominal = drawn("displacement", 150, seed=300, **loop)
     learned = trials(ILC(Settings(3.0, 0.3, 0.3)), env, nominal)
     errors = trials(ILC(Settings(3.0, 0.3, 0.3)), env)
-    assert learned[0] > worse * errors[0]
+    assert learned[0] > 2.0 * errors[0]
     assert np.mean(learned[-3:]) < 1.2 * np.mean(errors[-3:])
     # Nor does repeating make the noise grow.
     assert np.mean(learned[-3:]) < 1.2 * np.mean(errors[:3])

@@ -21,12 +21,12 @@ from pma_gym.discovery.diagnosis import (
     ResidualLaw,
     TrialRecord,
 )
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import RIGS
 from pma_gym.units import SI_FACTORS
 
-SIGNALS = {quantity: BY_QUANTITY[quantity] for quantity in OUTPUTS}
+SIGNALS = {quantity: BY_QUANTITY[quantity] for quantity in RIGS["station"].outputs}
 
 
 def commands(pressure, period):
@@ -37,7 +37,7 @@ def commands(pressure, period):
 
 def outputs(trial, group="measurements"):
     held = getattr(trial, group)
-    return np.column_stack([held[quantity] for quantity in OUTPUTS])
+    return np.column_stack([held[quantity] for quantity in RIGS["station"].outputs])
 
 
 def rms(values):
@@ -55,7 +55,8 @@ def record(name, trial, given, refitted, truth):
         factor = SI_FACTORS[column.unit]
         misses = [rms(measured[:, index] - curve[:, index]) / factor for curve in curves]
         gaps[column.name] = Gap(*misses, floor=0.97 * misses[-1], held_out=True)
-    return TrialRecord(name, trial.time, measured, *curves, gaps, held_out=True)
+    columns = tuple(column.name for column in SIGNALS.values())
+    return TrialRecord(name, trial.time, measured, *curves, gaps, held_out=True, columns=columns)
 
 
 @pytest.fixture(scope="session")

@@ -28,8 +28,8 @@ BUMP = {
     "residual_force_of_contraction": {"first_mm": 0.0, "reach_mm": 64.0}
     | {f"h{k}_n": 10.0 * (k == 3) for k in range(9)}
 }
-STEPS = np.array([line.resolution for _, line in sensors.SENSORS.values()])
-LEVELS = np.hypot(sensors.noise_levels(STATION), STEPS / np.sqrt(12.0))
+STEPS = sensors.resolutions(STATION)
+LEVELS = sensors.deviations(STATION)
 
 
 def commanded(number, rate=64.0, seconds=5.0, seed=3, kinds=(0, 1, 2), kpa=(220.0, 520.0)):

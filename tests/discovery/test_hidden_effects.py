@@ -18,6 +18,12 @@ from pma_gym.discovery import diagnose
 HIDDEN = Path(__file__).parent / "hidden"
 TRUTH = json.loads((HIDDEN / "truth.json").read_text(encoding="utf-8"))
 EFFECTS = [name for name, truth in TRUTH.items() if truth["effects"]]
+AT_EVERY_RUN = (
+    *("hysteresis", "cable_slack", "torque_ripple"),
+    *("sensor_quantisation", "regulator_asymmetry"),
+)
+"""One each of muscle, cable, drive, sensor and regulator; the others: `make test-campaigns`."""
+
 QUIET = [name for name, truth in TRUTH.items() if not truth["effects"]]
 
 
@@ -26,7 +32,13 @@ def diagnosed(name):
     return diagnose(read_dataset(HIDDEN / name), propose=False)
 
 
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=() if name in AT_EVERY_RUN else pytest.mark.campaign, id=name)
+        for name in EFFECTS
+    ],
+)
 def test_a_hidden_effect_is_named(name):
     diagnosis = diagnosed(name)
     assert diagnosis.verdict == "effect", diagnosis.sentence

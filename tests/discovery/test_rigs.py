@@ -53,16 +53,9 @@ HIDDEN = {
 """What is hidden in the sets of `rigs/`, its size, and by what share that may be missed."""
 
 
-QUICK = ("raw_volts", "one_long_trial")
-"""Sets that other tests here diagnose too."""
-
-
 @pytest.mark.parametrize(
     "name",
-    [
-        pytest.param(name, marks=() if name in QUICK else pytest.mark.example, id=name)
-        for name in HIDDEN
-    ],
+    [pytest.param(name, marks=pytest.mark.campaign, id=name) for name in HIDDEN],
 )
 def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     effect, size = HIDDEN[name]
@@ -93,12 +86,13 @@ def test_every_example_has_its_place_on_the_page():
     page = (ROOT / "docs" / "rigs.md").read_text(encoding="utf-8")
     readme = (FROZEN / "README.md").read_text(encoding="utf-8")
     for name, (effect, _) in HIDDEN.items():
-        assert f"pma-gym diagnose tests/discovery/rigs/{name}\n" in page
+        assert f"`pma-gym diagnose tests/discovery/rigs/{name}`" in page
         (line,) = (line for line in readme.splitlines() if line.startswith(f"| `{name}`"))
         assert effect.replace("_", " ") in line.lower()
     assert sum(path.stat().st_size for path in FROZEN.rglob("*")) < 1e6
 
 
+@pytest.mark.campaign
 def test_a_sensor_that_ends_is_seen_in_raw_volts():
     (said,) = (words for words in diagnosed("raw_volts").warnings if "contraction_mm" in words)
     assert "end of its sensor's range, 41.68" in said
@@ -113,6 +107,7 @@ def test_no_sensor_of_the_frozen_trials_is_taken_for_one_that_ends():
 
 def test_of_one_long_trial_stretches_are_left_out():
     diagnosis = diagnosed("one_long_trial")
+    assert named(diagnosis) == [HIDDEN["one_long_trial"][0]], diagnosis.sentence
     assert diagnosis.sentence.startswith("In this trial model")
     assert any("stretch of its time is left out" in words for words in diagnosis.warnings)
 
@@ -150,7 +145,9 @@ def one_long_drive():
     return driven_slide(12.0, lanes=1, seconds=10.0)
 
 
-@pytest.mark.parametrize("log", [fifteen_pulls, one_long_drive])
+@pytest.mark.parametrize(
+    "log", [fifteen_pulls, pytest.param(one_long_drive, marks=pytest.mark.campaign)]
+)
 def test_dry_friction_is_found_in_a_driven_slide_and_is_not_taken_for_viscous(log):
     diagnosis = diagnose(log(), DRIVEN, propose=False)
     assert diagnosis.verdict == "effect", diagnosis.sentence
@@ -177,6 +174,7 @@ def sixty_pulls():
     ]
 
 
+@pytest.mark.campaign
 def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
     for k, trial in enumerate(sixty_pulls()):
         write_trial(trial, tmp_path / f"pull_{k + 1}.csv")
@@ -187,6 +185,7 @@ def test_a_late_drive_is_found_in_sixty_short_trials(tmp_path):
     assert diagnosis.model.parameters["slide"].mass == pytest.approx(SLIDE["mass"], rel=0.02)
 
 
+@pytest.mark.campaign
 def test_dry_friction_is_found_at_one_and_two_kilohertz():
     rates = enumerate((1000, 2000))
     # Half as long, they do not tell the force from the speed at which it falls.

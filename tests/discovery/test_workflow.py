@@ -98,7 +98,9 @@ def test_one_trial_works_and_says_so():
     assert not any(gap.held_out for gap in diagnosis.gap.values())
 
 
-@pytest.mark.parametrize("kept", [("contraction",), EVERY[1:]])
+@pytest.mark.parametrize(
+    "kept", [pytest.param(("contraction",), marks=pytest.mark.campaign), EVERY[1:]]
+)
 def test_some_sensors_are_enough(kept):
     trials = [only(trial, *kept) for trial in laboratory("hysteresis")[0]]
     diagnosis = diagnose(trials, STATION)

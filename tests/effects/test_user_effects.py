@@ -88,7 +88,7 @@ def test_an_effect_of_ones_own_is_simulated(write, station):
 
 
 def test_the_example_of_the_documentation_works(write):
-    page = Path(__file__).parents[2] / "docs" / "physics" / "effects.md"
+    page = Path(__file__).parents[2] / "docs" / "user-effects.md"
     (example,) = re.findall(r"```python\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL)
     (drag,) = load_effects(write(example))
     assert drag.name == "drag" and drag.usual.factor == pytest.approx(2e4)

@@ -1,5 +1,6 @@
 """Batches as Gymnasium knows them: ids, modes, spaces, seeds, statistics."""
 
+import inspect
 import os
 import subprocess
 import sys
@@ -65,13 +66,17 @@ def test_spaces_are_those_of_the_environment_in_rows(batch):
 @pytest.mark.parametrize("mode", ["NextStep", "SameStep"])
 def test_gymnasiums_statistics_count_episodes(batch, mode):
     envs = RecordEpisodeStatistics(batch(4, autoreset_mode=mode))
+    # Older Gymnasium leaves the first step out of episodes that a same-step reset begins.
+    knows = "SAME_STEP" in inspect.getsource(RecordEpisodeStatistics.step)
+    least = 51 if mode == "NextStep" or knows else 50
     envs.reset(seed=0)
     for _ in range(160):
         *_, truncated, info = envs.step(np.full((4, 1), -0.9))
         if truncated.any():
             known = info if mode == "NextStep" else info["final_info"]
             assert np.all(known["rmse_mm"] > 0.0)
-            assert np.all(info["episode"]["l"] == 51) and np.all(info["episode"]["r"] < 0.0)
+            assert np.isin(info["episode"]["l"], (least, 51)).all()
+            assert np.all(info["episode"]["r"] < 0.0)
     assert envs.episode_count == 12
 
 

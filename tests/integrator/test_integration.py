@@ -52,7 +52,10 @@ def test_each_sensor_lags_by_the_analytic_first_order():
     np.testing.assert_allclose(states[:, lag], 200e3 + 100e3 * response, atol=0.1)
 
 
-@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(m, marks=() if m == "station" else pytest.mark.campaign) for m in MODELS],
+)
 def test_the_default_tolerance_against_scipy_on_demanding_trials(model):
     (error,) = error_ladder(model, (DEFAULT_TOLERANCE,))
     assert error.states[error.worst_state] < STATE_LIMIT

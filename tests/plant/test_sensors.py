@@ -8,6 +8,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs.station import STATION
 
 STEPS = {"contraction": 0.050e-3, "load": 1.19, "pressure": 0.48e3, "rotation": np.radians(0.344)}
 NOISE = {"contraction": 0.02e-3, "load": 0.5, "pressure": 0.3e3, "rotation": np.radians(0.1)}
@@ -49,7 +50,7 @@ def test_what_is_added_is_normal_and_quantised_to_the_nearest_step():
     lagged = np.tile([0.02, 0.5, 300.0, 300e3], (50_000, 1))
     levels = np.array([1e-3, 0.1, 50.0, 20e3])
     normals = generator.standard_normal(lagged.shape)
-    readings = sensors.read(lagged, levels, normals)
+    readings = sensors.read(STATION.signals, lagged, levels, normals)
     gains = [97.9, 57.2958 * 0.0142, 0.0041, 1.02e-5]
     half_step = 0.5 * DAQ_STEP / np.abs(gains)
     assert np.all(np.abs(readings - (lagged + levels * normals)) <= half_step * 1.001)
@@ -98,7 +99,7 @@ def test_a_model_without_a_sensor_reads_the_truth():
 
 def test_readings_stay_within_the_daqs_range():
     far = np.array([[1.0, 50.0, 1e5, 1e7], [-1.0, -50.0, -1e5, -1e7]])
-    readings = sensors.read(far, np.zeros(4), np.zeros((2, 4)))
+    readings = sensors.read(STATION.signals, far, np.zeros(4), np.zeros((2, 4)))
     assert np.all(np.abs(readings) < np.abs(far))
 
 

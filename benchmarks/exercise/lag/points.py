@@ -12,7 +12,7 @@ from pma_gym.plant.exercise_device.prescription import follow_from
 from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
-from pma_gym.plant.sensors import SENSORS, noise_levels
+from pma_gym.plant.sensors import noise_levels
 from pma_gym.tasks import EVERY_TASK
 from pma_gym.units import SI_FACTORS
 
@@ -59,7 +59,7 @@ class Point:
     @property
     def paced(self) -> bool:
         """Whether the exercise holds the speed."""
-        return EVERY_TASK[self.task].protocol.quantity == "rotation"
+        return EVERY_TASK[self.task].protocol.followed.is_angle
 
     @property
     def room(self) -> float:
@@ -142,6 +142,6 @@ def rates(point: Point, model: Model) -> Rates:
     excess = radius * seen["load"] - point.slope * seen["rotation"]
     output = angle if point.paced else excess
     a = np.asarray(system.A) * sizes / sizes[:, None]
-    measured = np.stack([seen[name] for name, _ in SENSORS.values()])
+    measured = np.stack([seen[name] for name in model.rig.outputs])
     noise = noise_levels(model)
     return Rates(a, motor / (radius * gain), regulator, angle, output, measured, noise)

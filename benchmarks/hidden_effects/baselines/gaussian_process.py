@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from benchmarks.hidden_effects.baselines.preparation import answer, moved, prepare
 from benchmarks.hidden_effects.baselines.signatures import courses, means, ticks, within
 from pma_gym.data.datasets.dataset import Dataset
-from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.rigs import RIGS
 
 Array = NDArray[np.float64]
 
@@ -49,7 +49,7 @@ def gaussian_process(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any
     left = within(some, means(some))
     shares = {
         name: explained(conditions, left[channel], some.order, seed)
-        for channel, name in enumerate(OUTPUTS)
+        for channel, name in enumerate(RIGS["station"].outputs)
     }
     parameters = moved(ready.problem, ready.refitted)
     if max(shares.values()) > EXPLAINED:

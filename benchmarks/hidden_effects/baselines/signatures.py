@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
 from pma_gym.discovery.screening.time_bins import BIN_S, TimeBins, time_bins
-from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.plant.rigs import RIGS
 
 Array = NDArray[np.float64]
 
@@ -89,7 +89,7 @@ def signature(ready: Prepared) -> dict[str, float]:
     values = {f"step of {name}": step for name, step in _steps(ready).items()}
     across, along = regions(some), courses(some)
     left = means(some)
-    for channel, name in enumerate(OUTPUTS):
+    for channel, name in enumerate(RIGS["station"].outputs):
         excess, counts = some.excess[channel], some.counts[channel]
         total = max(float(np.sum(excess)), 1e-9 * max(float(np.sum(counts)), 1.0))
         values[f"size of {name}"] = float(np.log1p(max(total, 0.0) / max(np.sum(counts), 1.0)))
@@ -105,7 +105,7 @@ def _steps(ready: Prepared) -> Mapping[str, float]:
     """How many of the DAQ's steps the readings keep to."""
     return {
         name: floor.step / floor.expected_step
-        for name, floor in zip(OUTPUTS, ready.floors, strict=True)
+        for name, floor in zip(RIGS["station"].outputs, ready.floors, strict=True)
     }
 
 

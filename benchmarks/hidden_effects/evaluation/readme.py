@@ -15,7 +15,7 @@ ROWS = (
     ("nothing hidden: an effect claimed", "nothing", "false alarm"),
     ("an effect outside the catalogue: `unknown`", "unknown", "unknown"),
 )
-"""What each row says, of which block and rate it is; docs/diagnosis-results.md has them all."""
+"""What each row says, of which block and rate it is; docs/notebook/diagnosis-results.md has all."""
 
 
 def diagnosis(kept: Path = KEPT) -> str:

@@ -268,6 +268,10 @@ def _missed(outcome: Outcome) -> bool:
     """Whether a case is one that the block's target speaks against."""
     if not outcome.answered:
         return True
+    if outcome.kind == "outside":
+        return outcome.verdict != "unknown"
+    if outcome.block == "rigs" and outcome.truth:
+        return not outcome.near or outcome.hits < len(outcome.truth) - 1 or outcome.false_structure
     if outcome.block.startswith("single") or outcome.block in ("faint", "pair"):
         return not outcome.right
     if outcome.block in ("unknown", "undecidable"):

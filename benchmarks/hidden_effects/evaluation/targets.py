@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from benchmarks.hidden_effects.evaluation.verdicts import Outcome
+from benchmarks.hidden_effects.evaluation.verdicts import RIGHT_STRUCTURE, Outcome
 from benchmarks.hidden_effects.generation.readout_noise import UGLY
 
 
@@ -122,6 +122,37 @@ _UNDECIDABLE = (
     Rate("random, settled in 1 round", lambda o: o.settled_by("random", 1)),
 )
 
+
+def _of(kind: str, hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
+    """The same of the cases of one kind alone."""
+    return lambda outcome: hit(outcome) if outcome.kind == kind else None
+
+
+def _something(hit: Callable[[Outcome], bool | None]) -> Callable[[Outcome], bool | None]:
+    """The same of those cases alone that hide something."""
+    return lambda outcome: hit(outcome) if outcome.truth else None
+
+
+_RIGS = (
+    Rate("one effect: right or in its group", _of("one effect", lambda o: o.near), Target(0.9)),
+    Rate("one effect: named right", _of("one effect", lambda o: o.right)),
+    Rate("one effect: a spurious second", _of("one effect", lambda o: o.spurious)),
+    Rate("two effects: both named", _of("two effects", lambda o: o.hits == 2)),
+    Rate("two effects: one of them, or its group", _of("two effects", lambda o: o.near)),
+    Rate("outside: unknown", _of("outside", lambda o: o.verdict == "unknown")),
+    Rate("outside: a false name", _of("outside", lambda o: o.verdict == "effect")),
+    Rate(
+        "hidden: confidently wrong, 3 noises left too",
+        _something(lambda o: o.wrong or o.false_structure),
+        Target(most=0.02),
+    ),
+    Rate(
+        "hidden: said to be of right structure", _something(lambda o: o.verdict in RIGHT_STRUCTURE)
+    ),
+    Rate("nothing: alarm", _of("nothing", lambda o: o.detected), Target(most=0.02)),
+    Rate("nothing: right structure said", _of("nothing", lambda o: o.verdict in RIGHT_STRUCTURE)),
+)
+
 RATES: dict[str, tuple[Rate, ...]] = {
     "single": _SINGLE,
     "faint": _FAINT,
@@ -132,6 +163,7 @@ RATES: dict[str, tuple[Rate, ...]] = {
     **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
     **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "undecidable": _UNDECIDABLE,
+    "rigs": _RIGS,
 }
 """By block."""
 

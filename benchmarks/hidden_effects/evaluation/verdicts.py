@@ -13,6 +13,12 @@ from pma_gym.discovery.diagnosis import Verdict
 STRUCTURAL = ("effect", "unknown")
 """Verdicts that claim more than parameters."""
 
+RIGHT_STRUCTURE = ("agrees", "parameters")
+"""Verdicts that say that no structure is missing."""
+
+MOST_LEFT = 3.0
+"""Noises that such a verdict may leave."""
+
 VERDICTS = (*get_args(Verdict), "no answer")
 """What is said where nothing is named."""
 
@@ -73,7 +79,10 @@ class Outcome:
         off: base parameters that were off by a tenth, where nothing else is hidden.
         moved: paths of base parameters that are named as off, in such a block.
         sentence: the answer as a person would say it, or what was raised instead.
-        kind: of data that excite too little; empty elsewhere.
+        kind: of data that excite too little, or of what a rig of another lab hides; empty
+            elsewhere.
+        left: the largest misfit of a signal after the amended model, over its noise; None where
+            the truth has no noise.
         rounds: results of the experiments that followed, by who chose them.
     """
 
@@ -103,6 +112,7 @@ class Outcome:
     off: tuple[str, ...] = ()
     moved: tuple[str, ...] = ()
     kind: str = ""
+    left: float | None = None
     rounds: Mapping[str, Sequence[Mapping[str, Any]]] = field(default_factory=dict)
     sentence: str = ""
 
@@ -112,6 +122,11 @@ class Outcome:
         if self.truth:
             return " + ".join(sorted(self.truth))
         return "parameters alone" if self.off else "nothing"
+
+    @property
+    def false_structure(self) -> bool:
+        """Whether the structure is said to be right with more than `MOST_LEFT` noises left."""
+        return self.verdict in RIGHT_STRUCTURE and (self.left or 0.0) > MOST_LEFT
 
     @property
     def said(self) -> str:
@@ -151,10 +166,9 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     verdict = answer["verdict"]
     effects = answer["effects"] if verdict == "effect" else []
     named = tuple(effect["name"] for effect in effects)
-    near = any(of_group([effect["name"]], hidden) for effect in effects[:1])
-    beside = any(
-        of_group([effect["name"], *effect["confused_with"][:2]], hidden) for effect in effects[:1]
-    )
+    meant = set().union(*(e.get("group") or group(e["name"]) for e in truth["effects"]))
+    near = any(effect["name"] in meant for effect in effects[:1])
+    beside = any(meant & {effect["name"], *effect["confused_with"][:2]} for effect in effects[:1])
     right = bool(hidden) and sorted(named) == sorted(hidden)
     outcome = _of(
         truth,
@@ -168,6 +182,7 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
         hits=len(set(named) & set(hidden)),
         spurious=len(named) > len(hidden),
         sentence=answer.get("sentence", ""),
+        left=_left(truth, answer),
     )
     _parameters(outcome, truth, answer)
     for gap in answer["gap"].values():
@@ -255,13 +270,23 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     outcome.parameters_spurious = bool(outcome.beyond)
 
 
+def _left(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> float | None:
+    noise, gap = truth.get("noise"), answer["gap"]
+    if not noise:
+        return None
+    return max((gap[name]["after"] / noise[name] for name in noise if name in gap), default=None)
+
+
 def _sizes(outcome: Outcome, truth: Mapping[str, Any], effects: list[Mapping[str, Any]]) -> None:
     parameters = {effect["name"]: effect["parameters"] for effect in effects}
     for effect in truth["effects"]:
-        for name, value in expected(effect["name"], effect["parameters"]).items():
+        values = effect.get("expected")
+        if values is None:
+            values = expected(effect["name"], effect["parameters"])
+        for name, value in values.items():
             estimates = parameters.get(effect["name"], {})
             estimate = estimates.get(name) or estimates.get(f"cable.{name}")
-            if estimate is None or value == 0.0:
+            if estimate is None or estimate["value"] is None or value == 0.0:
                 continue
             path = f"{effect['name']}.{name}"
             outcome.size_errors[path] = abs(estimate["value"] / value - 1.0)

@@ -1,7 +1,7 @@
 """Drawing a case: protocols, a rig that differs from what the lab believes, an effect, noise."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -68,6 +68,7 @@ class Case:
         readings: contraction, rotation, load, pressure in mm, deg, N, kPa, shape (rows, 4) each.
         repeat_of: by number of the trial, the earlier one that it repeats.
         truth: what nobody must read before the diagnosis is made.
+        files: texts of its data set by name, where it is no station's.
     """
 
     time: list[Array]
@@ -76,6 +77,7 @@ class Case:
     readings: list[Array]
     repeat_of: Mapping[int, int]
     truth: dict[str, Any]
+    files: Mapping[str, str] = field(default_factory=dict)
 
 
 def draw_case(

@@ -45,14 +45,18 @@ def write_case(case: Case, folder: Path, number: int) -> None:
     draft = begin_partial(target)
     try:
         draft.mkdir()
-        for i in range(len(case.time)):
-            (draft / trial_name(i)).write_text(_csv(case, i), "utf-8")
-        (draft / "dataset.toml").write_text(_dataset(case), "utf-8")
-        (draft / "model.toml").write_text(lab_model(), "utf-8")
+        for file, text in (case.files or _station_files(case)).items():
+            (draft / file).write_text(text, "utf-8")
         shutil.rmtree(target, ignore_errors=True)
         draft.rename(target)
     finally:
         end_partial(draft)
+
+
+def _station_files(case: Case) -> dict[str, str]:
+    """Texts of a station's data set by name."""
+    texts = {trial_name(i): _csv(case, i) for i in range(len(case.time))}
+    return texts | {"dataset.toml": _dataset(case), "model.toml": lab_model()}
 
 
 def trial_name(i: int) -> str:

@@ -28,6 +28,7 @@ from benchmarks.hidden_effects.generation.experiment_library import named
 from benchmarks.hidden_effects.generation.groups import group
 from benchmarks.hidden_effects.generation.likelihood_ratios import SEEN, UNTOLD, Behind
 from benchmarks.hidden_effects.generation.low_excitation import POOR, draw_poor
+from benchmarks.hidden_effects.generation.rigs import RigsBlock
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
@@ -229,6 +230,7 @@ def _rivals(
 
 
 BLOCKS: dict[str, Block] = USUAL | {
-    "undecidable": PoorBlock("undecidable", tuple(WITNESS), rounds=2)
+    "undecidable": PoorBlock("undecidable", tuple(WITNESS), rounds=2),
+    "rigs": RigsBlock("rigs"),
 }
 """All blocks by name, in the order of the table."""

@@ -10,7 +10,8 @@ from benchmarks.executors.executor import Executor
 from benchmarks.report.errors import Measure, Record, measures
 from benchmarks.runner.controller_spec import parse_controllers
 from benchmarks.runner.journal import JOURNAL, case_rows
-from benchmarks.suites.frozen import FrozenSuite, frozen_suite, kind_of
+from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.suite import FrozenSuite, kind_of
 from benchmarks.training.study.cells import OFF_POLICY, residual_group
 from benchmarks.training.study.pooled import Pool
 
@@ -93,7 +94,7 @@ def suite_loop(suite: FrozenSuite) -> str:
 
 
 def _kind(task: str) -> str:
-    from benchmarks.suites.frozen import kind_of
+    from benchmarks.suites.suite import kind_of
 
     return kind_of(task)
 

@@ -5,6 +5,7 @@ from typing import Any
 
 from benchmarks.training.study.figures import reached
 from pma_gym.pages.document import TextTable
+from pma_gym.tasks import EVERY_TASK
 
 SHOWN = ("displacement", "unseen displacement", "rotation I, II", "rotation III", "unseen rotation")
 """Measures that are printed, where they are there."""
@@ -98,5 +99,5 @@ def robustness_table(figures: Mapping[str, Any], task: str) -> TextTable:
         [condition, *(f"{errors[name]:.3g}" for name in names)]
         for condition, errors in conditions.items()
     ]
-    unit = "deg" if task == "rotation" else "mm"
+    unit = EVERY_TASK[task].protocol.unit
     return TextTable(f"{task} ({unit})", ["Condition", *names], rows)

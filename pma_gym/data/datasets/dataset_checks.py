@@ -12,6 +12,7 @@ from pma_gym.data.files.trial_files import place_in_file, read_header
 from pma_gym.data.files.trial_hints import mapping_line
 from pma_gym.data.quality.wild_readings import check_possible
 from pma_gym.data.readers.table import FileFormat, Table
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
 from pma_gym.units import SI_FACTORS
@@ -78,7 +79,7 @@ def check_signals(
     place = partial(place_in_file, path, columns=columns, form=form)
     for quantity in ("contraction", "pressure", "pressure_command"):
         # A slide without a muscle goes as far as it likes.
-        if quantity != "contraction" or any(name in door for name in _MUSCLE):
+        if not SIGNALS[quantity].shortens or any(name in door for name in _MUSCLE):
             check_possible(door, quantity, place)
     for quantity in trial.measurements:
         _check_alive(path, quantity, door)

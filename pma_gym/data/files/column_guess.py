@@ -8,43 +8,26 @@ from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_hints import FACTORS, looks_like
 from pma_gym.data.readers.units import unit_of
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import BY_NAME, RAW_COLUMNS, Column
 
 Array = NDArray[np.float64]
 
+_SAID = [signal for signal in SIGNALS.values() if signal.words]
+
 _WORDS: dict[str, tuple[str, ...]] = {
     "time": ("time", "zeit", "t", "timestamp", "elapsed"),
-    "pressure": ("pressure", "druck", "p", "press"),
-    "contraction": ("contraction", "weg", "position", "displacement", "stroke", "hub", "lvdt", "x"),
-    "rotation": ("rotation", "winkel", "angle", "drehung", "encoder", "potentiometer", "phi"),
-    "load": ("load", "kraft", "force", "last", "tension", "f", "zugkraft"),
-    "motor_voltage": ("motor", "umotor", "antrieb", "drive"),
-    "regulator_voltage": ("regulator", "regler", "ventil", "valve", "uventil", "proportional"),
+    **{s.name: s.words for s in _SAID if s.is_pressure},
+    **{s.name: s.words for s in _SAID if s.kind == "measurement"},
+    **{s.name: s.words for s in _SAID},
 }
-"""Words of a name, in English and German, by quantity."""
+"""Words of a name, in English and German, by quantity: pressures first, commands last."""
 
 _ASKED = ("soll", "set", "setpoint", "sp", "command", "cmd", "ref", "reference", "target", "demand")
 """Words of a name that make a pressure or a load a command."""
 
-_UNITS = {
-    "time": "s",
-    "pressure": "kPa",
-    "contraction": "mm",
-    "rotation": "deg",
-    "load": "N",
-    "motor_voltage": "V",
-    "regulator_voltage": "V",
-}
-_MEASURED = {
-    "time": "time_s",
-    "pressure": "pressure_kpa",
-    "contraction": "contraction_mm",
-    "rotation": "rotation_deg",
-    "load": "load_n",
-    "motor_voltage": "motor_voltage_v",
-    "regulator_voltage": "regulator_voltage_v",
-}
-_COMMANDED = {"pressure": "pressure_command_kpa", "load": "load_command_n"}
+_MEASURED = {"time": "time_s"} | {s.name: s.column for s in _SAID}
+_COMMANDED = {s.measured: s.column for s in SIGNALS.values() if s.measured}
 _RAW = {column.quantity: column.name for column in RAW_COLUMNS}
 
 

@@ -4,6 +4,7 @@ import difflib
 import re
 from collections.abc import Sequence
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_NAME, RAW_COLUMNS, Column, ColumnMap
 
@@ -19,14 +20,7 @@ FACTORS: dict[str, dict[str, float]] = {
 
 _STEMS = {
     "time_s": ("time", "t", "zeit"),
-    "motor_voltage_v": ("motor voltage", "motor", "motor command"),
-    "regulator_voltage_v": ("regulator voltage", "regulator", "valve voltage"),
-    "load_command_n": ("load command", "force command", "load setpoint"),
-    "pressure_command_kpa": ("pressure command", "pressure setpoint", "set pressure"),
-    "contraction_mm": ("contraction", "displacement", "position", "stroke"),
-    "rotation_deg": ("rotation", "angle", "pulley angle"),
-    "load_n": ("load", "force", "tension"),
-    "pressure_kpa": ("pressure", "muscle pressure", "gauge pressure"),
+    **{signal.column: signal.stems for signal in SIGNALS.values() if signal.stems},
     **{column.name: (column.name.removesuffix("_v").replace("_", " "),) for column in RAW_COLUMNS},
 }
 _LONGEST = 80

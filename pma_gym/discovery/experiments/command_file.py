@@ -69,13 +69,11 @@ def from_rest(trial: Trial, model: Model) -> Trial:
     step = float(np.median(np.diff(trial.time)))
     times = np.arange(-round((2.0 * REST_S + way) / step), 0) * step
     knots = [-(2.0 * REST_S + way), -(REST_S + way), -REST_S, 0.0]
-    before = np.interp(times, knots, [0.0, 0.0, first, first])
+    led_in = {"motor_voltage": np.interp(times, knots, [0.0, 0.0, first, first])}
     led = Trial(
         np.concatenate([trial.time[0] + times, trial.time]),
         {
-            name: np.concatenate([np.full(times.size, values[0]), values])
-            if name != "motor_voltage"
-            else np.concatenate([before, values])
+            name: np.concatenate([led_in.get(name, np.full(times.size, values[0])), values])
             for name, values in trial.commands.items()
         },
         provenance=trial.provenance,

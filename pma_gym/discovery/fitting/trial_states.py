@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.data.trial import Trial
+from pma_gym.data.signals import SIGNALS
+from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
-from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.documents import read_toml
 from pma_gym.estimation.initial_states import starts
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.memory_start import memory_states
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
@@ -122,8 +121,8 @@ def misfits(
         model: the model.
         states: of the trials, by name; a trial without one begins as the model says.
     """
-    squares: dict[str, float] = {name: 0.0 for name in OUTPUTS}
-    counts: dict[str, int] = {name: 0 for name in OUTPUTS}
+    squares: dict[str, float] = dict.fromkeys(model.rig.outputs, 0.0)
+    counts: dict[str, int] = dict.fromkeys(model.rig.outputs, 0)
     for each in named:
         held = simulated(model, each.trial, states.get(each.name, TrialState()))
         for name, row in held.items():
@@ -180,7 +179,7 @@ def _numbers(path: Path, name: str, table: object, part: str) -> dict[str, float
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
             raise TrialError(f"{key} in {place} must be a finite number, got {value!r:.80}")
         if part == "zeros" and (key not in BY_NAME or BY_NAME[key].kind != "measurement"):
-            known = [BY_QUANTITY[each].name for each in OUTPUTS]
+            known = [BY_QUANTITY[each].name for each in MEASUREMENTS]
             raise TrialError(f"{place} takes {', '.join(known)}, got {key!r:.80}")
         numbers[key] = float(value)
     return numbers
@@ -189,8 +188,8 @@ def _numbers(path: Path, name: str, table: object, part: str) -> dict[str, float
 def _zeros(trial: Trial, held: Mapping[str, Array]) -> dict[str, float]:
     """What a trial's signals with a free zero read above the model, on average."""
     zeros = {}
-    for name in FREE_ZEROS:
-        if name in trial.measurements and name in held:
+    for name in held:
+        if name in trial.measurements and SIGNALS[name].has_free_zero:
             off = trial.measurements[name] - held[name]
             if np.isfinite(off).any():
                 column = BY_QUANTITY[name]

@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.noise import at_rest, step_between
-from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -76,7 +74,8 @@ def acceptance_floors(
         stated: what the lab states.
     """
     floors = {}
-    for channel, name in enumerate(OUTPUTS):
+    for channel, signal in enumerate(logged[0].signals):
+        name = signal.name
         if not any(each.measures[channel] for each in logged):
             continue
         for source, level in (
@@ -138,7 +137,7 @@ def scatter_of_repeats(
     for group in repeats(logged, named):
         for i, j in zip(group, group[1:], strict=False):
             apart = difference(logged[i], logged[j], channel)
-            free = OUTPUTS[channel] in FREE_ZEROS and apart.size > 1
+            free = logged[i].signals[channel].has_free_zero and apart.size > 1
             # A file that was copied is no repeat.
             if apart.size and np.any(apart):
                 squares += float(np.sum((apart - free * apart.mean()) ** 2)) / 2.0

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.signals import Signal
 from pma_gym.discovery.preparation.acceptance_floors import difference
 from pma_gym.discovery.preparation.noise import (
     at_rest,
@@ -15,10 +16,8 @@ from pma_gym.discovery.preparation.noise import (
     sparse,
     step_between,
 )
-from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.estimation.logged import Logged
 from pma_gym.plant import sensors
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
@@ -37,6 +36,7 @@ class Level:
         distinct: how many readings differ from each other.
     """
 
+    signal: Signal
     level: float
     source: str
     by_source: dict[str, float]
@@ -48,11 +48,12 @@ class Level:
 def initial_floors(
     model: Model, logged: Sequence[Logged], named: Sequence[NamedTrial]
 ) -> list[Level]:
-    """Levels of the four outputs."""
-    assumed, floors = sensors.noise_levels(model), []
-    for channel, (_, line) in enumerate(sensors.SENSORS.values()):
+    """Levels of the rig's signals, in their order."""
+    assumed, steps, floors = sensors.noise_levels(model), sensors.resolutions(model), []
+    for channel, signal in enumerate(model.rig.signals):
+        resolution = float(steps[channel])
         step = step_between(logged, channel)
-        rounding = (step or line.resolution) / np.sqrt(12.0)
+        rounding = (step or resolution) / np.sqrt(12.0)
         sources = {"the model's sensor": float(np.hypot(assumed[channel], rounding))}
         rest = level_at_rest(at_rest(logged, channel))
         if rest is not None:
@@ -66,7 +67,7 @@ def initial_floors(
             source = "repeats"
         level = max(sources[source], float(rounding))
         distinct = len(distinct_readings(logged, channel))
-        floors.append(Level(level, source, sources, step, line.resolution, distinct))
+        floors.append(Level(signal, level, source, sources, step, resolution, distinct))
     return floors
 
 
@@ -89,7 +90,7 @@ def _between_repeats(
     for i, each in enumerate(named):
         groups.setdefault(each.repeat_of or each.name, []).append(i)
     few = sparse([_readings(each, channel) for each in logged if each.measures[channel]])
-    centred = not few or OUTPUTS[channel] in FREE_ZEROS
+    centred = not few or logged[0].signals[channel].has_free_zero
     squares, count = 0.0, 0
     for group in groups.values():
         for i, j in zip(group, group[1:], strict=False):

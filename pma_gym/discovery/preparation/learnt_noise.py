@@ -18,7 +18,6 @@ from pma_gym.discovery.preparation.acceptance_floors import difference, repeats
 from pma_gym.discovery.preparation.noise import Whitening, at_rest, autoregression
 from pma_gym.discovery.preparation.nuisance_projection import drift_cosines
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -49,8 +48,8 @@ def learnt_noise(
         (i, j) for group in repeats(logged, named) for i, j in zip(group, group[1:], strict=False)
     ]
     learnt = []
-    drifts = [_drift(logged, pairs, channel) for channel in range(len(OUTPUTS))]
-    surely = any(each.chance < CHANCE / len(OUTPUTS) for each in drifts)
+    drifts = [_drift(logged, pairs, channel) for channel in range(len(noise))]
+    surely = any(each.chance < CHANCE / len(noise) for each in drifts)
     shares = [each.share for each in drifts if np.isfinite(each.share)]
     usual = float(np.sqrt(np.mean(np.square(shares)))) if shares else 0.0
     for channel, before in enumerate(noise):

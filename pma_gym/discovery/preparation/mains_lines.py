@@ -43,7 +43,7 @@ def with_lines(
     Args:
         noise: of the signals.
         logged: the trials.
-        left: simulated less measured (SI), NaN where not measured, shape (4, rows) each.
+        left: simulated less measured (SI), NaN where not measured, shape (signals, rows) each.
     """
     lines: list[list[float]] = [[] for _ in noise]
     powers = np.zeros(len(noise))

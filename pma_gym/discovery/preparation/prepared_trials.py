@@ -8,8 +8,8 @@ import numpy as np
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.quality import clipping
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
-from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.splits import FOLDS, stretches
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
@@ -58,15 +58,12 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
 def _unused(trials: Sequence[Trial], model: Model) -> list[str]:
     """Words on what was measured that a slide does not have."""
     names = [
-        BY_QUANTITY[name].name
-        for name in model.rig.absent_outputs
-        if any(name in trial.measurements for trial in trials)
+        signal.column
+        for signal in SIGNALS.values()
+        if signal not in model.rig.signals
+        and any(signal.name in trial.measurements for trial in trials)
     ]
-    said = (
-        "not used: a slide has neither pulley nor pressure, and its load is its command; a "
-        "measured load that drives it is read by [columns] as load_command_n"
-    )
-    return [f"{', '.join(names)}: {said}"] if names else []
+    return [f"{', '.join(names)}: not used: {model.rig.absent_signals}"] if names else []
 
 
 def _pieces(named: NamedTrial) -> list[NamedTrial]:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Estimate, NamedEffect
 from pma_gym.discovery.preparation.initial_floors import Level
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 COARSER = 1.5
@@ -36,16 +35,16 @@ def coarse_sensors(
     """One effect with the steps of all coarse sensors; none where there are none.
 
     Args:
-        floors: noise of the four outputs.
+        floors: noise of the signals.
         misfits: what the refitted model leaves of them (root mean square, SI), NaN where nothing
             is measured. Rounding makes no misfit of more than a step, so a sensor with more is not
             named: that would explain the misfit by what is too small for it.
     """
     steps, others = {}, 0
-    for name, floor in zip(OUTPUTS, floors, strict=True):
-        explains = misfits is None or not misfits[OUTPUTS.index(name)] > floor.step
+    for channel, floor in enumerate(floors):
+        explains = misfits is None or not misfits[channel] > floor.step
         if is_coarse(floor) and explains:
-            column = BY_QUANTITY[name]
+            column = BY_QUANTITY[floor.signal.name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]
             sure = MISS * size / max(floor.distinct - 1, 1)

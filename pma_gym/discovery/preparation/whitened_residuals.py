@@ -25,13 +25,10 @@ from pma_gym.discovery.preparation.nuisance_projection import Projection, projec
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
 from pma_gym.integrator.equations import Interpolation
-from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, OUTPUTS
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
-
-FREE_ZEROS = ("contraction", "rotation")
-"""Outputs whose zero is free in every trial."""
 
 ROWS = 256
 """Rows in one product of matrices: few enough that no BLAS shares it between threads."""
@@ -202,22 +199,23 @@ class WhitenedResiduals(Residuals):
         return self._each(values[None], work)
 
     def _in_noise(self, logged: Logged, left: Array) -> Array:
-        """Differences (SI), shape (tried, 4, rows), whitened, free of free zeros and flat."""
+        """Differences (SI), shape (tried, signals, rows), whitened, free of free zeros and flat."""
         # A rig that cannot be simulated has no finite ones; who asks for them looks.
         with np.errstate(invalid="ignore", over="ignore"):
             return self.whitened(logged, left).reshape(len(left), -1)
 
     def whitened(self, logged: Logged, differences: Array) -> Array:
-        """Differences (SI), shape (columns, 4, rows), made white and free of free zeros."""
+        """Differences (SI), shape (columns, signals, rows), made white and free of free zeros."""
         white = np.zeros_like(differences)
-        for channel, (name, noise) in enumerate(zip(OUTPUTS, self.noise, strict=True)):
+        signals = zip(logged.signals, self.noise, strict=True)
+        for channel, (signal, noise) in enumerate(signals):
             if not logged.measures[channel]:
                 continue
             missing = logged.missing[channel]
             filtered = noise.white(differences[:, channel], missing)
             if noise.lines or noise.drift:
                 self._projection(logged, channel).out_of(filtered)
-            elif name in FREE_ZEROS:
+            elif signal.has_free_zero:
                 one = np.ones(len(logged.time))
                 one[missing] = 0.0
                 along = noise.white(one[None], missing)[0]
@@ -244,7 +242,7 @@ class WhitenedResiduals(Residuals):
         """How nuisances are projected out of a signal of a trial; made once."""
         key = (id(logged), channel)
         if key not in self._projections:
-            free = OUTPUTS[channel] in FREE_ZEROS
+            free = logged.signals[channel].has_free_zero
             self._projections[key] = projection(self.noise[channel], logged, channel, free)
         return self._projections[key]
 
@@ -290,8 +288,8 @@ class WhitenedResiduals(Residuals):
         return total
 
     def _counts(self, logged: Logged) -> NDArray[np.int64]:
-        there = np.zeros((len(OUTPUTS), len(logged.time)), bool)
-        for channel in range(len(OUTPUTS)):
+        there = np.zeros(logged.measured.shape, bool)
+        for channel in range(len(logged.signals)):
             if logged.measures[channel]:
                 there[channel] = True
                 there[channel, logged.missing[channel]] = False

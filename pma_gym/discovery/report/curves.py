@@ -12,7 +12,7 @@ from pma_gym.discovery.diagnosis import Diagnosis, TrialRecord
 from pma_gym.discovery.report.pictures import AFTER, BEFORE, MEASURED, after_name
 from pma_gym.discovery.report.text import signal_name, signal_unit
 from pma_gym.pages.figures import legend_below, picture, png
-from pma_gym.plant.compiled_model import OUTPUTS
+from pma_gym.pages.interactive import InteractiveFigure, Trace
 from pma_gym.units import SI_FACTORS
 
 _MOST_SIGNALS = 2
@@ -53,10 +53,25 @@ def curves_picture(record: TrialRecord, diagnosis: Diagnosis) -> bytes:
         return png(drawn)
 
 
+def curves_figure(record: TrialRecord, diagnosis: Diagnosis) -> InteractiveFigure:
+    """A trial's worst signal to zoom and hover: measured, before and after."""
+    signal = worst_signals(record)[0]
+    name = after_name(diagnosis) + (", held out" if record.held_out else "")
+    time = record.time.tolist()
+    curves = (("measured", record.measured, ""), ("model as given", record.before, BEFORE))
+    traces = [
+        Trace(label, time, _door(record, values, signal).tolist(), color)
+        for label, values, color in (*curves, (name, record.after, AFTER))
+    ]
+    caption = f"{signal_name(signal)} of {record.name}: drag to zoom, click a curve to hide it."
+    label = f"{signal_name(signal)} ({signal_unit(signal)})"
+    return InteractiveFigure("worst", caption, "time (s)", label, traces)
+
+
 def _draw(record: TrialRecord, signal: str, above: Axes, below: Axes) -> None:
     unit = signal_unit(signal)
-    measured = _door(record.measured, signal)
-    before, after = _door(record.before, signal), _door(record.after, signal)
+    measured = _door(record, record.measured, signal)
+    before, after = (_door(record, each, signal) for each in (record.before, record.after))
     above.plot(record.time, measured, **_measured_style(measured))
     above.plot(record.time, before, color=BEFORE, linestyle="--")
     above.plot(record.time, after, color=AFTER)
@@ -87,7 +102,7 @@ def _left_style(values: NDArray[np.float64]) -> dict[str, Any]:
     return {"marker": "o", "linestyle": "", "markersize": 4} if _sparse(values) else {}
 
 
-def _door(values: NDArray[np.float64], signal: str) -> NDArray[np.float64]:
+def _door(record: TrialRecord, values: NDArray[np.float64], signal: str) -> NDArray[np.float64]:
     """One signal of an array of outputs, in its file unit."""
     column = BY_NAME[signal]
-    return values[:, OUTPUTS.index(column.quantity)] / SI_FACTORS[column.unit]
+    return values[:, record.columns.index(signal)] / SI_FACTORS[column.unit]

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Nuisance
 from pma_gym.discovery.preparation.mains_lines import line_size
 from pma_gym.discovery.report.text import figure, listed, signal_name
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.scan_statistic import autocorrelation
 from pma_gym.discovery.verdict.findings import Findings
-from pma_gym.plant.compiled_model import OUTPUTS
 
 LEAST_COLOUR = 0.2
 """Correlation from reading to reading below which the colour of noise is not worth a word."""
@@ -28,10 +26,11 @@ def nuisances(findings: Findings) -> tuple[Nuisance, ...]:
     left = simulated_less_measured(whitened, held)
     lines: dict[float, dict[str, float]] = {}
     drifts, colours = {}, {}
-    for channel, (name, noise) in enumerate(zip(OUTPUTS, findings.problem.noise, strict=True)):
+    for channel, noise in enumerate(findings.problem.noise):
         if not any(logged.measures[channel] for logged in whitened.logged):
             continue
-        column, parts = BY_QUANTITY[name].name, [part[channel] for part in left]
+        column = whitened.logged[0].signals[channel].column
+        parts = [part[channel] for part in left]
         for hertz in noise.lines:
             size = line_size(hertz, whitened.logged, parts) / noise.level
             lines.setdefault(round(hertz, 6), {})[column] = size

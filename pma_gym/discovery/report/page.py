@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 from pma_gym.discovery.diagnosis import Diagnosis, NamedEffect
 from pma_gym.discovery.report.adequacy_text import floors_left
-from pma_gym.discovery.report.curves import curves_picture, worst_trial
+from pma_gym.discovery.report.curves import curves_figure, curves_picture, worst_trial
 from pma_gym.discovery.report.decision_section import decision_blocks
 from pma_gym.discovery.report.pictures import (
     after_name,
@@ -152,6 +152,7 @@ def _gap_blocks(diagnosis: Diagnosis) -> list[Block]:
             f"{worst.name if worst else ''}, the trial that the model as given misses most. Grey "
             "band: twice the noise to either side.",
         ),
+        *([curves_figure(worst, diagnosis)] if worst else []),
     ]
 
 

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.trial import MEASUREMENTS
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import Floor, Gap, Judgement, TrialRecord
 from pma_gym.discovery.fitting.free_parameters import values
-from pma_gym.discovery.preparation.whitened_residuals import FREE_ZEROS
 from pma_gym.discovery.verdict.findings import Findings
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
@@ -39,12 +38,12 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
         measured = np.where(_there(logged), logged.measured, np.nan)
         # A model that cannot be simulated as it was given says nothing.
         started = refitted[i] if before is None else before[i]
-        curves = [_zeroed(held, measured) for held in (started, refitted[i], after[i])]
+        curves = [_zeroed(logged, held, measured) for held in (started, refitted[i], after[i])]
         gaps = {}
-        for channel, name in enumerate(OUTPUTS):
+        for channel, signal in enumerate(logged.signals):
             if not logged.measures[channel]:
                 continue
-            column = BY_QUANTITY[name]
+            column = BY_QUANTITY[signal.name]
             factor = SI_FACTORS[column.unit]
             started_off, refitted_off, after_off = (
                 _rms(curve[channel] - measured[channel]) / factor for curve in curves
@@ -63,6 +62,7 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
                 gaps,
                 unseen is not None,
                 each.file or each.name,
+                tuple(signal.column for signal in logged.signals),
             )
         )
     return tuple(records)
@@ -71,7 +71,7 @@ def trial_records(findings: Findings) -> tuple[TrialRecord, ...]:
 def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
     """Gaps over all trials, by column name."""
     by_signal: dict[str, Gap] = {}
-    for column in (BY_QUANTITY[name] for name in OUTPUTS):
+    for column in (BY_QUANTITY[name] for name in MEASUREMENTS):
         parts = [
             (record.gaps[column.name], len(record.time))
             for record in records
@@ -91,13 +91,13 @@ def gaps(records: Sequence[TrialRecord]) -> dict[str, Gap]:
 def floors_in_file_units(findings: Findings) -> dict[str, Floor]:
     """Noise of the signals that were measured."""
     floors = {}
-    for channel, name in enumerate(OUTPUTS):
+    for channel, level in enumerate(findings.floors):
         if not any(
             each.measures[channel]
             for each in findings.problem.whitened_residuals(findings.given).logged
         ):
             continue
-        column, level = BY_QUANTITY[name], findings.floors[channel]
+        column = BY_QUANTITY[level.signal.name]
         factor = SI_FACTORS[column.unit]
         learnt = findings.selection.problem.noise[channel]
         sources = {source: value / factor for source, value in level.by_source.items()}
@@ -140,12 +140,12 @@ def _there(logged: Logged) -> NDArray[np.bool_]:
     return there
 
 
-def _zeroed(held: Array, measured: Array) -> Array:
+def _zeroed(logged: Logged, held: Array, measured: Array) -> Array:
     """A curve with the zeros that are free put where they fit best."""
     curve = held.copy()
-    for channel, name in enumerate(OUTPUTS):
+    for channel, signal in enumerate(logged.signals):
         off = measured[channel] - held[channel]
-        if name in FREE_ZEROS and np.isfinite(off).any():
+        if signal.has_free_zero and np.isfinite(off).any():
             curve[channel] += np.nanmean(off)
     return curve
 

@@ -15,7 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.data.signals import Signal
 from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
@@ -23,7 +23,6 @@ from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, singl
 from pma_gym.discovery.screening.residual_maps import residual_map
 from pma_gym.discovery.screening.residuals import simulated_less_measured
 from pma_gym.discovery.screening.time_bins import PIECE_BINS, TimeBins, time_bins
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -59,7 +58,7 @@ def localise(
     Args:
         whitened: the trials beside the model.
         fit: its parameters.
-        noise_levels: standard deviations of the four signals' noise (SI), shape (4,).
+        noise_levels: standard deviations of the signals' noise (SI), shape (signals,).
         seed: of the simulated residuals.
     Returns:
         Regions, the largest share of its signal's gap first, and a map for each signal with a gap.
@@ -70,8 +69,10 @@ def localise(
     levels = np.asarray(noise_levels, float)[:, None]
     residuals = [part / levels for part in simulated_less_measured(whitened, readings)]
     bins = time_bins(whitened.logged, readings, residuals)
-    seen = [channel for channel in range(len(OUTPUTS)) if _has_gap(bins, channel)]
-    return _places(bins, seen, seed), tuple(residual_map(bins, channel) for channel in seen)
+    seen = [channel for channel in range(len(bins.total)) if _has_gap(bins, channel)]
+    signals = whitened.logged[0].signals
+    maps = tuple(residual_map(bins, channel, signals[channel]) for channel in seen)
+    return _places(bins, signals, seen, seed), maps
 
 
 def _has_gap(bins: TimeBins, channel: int) -> bool:
@@ -79,7 +80,9 @@ def _has_gap(bins: TimeBins, channel: int) -> bool:
     return bool(count > 0 and np.sum(bins.excess[channel]) > (VISIBLE - 1.0) * count)
 
 
-def _places(bins: TimeBins, seen: Sequence[int], seed: int) -> tuple[Place, ...]:
+def _places(
+    bins: TimeBins, signals: Sequence[Signal], seen: Sequence[int], seed: int
+) -> tuple[Place, ...]:
     singles = single_regions(bins)
     regions = singles + [
         Region(first.kinds + second.kinds, "", first.inside & second.inside)
@@ -105,7 +108,7 @@ def _places(bins: TimeBins, seen: Sequence[int], seed: int) -> tuple[Place, ...]
         share, readings = _shares(bins, channel, member)
         for k in _shown(bins.excess[channel], inside, names, share, readings, p_value):
             words = ", ".join(singles[i].words for i in names[k])
-            signal = BY_QUANTITY[OUTPUTS[channel]].name
+            signal = signals[channel].column
             places.append(Place(signal, words, float(share[k]), float(p_value[k])))
     places.sort(key=lambda place: -place.share_of_gap)
     return tuple(places[:MOST])

@@ -6,10 +6,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.data.signals import Signal
 from pma_gym.discovery.diagnosis import Map
 from pma_gym.discovery.screening.time_bins import TimeBins
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -26,12 +25,13 @@ _AXES: Mapping[str, str] = {
 }
 
 
-def residual_map(bins: TimeBins, channel: int) -> Map:
+def residual_map(bins: TimeBins, channel: int, signal: Signal) -> Map:
     """The signal's mean residual over the two conditions that explain most of it.
 
     Args:
         bins: all trials.
-        channel: which of the plant's outputs, 0 to 3.
+        channel: which of the plant's outputs.
+        signal: what that output is.
     """
     total, counts = bins.total[channel], bins.counts[channel]
     edges = {name: _edges(getattr(bins, name)[counts > 0]) for name in _AXES}
@@ -46,8 +46,7 @@ def residual_map(bins: TimeBins, channel: int) -> Map:
             best = explained, x, y, means
     assert best is not None
     _, x, y, means = best
-    signal = BY_QUANTITY[OUTPUTS[channel]].name
-    return Map(signal, _AXES[x], _AXES[y], edges[x], edges[y], means)
+    return Map(signal.column, _AXES[x], _AXES[y], edges[x], edges[y], means)
 
 
 def _grid(bins: TimeBins, x: str, y: str, edges: Mapping[str, Array], weights: Array) -> Array:

@@ -12,7 +12,6 @@ from pma_gym.discovery.preparation.noise import Whitening, autoregression, step_
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.autocorrelation import AutocorrelationTest, autocorrelation_test
 from pma_gym.discovery.screening.scan_statistic import NO_EXCESS, ScanStatistic, scan_statistic
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -37,7 +36,7 @@ def reestimated_noise(
 
 
 def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
-    """Simulated less measured (SI), shape (4, rows) for each trial, nuisances taken out."""
+    """Simulated less measured (SI), shape (signals, rows) for each trial, nuisances taken out."""
     readings = whitened.readings(fit.values)
     assert readings is not None
     left = simulated_less_measured(whitened, readings)
@@ -60,16 +59,16 @@ def innovations(noise: Whitening, part: Array) -> Array:
 
 
 def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Array]) -> list[Array]:
-    """Simulated less measured (SI), shape (4, rows) for each trial, free zeros taken out."""
+    """Simulated less measured (SI), shape (signals, rows) for each trial, free zeros taken out."""
     differences = []
     for logged, held in zip(whitened.logged, readings, strict=True):
         left = held - logged.measured
-        for channel, name in enumerate(OUTPUTS):
+        for channel, signal in enumerate(logged.signals):
             if not logged.measures[channel]:
                 left[channel] = np.nan
                 continue
             left[channel, logged.missing[channel]] = np.nan
-            if name in ("contraction", "rotation"):
+            if signal.has_free_zero:
                 left[channel] -= np.nanmean(left[channel])
         differences.append(left)
     return differences
@@ -106,11 +105,14 @@ def autocorrelation_tests(
     """
     if not _tells(problem):
         return {}
-    left = residuals(problem.whitened_residuals(fit.model, chosen), fit)
+    whitened = problem.whitened_residuals(fit.model, chosen)
+    left, signals = residuals(whitened, fit), whitened.logged[0].signals
     rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in problem.trials]))
     return {
-        name: autocorrelation_test([innovations(problem.noise[c], part[c]) for part in left], rate)
-        for c, name in enumerate(OUTPUTS)
+        signal.name: autocorrelation_test(
+            [innovations(problem.noise[c], part[c]) for part in left], rate
+        )
+        for c, signal in enumerate(signals)
     }
 
 
@@ -125,7 +127,7 @@ def scan_of_fit(problem: FitProblem, fit: Fitted) -> ScanStatistic:
         scan_statistic(
             [part[c] for part in left], edges, problem.noise[c].level, step_between(logged, c)
         )
-        for c in range(len(OUTPUTS))
+        for c in range(len(problem.noise))
     ]
     chance = min(1.0, len(scans) * min(each.chance for each in scans))
     return ScanStatistic(chance, sum(each.excess for each in scans))

@@ -217,8 +217,8 @@ def _one_by_one(whitened: WhitenedResiduals, tried: Array) -> list[Any]:
 
 def _changes(baseline: Baseline, changes: Sequence[Any], weights: Array) -> Array:
     """Rms of what each probe changes beyond parameters, over the noise, where that is most."""
-    squares = np.zeros((weights.shape[1], 4))
-    counts = np.zeros(4)
+    signals = len(baseline.whitened.logged[0].signals)
+    squares, counts = np.zeros((weights.shape[1], signals)), np.zeros(signals)
     reduced = weights.T.astype(np.float32)
     for logged, ours, theirs in zip(
         baseline.whitened.logged, baseline.columns, changes, strict=True

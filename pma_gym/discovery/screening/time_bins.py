@@ -34,9 +34,9 @@ class TimeBins:
     """All trials in ticks, padded to whole pieces; shape (n,) each unless said otherwise.
 
     Attributes:
-        excess: sum of residual squared less 1, in units of noise, shape (4, n).
-        total: sum of the residual, shape (4, n).
-        counts: readings, shape (4, n); 0 where a tick is padding.
+        excess: sum of residual squared less 1, in units of noise, shape (signals, n).
+        total: sum of the residual, shape (signals, n).
+        counts: readings, shape (signals, n); 0 where a tick is padding.
         pressure: (kPa), as simulated, as all conditions.
         load: (N).
         contraction: (mm).
@@ -69,7 +69,7 @@ def time_bins(
 
     Args:
         logs: the trials.
-        readings: what the sensors hold (SI), shape (4, rows) for each trial.
+        readings: what the sensors hold (SI), shape (signals, rows) for each trial.
         residuals: those less what was measured, in units of the noise, NaN where nothing was.
     """
     parts = []
@@ -110,7 +110,7 @@ def _padded(values: Array, spare: int) -> Array:
 
 def _conditions(logged: Logged, held: Array) -> dict[str, Array]:
     """Conditions of each row, from what is simulated: measured speed is mostly noise."""
-    time, contraction = logged.time, held[0]
+    time, contraction = logged.time, logged.row(held, "displacement", "angle")
     speed = _speed(time, contraction)
     moving = np.abs(speed) > MOVING
     direction = np.where(moving, np.sign(speed), 0.0)
@@ -127,8 +127,8 @@ def _conditions(logged: Logged, held: Array) -> dict[str, Array]:
         phase[rows[0] :] = 1.0
         phase[rows[-1] + 1 :] = 2.0
     return {
-        "pressure": held[3] / 1e3,
-        "load": held[2],
+        "pressure": logged.row(held, "pressure") / 1e3,
+        "load": logged.row(held, "force", "torque"),
         "contraction": contraction * 1e3,
         "speed": speed * 1e3,
         "reversal": _since(time, turned),

@@ -11,7 +11,6 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.units import SI_FACTORS
 
 FAR_ABOVE, FAR_BELOW = 30.0, 1e-4
@@ -58,18 +57,20 @@ def _scales(
     travel, speed, pressure, seconds = 0.0, 0.0, 0.0, 0.0
     for held, logged in zip(readings, whitened.logged, strict=True):
         # A model that lacks much may run away; what was measured did not.
-        contraction, time = _known(logged, held, "contraction")
+        contraction, time = _known(logged, held, ("displacement", "angle"))
         travel = max(travel, float(np.ptp(contraction)))
         speed = max(speed, float(np.abs(np.gradient(contraction, time)).max()))
-        pressure = max(pressure, float(np.ptp(_known(logged, held, "pressure")[0])))
+        pressure = max(pressure, float(np.ptp(_known(logged, held, ("pressure",))[0])))
         seconds = max(seconds, float(logged.time[-1] - logged.time[0]))
     si = {"mm": travel, "um": travel, "mm/s": speed, "kPa": pressure, "s": seconds, "ms": seconds}
     return {name: size / SI_FACTORS[name] for name, size in si.items() if size > 0.0}
 
 
-def _known(logged: Logged, held: Array, name: str) -> tuple[Array, Array]:
+def _known(logged: Logged, held: Array, measures: tuple[str, ...]) -> tuple[Array, Array]:
     """A signal (SI) as measured, else as simulated, and the times (s) of its readings."""
-    channel = OUTPUTS.index(name)
+    channel = logged.channel(*measures)
+    if channel is None:
+        return np.zeros(len(logged.time)), logged.time
     there = np.full(len(logged.time), bool(logged.measures[channel]))
     there[logged.missing[channel]] = False
     if there.sum() < LEAST_ROWS:

@@ -20,7 +20,6 @@ from pma_gym.discovery.preparation.acceptance_floors import REST, AcceptanceFloo
 from pma_gym.discovery.preparation.noise import Whitening, at_rest, autoregression, white_noise
 from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -130,9 +129,10 @@ def adequacy(
     inside = _Judge(logged, fitted, folds, seed)
     outside = None if unseen is None else _Judge(logged, unseen, folds, seed)
     judged = {}
-    for channel, name in enumerate(OUTPUTS):
+    for channel, signal in enumerate(logged[0].signals):
         if any(each.measures[channel] for each in logged):
-            judged[name] = _judged(outside, inside, channel, floors.get(name))
+            floor = floors.get(signal.name)
+            judged[signal.name] = _judged(outside, inside, channel, floor)
     return Adequacy(judged)
 
 
@@ -187,7 +187,8 @@ class _Judge:
         seed: int,
     ) -> None:
         self._logged, self._residual, self._folds, self._seed = logged, residual, folds, seed
-        self._signals = max(sum(any(e.measures[c] for e in logged) for c in range(4)), 1)
+        measured = np.array([each.measures for each in logged]).any(axis=0)
+        self._signals = max(int(measured.sum()), 1)
 
     @cached_property
     def _given(self) -> list[Array]:

@@ -9,7 +9,6 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import Pieces, WhitenedResiduals
 from pma_gym.estimation.least_squares import inverse
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -111,15 +110,15 @@ def _groups(
     readings = whitened.readings(fit.values)
     if readings is None:
         return groups
-    for channel, name in enumerate(OUTPUTS):
-        if name == "rotation":
+    for channel, signal in enumerate(whitened.logged[0].signals):
+        if signal.starts_at_zero:
             continue
         means = []
         for logged, held in zip(whitened.logged, readings, strict=True):
             edges = whitened.edges(logged)
             means += [held[channel, a:b].mean() for a, b in zip(edges, edges[1:], strict=False)]
         ranks = np.argsort(np.argsort(np.array(means), kind="stable"), kind="stable")
-        groups[name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
+        groups[signal.name] = (GROUPS * ranks // len(ranks)).astype(np.int64)
     return groups
 
 

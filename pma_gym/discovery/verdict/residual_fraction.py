@@ -5,13 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.noise import slow_part, sparse
 from pma_gym.discovery.preparation.quantisation import is_coarse
 from pma_gym.discovery.screening.autocorrelation import autocorrelation_test, tone
 from pma_gym.discovery.screening.residuals import innovations, residuals
 from pma_gym.discovery.verdict.findings import Findings
-from pma_gym.plant.compiled_model import OUTPUTS
 
 LEAST_SLOW = 0.02
 """Mean square of a signal's slow residual over that of its noise, below which there is none."""
@@ -44,7 +42,7 @@ def residual_fraction(findings: Findings) -> ResidualFraction:
     after = _slow(findings, residuals(whitened, selection.fit))
     # What may be chance before has no share afterwards. Of a few readings no memory is known, and
     # a slide's starts are taken from readings and carry their noise.
-    seldom = [sparse([part[channel] for part in begun]) for channel in range(len(OUTPUTS))]
+    seldom = [sparse([part[channel] for part in begun]) for channel in range(len(begun[0]))]
     free = findings.given.rig.is_free
     there = (before[1] > 0.0) | np.array(seldom) | free
     shares = [
@@ -58,10 +56,10 @@ def tones(findings: Findings) -> dict[str, float]:
     """Frequency (Hz) of each signal, by column, whose residual after the refit oscillates."""
     whitened = findings.problem.whitened_residuals(findings.refitted.model)
     left, rate, hertz = residuals(whitened, findings.refitted), _rate(findings), {}
-    for channel, name in enumerate(OUTPUTS):
+    for channel, signal in enumerate(whitened.logged[0].signals):
         kept = tone([part[channel] for part in left], rate)
         if kept is not None:
-            hertz[BY_QUANTITY[name].name] = kept.hertz
+            hertz[signal.column] = kept.hertz
     return hertz
 
 
@@ -71,9 +69,9 @@ def _rate(findings: Findings) -> float:
 
 
 def _slow(findings: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Mean squares of four signals' slow and autocorrelated parts over those of their noise."""
+    """Mean squares of the signals' slow and autocorrelated parts over those of their noise."""
     rate = _rate(findings)
-    shares = np.zeros((2, 4))
+    shares = np.zeros((2, len(findings.floors)))
     for channel, floor in enumerate(findings.floors):
         # Of the colour that is known from rest and repeats; what is missing must not hide in it.
         noise = findings.problem.noise[channel]

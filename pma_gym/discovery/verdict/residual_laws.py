@@ -138,7 +138,12 @@ def _ranges(problem: FitProblem, refitted: Fitted) -> dict[str, tuple[float, flo
     seen = {
         "residual_force_of_contraction": np.concatenate([held[0] for held in readings]),
         "residual_force_of_velocity": speeds,
-        "residual_force_of_pressure": np.concatenate([held[3] for held in readings]),
+        "residual_force_of_pressure": np.concatenate(
+            [
+                each.row(held, "pressure")
+                for each, held in zip(whitened.logged, readings, strict=True)
+            ]
+        ),
         "residual_load": loads,
     }
     ranges = {}

@@ -5,9 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import TrialRecord
-from pma_gym.plant.compiled_model import OUTPUTS
 
 Array = NDArray[np.float64]
 
@@ -34,20 +32,20 @@ def worsened(
         floors: noise of each signal, by column, in its unit inside (SI).
         seed: of the bootstrap.
     """
-    growth = {name: [_growth(each, c) for each in records] for c, name in enumerate(OUTPUTS)}
-    names = [name for name in OUTPUTS if floors.get(BY_QUANTITY[name].name)]
+    columns = records[0].columns if records else ()
+    growth = {name: [_growth(each, c) for each in records] for c, name in enumerate(columns)}
+    names = [name for name in columns if floors.get(name)]
     signals, trials = [], []
     tests = len(names) + len(records)
     for number, name in enumerate(names):
-        level = floors[BY_QUANTITY[name].name]
+        level = floors[name]
         sums = np.concatenate([part[0] for part in growth[name]])
         counts = np.concatenate([part[1] for part in growth[name]])
         if _grows(sums / level**2, counts, CHANCE / tests, [seed, number]):
-            signals.append(BY_QUANTITY[name].name)
+            signals.append(name)
     for number, record in enumerate(records):
         parts = [
-            (growth[name][number][0] / floors[BY_QUANTITY[name].name] ** 2, growth[name][number][1])
-            for name in names
+            (growth[name][number][0] / floors[name] ** 2, growth[name][number][1]) for name in names
         ]
         if not parts:
             continue

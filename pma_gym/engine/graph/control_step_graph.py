@@ -19,6 +19,7 @@ from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.integrator.system import step_start_values
 from pma_gym.plant import sensors
+from pma_gym.plant.rigs.station import STATION
 from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 
@@ -116,10 +117,11 @@ class ControlStepGraph(StepInputs):
 
     def read(self, stream: int, count: Value) -> list[Value]:
         """What the four sensors say (SI), by random numbers of a stream."""
-        eq, truth = self.equations, self.truth()
+        eq, truth, signals = self.equations, self.truth(), STATION.signals
+        measured = [(signal.sensor, signal.name) for signal in signals]
         lagged = [
             eq[f"lag_{name}"] if f"lag_{name}" in self.state_layout.states else truth[output]
-            for name, (output, _) in sensors.SENSORS.items()
+            for name, output in measured
         ]
         if not self.state_layout.options.noise:
             return lagged
@@ -128,12 +130,10 @@ class ControlStepGraph(StepInputs):
             (self.slot("key_0"), self.slot("key_1")),
         )
         said = []
-        for held, normal, (name, (_, line)) in zip(
-            lagged, normals(words), sensors.SENSORS.items(), strict=True
-        ):
-            parameters = eq.parameters.get(name)
+        for held, normal, signal in zip(lagged, normals(words), signals, strict=True):
+            parameters = eq.parameters.get(signal.sensor)
             level = getattr(parameters, "noise", self.graph.constant(0.0))
-            said.append(sensors.reading(held, level, normal, line.gain, line.offset))
+            said.append(sensors.reading(held, level, normal, signal.calibration))
         return said
 
     def sense(self, count: Value, first: bool) -> dict[str, Value]:

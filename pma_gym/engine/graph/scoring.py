@@ -57,11 +57,11 @@ def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Valu
 
     Of an exercise that prescribes a moment it is the moment's excess (N m).
     """
-    if task.protocol.quantity == "extension":
+    if task.protocol.followed.lengthens:
         return eq["zero_contraction"] - outputs["contraction"]
-    if task.protocol.quantity == "contraction":
+    if task.protocol.followed.shortens:
         return outputs["contraction"] - eq.graph.input(START, HELD)
-    if task.protocol.quantity == "excess":
+    if task.protocol.followed.is_force:
         radius = eq.parameters["rotor"].radius
         return Prescribed(radius, held_plan(eq, task)).excess(outputs["load"], outputs["rotation"])
     return outputs["rotation"]

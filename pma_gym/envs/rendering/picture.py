@@ -88,12 +88,12 @@ class Picture:
             "--",
             color=REFERENCE,
             lw=1.4,
-            label="prescribed" if protocol.quantity == "excess" else "reference",
+            label="prescribed" if protocol.followed.is_force else "reference",
         )
         (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
         # An excess lies on either side of what is prescribed.
-        lowest, highest = (-1.2, 2.4) if protocol.quantity == "excess" else (-0.12, 1.2)
+        lowest, highest = (-1.2, 2.4) if protocol.followed.is_force else (-0.12, 1.2)
         span = protocol.span / self._factor
         axes.set_ylim(lowest * span, highest * span)
         axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")

@@ -1,4 +1,4 @@
-"""What a picture reads of an environment."""
+"""The part of an environment that a picture reads."""
 
 from collections.abc import Mapping
 from typing import Protocol

@@ -130,7 +130,7 @@ def _solve(
 ) -> EquilibriumProblem:
     problem = EquilibriumProblem(plant, motor_voltages, regulator_voltages, vectors)
     problem.relax_memory("regulator_delay")
-    if "pressure" in problem.names:
+    if plant.model.rig.has_muscle:
         _settle_pressure(problem)
     for port in ("drive_delay", "drive_lag"):
         problem.relax_memory(port)

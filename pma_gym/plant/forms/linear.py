@@ -4,8 +4,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from pma_gym.data.signals import is_pressure
 from pma_gym.effects import CATALOGUE
-from pma_gym.plant.compiled_model import OUTPUTS, CompiledModel
+from pma_gym.plant.compiled_model import CompiledModel
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.equilibrium.force_balance import static_force
 from pma_gym.plant.equilibrium.solver import equilibrium_at
@@ -14,7 +15,6 @@ if TYPE_CHECKING:
     import control
 
 INPUTS = ("motor_voltage", "regulator_voltage")
-SEEN = (*OUTPUTS, "extension")
 DIRECTIONS = {"contracting": 1.0, "relaxing": -1.0}
 """Sign of the velocity by direction of motion."""
 
@@ -87,16 +87,22 @@ def linearize_at(
         for i, name in enumerate(plant.states)
         if name in FOLLOWING or not name.startswith(("memory_", "lag_"))
     ]
+    seen = _seen(plant)
     return control.StateSpace(
         _by_state(plant, base, commands, kept),
         _by_input(plant, base, commands)[kept],
         _outputs(plant, rest, kept),
-        np.zeros((len(SEEN), len(INPUTS))),
+        np.zeros((len(seen), len(INPUTS))),
         states=[plant.states[i] for i in kept],
         inputs=list(INPUTS),
-        outputs=list(SEEN),
+        outputs=list(seen),
         name=plant.model.name,
     )
+
+
+def _seen(plant: CompiledModel) -> tuple[str, ...]:
+    """Names of a plant's outputs, and of what counts from a trial's start."""
+    return (*plant.outputs, *(each.reading for each in plant.signals if each.reading))
 
 
 def operating_point(
@@ -165,7 +171,7 @@ def _outputs(plant: CompiledModel, rest: Condition, kept: list[int]) -> np.ndarr
     columns = []
     for high, low, step in _pairs(plant, rest.state, kept):
         seen = plant.observe(np.stack([high, low]), rest.zero_contraction)
-        columns.append([(seen[name][0] - seen[name][1]) / (2.0 * step) for name in SEEN])
+        columns.append([(seen[name][0] - seen[name][1]) / (2.0 * step) for name in _seen(plant)])
     return np.transpose(columns)
 
 
@@ -175,7 +181,7 @@ def _pairs(
     """The state moved up and down along each kept state, and the step."""
     pairs = []
     for at in kept:
-        step = _PRESSURE_STEP if plant.states[at] == "pressure" else _STEP
+        step = _PRESSURE_STEP if is_pressure(plant.states[at]) else _STEP
         move = np.zeros_like(state)
         move[at] = step
         pairs.append((state + move, state - move, step))

@@ -14,6 +14,7 @@ cell is taken to read the spring's share of the extension, K y, which is F_ce - 
 from collections.abc import Mapping
 
 from pma_gym.codegen.trace import trace
+from pma_gym.data.signals import signals
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.muscle.contractile_force import contractile_force
 from pma_gym.effects.muscle.stiffness import spring_stiffness
@@ -134,6 +135,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 
 CASCADE = Rig(
     name="cascade",
+    signals=signals("contraction", "rotation", "load", "pressure"),
     ports=PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from pma_gym.data.signals import Signal
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
@@ -15,6 +16,7 @@ class Rig:
 
     Attributes:
         name: its name, as `plant = "..."` of a model file says it.
+        signals: what its sensors measure, in the order of its outputs.
         ports: its ports: how many effects each takes, and what becomes of their results.
         parts: effects that it reads itself and cannot do without.
         position_tolerances: states that are held to a smaller error than the others, and their
@@ -24,7 +26,7 @@ class Rig:
         fastest_oscillation: angular frequency (rad/s) of its fastest oscillation by the effects'
             parameters; 0 if nothing swings.
         refused_effects: effects that would fit a port and mean nothing there, and why.
-        absent_outputs: outputs that it does not have, so no sensor measures them.
+        absent_signals: why it has no other signals, and what to do with a log that has them.
         shipped_example: shipped model that a missing part can be copied from; "" for none.
         balances_loads: a muscle balances the load of the drive, so a load has an equilibrium and a
             person or a weight can act on it.
@@ -37,6 +39,7 @@ class Rig:
     """
 
     name: str
+    signals: tuple[Signal, ...]
     ports: Mapping[str, Port]
     parts: tuple[str, ...]
     position_tolerances: Mapping[str, float]
@@ -44,10 +47,15 @@ class Rig:
     solve_equilibrium: Callable[[EquilibriumProblem], None]
     fastest_oscillation: Callable[[Mapping[str, Parameters]], float]
     refused_effects: Mapping[str, str] = field(default_factory=dict)
-    absent_outputs: tuple[str, ...] = ()
+    absent_signals: str = ""
     shipped_example: str = ""
     balances_loads: bool = False
     is_free: bool = False
     has_muscle: bool = True
     is_diagnosable: bool = False
     moving_lags: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of its signals, as its equations and trials call them."""
+        return tuple(signal.name for signal in self.signals)

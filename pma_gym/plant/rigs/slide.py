@@ -9,6 +9,7 @@ measure nothing new.
 
 from collections.abc import Mapping
 
+from pma_gym.data.signals import signals
 from pma_gym.effects.effect import Parameters
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
@@ -34,9 +35,6 @@ REFUSED_EFFECTS: dict[str, str] = {
 PARTS: tuple[str, ...] = ("slide", "start")
 """Effects of port `part` that the slide reads itself and cannot do without."""
 
-ABSENT_OUTPUTS: tuple[str, ...] = ("rotation", "load", "pressure")
-"""Outputs that it does not have: its load is its command."""
-
 POSITION_TOLERANCES: dict[str, float] = {"contraction": 0.001}
 """States that are asked for more exactly than the others, and their tolerance beside theirs."""
 
@@ -52,13 +50,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
     eq.let("slide_force", eq.total("slide_force"))
     eq.let("resistance", eq.total("muscle_damping"))
-    nothing = eq.graph.constant(0.0)
-    eq.outputs = {
-        "contraction": eq["contraction"],
-        "rotation": nothing,
-        "load": nothing,
-        "pressure": nothing,
-    }
+    eq.outputs = {"contraction": eq["contraction"]}
     force = eq["slide_force"] - eq["load_arriving"] - eq["resistance"] * eq["velocity"]
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
@@ -82,6 +74,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 
 SLIDE = Rig(
     name="slide",
+    signals=signals("contraction"),
     ports=PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,
@@ -89,7 +82,10 @@ SLIDE = Rig(
     solve_equilibrium=solve_equilibrium,
     fastest_oscillation=fastest_oscillation,
     refused_effects=REFUSED_EFFECTS,
-    absent_outputs=ABSENT_OUTPUTS,
+    absent_signals=(
+        "a slide has neither pulley nor pressure, and its load is its command; a measured load "
+        "that drives it is read by [columns] as load_command_n"
+    ),
     is_free=True,
     has_muscle=False,
     is_diagnosable=True,

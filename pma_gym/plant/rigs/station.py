@@ -12,6 +12,7 @@ from collections.abc import Mapping
 
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.trace import trace
+from pma_gym.data.signals import signals
 from pma_gym.effects.cable.hanging_load import hanging_inertia
 from pma_gym.effects.cable.leg import leg_torque
 from pma_gym.effects.effect import Parameters
@@ -126,6 +127,7 @@ def _write_states(eq: PlantEquations) -> None:
 
 STATION = Rig(
     name="station",
+    signals=signals("contraction", "rotation", "load", "pressure"),
     ports=STATION_PORTS,
     parts=PARTS,
     position_tolerances=POSITION_TOLERANCES,

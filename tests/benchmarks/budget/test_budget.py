@@ -195,7 +195,9 @@ def test_command_writes_tables_and_pictures(tmp_path, monkeypatch):
     [("as causes", waterfall_rows), ("one thing alone", alone_rows), ("share of", share_rows)],
 )
 def test_the_documentation_has_the_commands_figures(budgets, task, words, make):
-    page = (Path(__file__).parents[3] / "docs" / "error-budget.md").read_text(encoding="utf-8")
+    docs = Path(__file__).parents[3] / "docs"
+    pages = (docs / "error-budget.md", docs / "notebook" / "error-budget.md")
+    page = "".join(each.read_text(encoding="utf-8") for each in pages)
     (table,) = (
         [[cell.strip() for cell in line.strip("|\n").split("|")] for line in lines.splitlines()]
         for title, lines in re.findall(r"\*\*(.+?)\*\*\n\n((?:\|.*\n)+)", page)

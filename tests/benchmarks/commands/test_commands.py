@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
 from benchmarks.reproduction import job
-from benchmarks.reproduction.execution import Execution
+from benchmarks.runner import run
 from benchmarks.suites.reproduction import load_suite
 
 COMMANDS = ["profiles", "studies", "identify", "tune", "accuracy"]
@@ -62,15 +62,16 @@ def test_a_file_that_cannot_be_written_is_refused_at_once(
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_ctrl_c_before_the_first_case_says_that_nothing_was_measured(tmp_path, monkeypatch):
-    monkeypatch.setattr(job, "compile_models", lambda suite: None)
-    monkeypatch.setattr(job, "execute", lambda *_: Execution((), {}, False))
+def test_ctrl_c_leaves_what_is_done_and_says_how_it_goes_on(tmp_path, monkeypatch):
+    monkeypatch.setattr(run, "compile_kernels", lambda suite: None)
+    monkeypatch.setattr(run, "execute", lambda *_: False)
     with (tmp_path / "terminal.txt").open("w") as terminal:
         console = Console(file=terminal, width=200)
         assert job.run_job(load_suite(), tmp_path / "out", local(2), console) == 130
     words = (tmp_path / "terminal.txt").read_text()
-    assert "before the first case was done: nothing was measured, and nothing is written" in words
-    assert not list((tmp_path / "out").iterdir())
+    assert "Interrupted: 0 of 153 cases are done and stay in" in words
+    assert "The same command goes on from there." in words
+    assert not (tmp_path / "out" / "report.html").exists()
 
 
 def test_ctrl_c_before_the_cases_begin_says_the_same(monkeypatch, tmp_path):
@@ -80,4 +81,4 @@ def test_ctrl_c_before_the_cases_begin_says_the_same(monkeypatch, tmp_path):
     monkeypatch.setattr(job, "run_job", interrupted)
     done = CliRunner().invoke(app, ["--out", str(tmp_path)])
     assert done.exit_code == 130
-    assert done.stderr == "Interrupted before the first case: nothing is measured or written\n"
+    assert done.stderr == "Interrupted before the first case; run it again\n"

@@ -14,7 +14,8 @@ from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.journal import Journal
 from benchmarks.runner.rollout import rollout
 from benchmarks.runner.user_controller import Guarded, LateError
-from benchmarks.suites.frozen import NOMINAL, Episode
+from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.suite import NOMINAL, Episode
 from pma_gym.envs import PMAEnv
 
 SUITE = """
@@ -56,7 +57,7 @@ def own(folder, body):
 
 
 def guarded(spec):
-    return run_case(Case("nominal", spec, Episode(NOMINAL, "displacement", 300, 0)))
+    return run_case(Case(frozen_suite("nominal"), spec, Episode(NOMINAL, "displacement", 300, 0)))
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from benchmarks.executors.choice import ExecutorName, executor_named, local
 from benchmarks.executors.executor import ThisProcess, run_all, run_or_raise
 from benchmarks.executors.failures import ProcessDied, TookTooLong
 from benchmarks.executors.local import LocalProcesses
-from benchmarks.reproduction.execution import execute
 from benchmarks.runner.controller_spec import ControllerSpec
+from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.suites.reproduction import load_suite
 from tests.benchmarks.executors.pieces import (
     awkward,
@@ -104,9 +104,10 @@ def test_a_case_whose_process_dies_fails_alone(tmp_path):
     spec = ControllerSpec("Deadly", path=str(path))
     pressures = (200, 250, 300, 350, 400)
     suite = load_suite().select(["serres2008"], [spec], ["displacement"], pressures)
-    done = execute(suite, local(2))
-    assert done.complete
-    failures = {o.score.case.pressure_kpa: o.score.failure for o in done.outcomes}
+    rows = []
+    todo = pending_cases(suite, suite.entries, tmp_path)
+    assert execute(todo, local(2), tmp_path, rows.append)
+    failures = {row["pressure_kpa"]: row["failure"] for row in rows}
     assert [p for p, failure in failures.items() if failure] == [300]
     assert "its process died" in failures[300] and "exit code 3" in failures[300]
 

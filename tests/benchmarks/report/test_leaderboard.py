@@ -20,8 +20,7 @@ from benchmarks.report.publish import NUMBERS, PAGE, PAIRS, TEXT, numbers_csv, p
 from benchmarks.report.tracking_cost import spending
 from benchmarks.runner.journal import JOURNAL, Journal
 from benchmarks.runner.provenance import RUN
-from benchmarks.suites.frozen import Episode
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.suite import Episode, SuiteError
 from benchmarks.suites.target import parse_target
 from controllers import CONTROLLERS
 from pma_gym.pages.document import to_markdown
@@ -244,9 +243,8 @@ def test_a_bound_is_who_may_see():
     assert not is_bound("Mine")
 
 
-@pytest.fixture
-def folder(tmp_path):
-    """Results of the simulated suite as a run leaves them, with a failed case."""
+def write_run(tmp_path):
+    """Write results of the simulated suite as a run leaves them, with a failed case."""
     suite = simulated_suite(targets=[{"figure": "best", "measure": "displacement", "most": 1.0}])
     rows = simulated_rows(suite)
     rows[3] = simulated_row(
@@ -258,6 +256,12 @@ def folder(tmp_path):
     info = INFO | {"suite": {"name": suite.name, "digest": suite.digest, "version": 3}}
     (tmp_path / RUN).write_text(json.dumps(info))
     return suite, tmp_path
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Results of the simulated suite."""
+    return write_run(tmp_path)
 
 
 def test_page_and_numbers_are_written(folder, tmp_path):

@@ -10,8 +10,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.executors.executor import ThisProcess
-from benchmarks.reproduction.execution import Execution
-from benchmarks.reproduction.job import run_job
+from benchmarks.reproduction.job import report_again, run_job
 from benchmarks.reproduction.replay import ReplayError
 from benchmarks.reproduction.replay_page import displacement_verdict
 from benchmarks.reproduction.results import CSV_COLUMNS, FIGURES, Results
@@ -19,6 +18,7 @@ from benchmarks.reproduction.tables import columns
 from benchmarks.runner.controller_spec import ControllerSpec, parse_controllers
 from benchmarks.runner.environment_info import git_state
 from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.suite import SuiteError
 from pma_gym.pages.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
 
 CONTROLLER = """
@@ -36,14 +36,19 @@ class Half:
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory):
-    """A small run: the replay and a controller of one's own, one case of which fails."""
-    folder = tmp_path_factory.mktemp("run")
-    path = folder / "half.py"
+def suite(tmp_path_factory):
+    """The replay and a controller of one's own, one case of which fails."""
+    path = tmp_path_factory.mktemp("controllers") / "half.py"
     path.write_text(CONTROLLER)
     suite = load_suite()
     controllers = [suite.controllers[0], ControllerSpec("Half", path=str(path))]
-    suite = suite.select(["serres2008"], controllers, ["displacement"], [350, 550])
+    return suite.select(["serres2008"], controllers, ["displacement"], [350, 550])
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, suite):
+    """A small run."""
+    folder = tmp_path_factory.mktemp("run")
     with (folder / "terminal.txt").open("w") as terminal:
         code = run_job(suite, folder / "out", ThisProcess(), Console(file=terminal, width=120))
     return code, folder / "out", (folder / "terminal.txt").read_text()
@@ -74,7 +79,7 @@ def test_columns_are_headed_by_the_controllers_own_names(tmp_path):
     path.write_text(CONTROLLER)
     (half,) = parse_controllers(f"{path}:Half")
     suite = load_suite().select(["serres2008"], [half], ["displacement"], [350])
-    results = Results(suite, Execution((), {}, True), {})
+    results = Results(suite)
     assert list(columns(results, "serres2008", "displacement", "displacement")) == [
         "Measured",
         "half",
@@ -130,7 +135,32 @@ def test_markdown_links_pictures_that_exist(run):
 
 def test_nothing_partly_written_is_left(run):
     names = {path.name for path in run[1].iterdir()}
-    assert names == {"plots", "report.md", "report.html", "scores.csv", "scores.json"}
+    made = {"plots", "report.md", "report.html", "scores.csv", "scores.json"}
+    assert names == made | {"journal.jsonl", "run.json", "stations.json"}
+
+
+def test_a_run_goes_on_from_its_journal_and_writes_the_same(run, suite, tmp_path):
+    """Killed after one of its cases: the others run, and all files are as without the kill."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    lines = (run[1] / "journal.jsonl").read_text().splitlines(keepends=True)
+    (folder / "journal.jsonl").write_text(lines[0] + lines[1][:100])
+    with (tmp_path / "terminal.txt").open("w") as terminal:
+        assert run_job(suite, folder, ThisProcess(), Console(file=terminal, width=200)) == 1
+    assert "1 cases are done in" in (tmp_path / "terminal.txt").read_text()
+    for name in ("scores.csv", "plots/tracking_displacement.png"):
+        assert (folder / name).read_bytes() == (run[1] / name).read_bytes()
+    document = json.loads((folder / "scores.json").read_text())
+    assert document["run"]["cases_reused"] == 1
+    (whole,) = (each for each in document["targets"] if each["what"] == "whole job")
+    assert whole["verdict"] == "no figure"
+
+
+def test_the_report_is_written_again_from_the_journal_alone(run, suite, tmp_path):
+    page = report_again(suite, run[1], tmp_path / "page", ThisProcess())
+    assert page.read_bytes() == (run[1] / "report.html").read_bytes()
+    with pytest.raises(SuiteError, match=r"lacks 4 of 4 cases .*; run them: python -m benchmarks"):
+        report_again(suite, tmp_path / "nothing", tmp_path / "page", ThisProcess())
 
 
 def test_blocks_are_escaped_and_marked_up():
@@ -158,7 +188,7 @@ def test_blocks_are_escaped_and_marked_up():
     ],
 )
 def test_the_verdict_follows_the_errors(slope, rmse, verdict):
-    results = Results(load_suite(), Execution((), {}, True), {})
+    results = Results(load_suite())
     error = ReplayError("displacement", "displacement", 150, slope, 0.5, 0.0, rmse, 0.1, 0.1)
     assert verdict in displacement_verdict(results, [error])
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from benchmarks.reproduction.replay import ReplayError, summarise, table_angle
-from benchmarks.reproduction.score import PHASES, measured_score, score_trial
 from benchmarks.reproduction.targets import Check
+from benchmarks.runner.phase_score import PHASES, measured_score, score_trial
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.serres2008 import load_table, pressures
 from pma_gym.data.trial import Trial

@@ -12,9 +12,10 @@ import pytest
 
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess, run_all
-from benchmarks.reproduction.execution import execute
-from benchmarks.reproduction.results import Results, csv_text
+from benchmarks.reproduction.results import csv_text, scores_of
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
+from benchmarks.runner.execution import execute, pending_cases
+from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.rollout import make_environment, rollout
 from benchmarks.suites.reproduction import load_suite
 from pma_gym.plant.model import load_model
@@ -52,6 +53,13 @@ def controller_file(folder, body):
 
 def small_suite(spec, pressures=(300, 350)):
     return load_suite().select([MODEL], [spec], ["displacement"], pressures)
+
+
+def scores(suite, out, executor=None):
+    rows = []
+    todo = pending_cases(suite, suite.entries, out)
+    assert execute(todo, executor or ThisProcess(), out, rows.append)
+    return scores_of(suite, rows)
 
 
 def test_the_truth_is_the_plant_under_the_same_voltage():
@@ -118,25 +126,23 @@ def test_an_array_of_one_volt_is_a_voltage():
 def test_any_number_of_processes_gives_the_same_bits(tmp_path):
     spec = controller_file(tmp_path, "return 2.0 - 10.0 * observation.extension")
     suite = small_suite(spec)
-    one, two = (execute(suite, local(jobs)) for jobs in (1, 2))
-    assert one.complete and two.complete
-    texts = [csv_text(Results(suite, run, {}).scores) for run in (one, two)]
+    texts = [csv_text(scores(suite, tmp_path / str(jobs), local(jobs))) for jobs in (1, 2)]
     assert texts[0] == texts[1]
     assert texts[0].count("\n") == 3
 
 
 def test_a_case_that_fails_loses_only_itself(tmp_path):
     suite = small_suite(controller_file(tmp_path, "return 1 / (self.pressure - 300)"))
-    failed, done = (outcome.score for outcome in execute(suite, ThisProcess()).outcomes)
+    failed, done = scores(suite, tmp_path)
     assert "act raised ZeroDivisionError: division by zero (line 7 of written.py" in failed.failure
     assert not failed.phases
     assert done.phases and not done.failure
 
 
-def test_a_limit_of_the_rig_is_the_failure_of_its_case():
+def test_a_limit_of_the_rig_is_the_failure_of_its_case(tmp_path):
     suite = small_suite(ControllerSpec("Full", path=__file__), (150,))
-    (outcome,) = execute(suite, ThisProcess()).outcomes
-    assert "by a physical limit: muscle stretched over 12 mm" in outcome.score.failure
+    (score,) = scores(suite, tmp_path)
+    assert "by a physical limit: muscle stretched over 12 mm" in score.failure
 
 
 class Full(Returns):
@@ -184,7 +190,7 @@ def test_ctrl_c_leaves_finished_cases_and_the_earlier_results(tmp_path):
     assert process.returncode == 130, errors
     assert "Interrupted" in output and "of 9 cases are done" in " ".join(output.split())
     assert "Traceback" not in errors
-    rows = (out / "partial" / "scores.csv").read_text().splitlines()[1:]
+    rows = list(case_rows(out / JOURNAL))
     # The cases in progress are dropped: two are done when the fourth begins.
     assert 2 <= len(rows) < 9
     assert (out / "scores.csv").read_text() == "earlier\n"

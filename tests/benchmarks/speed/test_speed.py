@@ -240,7 +240,7 @@ def test_the_page_takes_its_figures_from_a_whole_run(tmp_path, monkeypatch):
         page.load_run(path)
     with pytest.raises(page.RunError, match="there is no file"):
         page.load_run(tmp_path / "none.json")
-    text = page.PAGE.read_text(encoding="utf-8")
+    text = "".join(each.read_text(encoding="utf-8") for each in page.PAGES)
     refreshed_text = page.refreshed(text, json.loads(path.read_text()))
     assert "| CartPole-v1 | 20 ms; 4 states, one Euler step | 100 | 0 % |" in refreshed_text
     assert f"<!-- figures: batches -->\n\n{page.ABSENT}" in refreshed_text

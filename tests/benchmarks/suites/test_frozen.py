@@ -10,9 +10,9 @@ import pytest
 from benchmarks.runner.case import Case, cases, run_case
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.suites.feasibility import inability
-from benchmarks.suites.frozen import NOMINAL, Episode, EpisodePlan, frozen_suite, suite_names
-from benchmarks.suites.reproduction import SuiteError
+from benchmarks.suites.frozen import frozen_suite, suite_names
 from benchmarks.suites.stations import draw_station
+from benchmarks.suites.suite import NOMINAL, Episode, EpisodePlan, SuiteError
 from controllers import CONTROLLERS
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import dump_model, load_model
@@ -23,6 +23,7 @@ FROZEN = {
     "many": (2, "b974962a2da6c913"),
     "nominal": (2, "3e4e11ff0657afc7"),
     "pressure": (2, "542aca9f3d87993f"),
+    "reproduction": (2, "871047391c0cc318"),
     "robust": (2, "176552067d898220"),
 }
 """Version and digest of every suite's numbers. Who changes a number gives it a new version."""
@@ -55,7 +56,10 @@ def test_many_draws_the_stations_of_robust_and_more():
     assert many.recipe == robust.recipe and len(many.stations) > 30 * len(robust.stations)
     one = many.station(63).model
     assert dump_model(one) == dump_model(robust.station(63).model)
-    assert [s.name for s in map(frozen_suite, suite_names()) if s.only_by_name] == ["many"]
+    assert [s.name for s in map(frozen_suite, suite_names()) if s.only_by_name] == [
+        "many",
+        "reproduction",
+    ]
 
 
 def acting(model):
@@ -84,7 +88,9 @@ def test_no_drawn_station_moves_without_a_new_version():
 def test_every_case_is_there_once_and_every_trial_as_often_as_the_others(name):
     suite = frozen_suite(name)
     assert len(set(suite.episodes)) == len(suite.episodes)
-    assert len({suite.seed_of(episode) for episode in suite.episodes}) == len(suite.episodes)
+    controller = suite.entries[0].spec.name
+    seeds = {suite.seed_of(episode, controller) for episode in suite.episodes}
+    assert len(seeds) == len(suite.episodes)
     for task in suite.tasks:
         often = Counter(e.pressure_kpa for e in suite.episodes if e.task == task)
         assert max(often.values()) - min(often.values()) <= 1
@@ -179,7 +185,7 @@ def test_controllers_are_told_the_nominal_model_whatever_the_station(tmp_path):
     path.write_text(SPY)
     spec = ControllerSpec("Spy", path=str(path))
     rows = [
-        run_case(Case("robust", spec, Episode(number, "displacement", 300, 0)))
+        run_case(Case(frozen_suite("robust"), spec, Episode(number, "displacement", 300, 0)))
         for number in (NOMINAL, 1)
     ]
     assert rows[0]["failure"] == rows[1]["failure"] == ""
@@ -188,7 +194,7 @@ def test_controllers_are_told_the_nominal_model_whatever_the_station(tmp_path):
 
 def test_all_controllers_meet_the_same_noise():
     suite = frozen_suite("robust")
-    rows = [run_case(Case("robust", ControllerSpec(n), suite.episodes[0])) for n in ("pid", "pid")]
+    rows = [run_case(Case(suite, ControllerSpec(n), suite.episodes[0])) for n in ("pid", "pid")]
     assert rows[0]["seed"] == rows[1]["seed"] == suite.seed_of(suite.episodes[0])
     assert rows[0]["phases"] == rows[1]["phases"]
 
@@ -197,7 +203,7 @@ def test_all_controllers_meet_the_same_noise():
     ("name", "message"),
     [
         ("robst", "no suite 'robst': there are .*did you mean robust"),
-        ("reproduction", "schema must be 2, got 1"),
+        ("{0}/older.toml", "schema must be 2, got 1"),
         ("{0}/broken.toml", "broken.toml is not valid TOML: line 1"),
         ("{0}/unknown.toml", "unknown tasks: juggling; known: displacement"),
         ("{0}/effect.toml", "no effect 'sarosi' that a station may have or not"),
@@ -214,6 +220,7 @@ def test_a_suite_that_cannot_be_read_says_why(name, message, tmp_path):
     )
     for file, text in {
         "broken": "schema = = 2",
+        "older": head.replace("schema = 2", "schema = 1") + plan.format("displacement"),
         "unknown": head + plan.format("juggling"),
         "effect": head + drawn + 'name = "sarosi"\nranges = {}\n',
         "range": head + drawn + 'name = "creep"\nranges = { stiffness_n_per_mm = [0.1, 1.0] }\n',

@@ -1,12 +1,16 @@
 """The suite is what the dissertation ran; a case's seed depends on its name alone."""
 
+import pickle
 from dataclasses import replace
 
 import pytest
 
+from benchmarks.runner.case import cases
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, parse_controllers
-from benchmarks.suites.reproduction import Case, SuiteError, load_suite
+from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.suite import Episode, SuiteError
 from pma_gym.data.serres2008 import pressures
+from pma_gym.plant.model import dump_model, load_model
 
 MINE = """
 class Mine:
@@ -50,9 +54,9 @@ def test_the_suite_repeats_every_trial_of_the_dissertation():
     assert suite.pressures_kpa["displacement"] == pressures("displacement")
     assert suite.pressures_kpa["rotation"] == pressures("rotation")
     assert suite.models[0] == "station"
-    assert {suite.targets.replay, *suite.targets.feedback} <= {c.name for c in suite.controllers}
+    assert {suite.goals.replay, *suite.goals.feedback} <= {c.name for c in suite.controllers}
     # The policy runs on the station alone.
-    assert len(list(suite.cases())) == (2 * 4 + 1) * 17
+    assert len(cases(suite, suite.entries)) == (2 * 4 + 1) * 17
     assert not suite.selected
 
 
@@ -64,21 +68,43 @@ def test_pictured_pressures_are_run():
 
 def test_seeds_are_frozen_and_differ():
     suite = load_suite()
-    seeds = {case.name: suite.seed_of(case) for case in suite.cases()}
+    every = cases(suite, suite.entries)
+    seeds = {case.name: suite.seed_of(case.episode, case.spec.name) for case in every}
     assert len(set(seeds.values())) == len(seeds)
     # Frozen: another value here would be another benchmark.
     assert seeds["station/pid/rotation/300"] == 536785835
 
 
-def test_seeds_do_not_depend_on_folders_or_on_other_cases():
+def test_seeds_do_not_depend_on_folders_or_on_other_cases(tmp_path):
     suite = load_suite()
-    here = Case("model.toml", ControllerSpec("Mine", path="mine.py"), "rotation", 300)
-    there = Case("/far/model.toml", ControllerSpec("Mine", path="/far/mine.py"), "rotation", 300.0)
-    assert suite.seed_of(here) == suite.seed_of(there)
+    (tmp_path / "far").mkdir()
+    folders = [tmp_path, tmp_path / "far"]
+    for folder in folders:
+        (folder / "model.toml").write_text(dump_model(load_model("serres2008")))
+    here, there = (suite.select([str(folder / "model.toml")]) for folder in folders)
+    trial = Episode(0, "rotation", 300.0, 0)
+    assert here.seed_of(trial, "Mine") == there.seed_of(trial, "Mine")
     fewer = suite.select(tasks=["rotation"])
-    for case in fewer.cases():
-        assert fewer.seed_of(case) == suite.seed_of(case)
-    assert replace(suite, seed=1).seed_of(here) != suite.seed_of(here)
+    for case in cases(fewer, fewer.entries):
+        name = case.spec.name
+        assert fewer.seed_of(case.episode, name) == suite.seed_of(case.episode, name)
+    assert replace(suite, seed=1).seed_of(trial, "pid") != suite.seed_of(trial, "pid")
+
+
+def test_rows_of_another_model_are_not_used_again_and_fewer_trials_are(tmp_path):
+    suite, path = load_suite(), tmp_path / "model.toml"
+    path.write_text(dump_model(load_model("serres2008")))
+    one = suite.select([str(path)])
+    path.write_text(dump_model(load_model("station")))
+    other = suite.select([str(path)])
+    assert len({suite.digest, one.digest, other.digest}) == 3
+    assert suite.select(tasks=["rotation"], pressures_kpa=[300]).digest == suite.digest
+
+
+def test_a_suite_travels_to_other_processes_with_its_models():
+    suite = load_suite().select(["serres2008", "station"], tasks=["rotation"])
+    there = pickle.loads(pickle.dumps(suite))
+    assert (there.models, there.digest) == (suite.models, suite.digest)
 
 
 def test_a_selection_says_so():

@@ -6,8 +6,8 @@ import pytest
 pytest.importorskip("stable_baselines3")
 
 from benchmarks.suites.frozen import frozen_suite
-from benchmarks.suites.reproduction import SuiteError
 from benchmarks.suites.stations import draw_station
+from benchmarks.suites.suite import SuiteError
 from benchmarks.training import stations
 from benchmarks.training.stations import (
     TRAINING,

@@ -8,7 +8,8 @@ import pytest
 from benchmarks.report.errors import Errors, measures
 from benchmarks.report.statistics import interquartile_mean
 from benchmarks.runner.controller_spec import ControllerError, parse_controllers
-from benchmarks.suites.frozen import Episode, frozen_suite
+from benchmarks.suites.frozen import frozen_suite
+from benchmarks.suites.suite import Episode
 from benchmarks.training.study.cells import CHANGES, cells
 from benchmarks.training.study.figures import reached
 from benchmarks.training.study.pooled import Pool

@@ -7,9 +7,10 @@ import control
 import numpy as np
 import pytest
 
-from controllers.models.local_model import SENSORS, step_response
+from controllers.models.local_model import step_response
 from controllers.models.nominal_motion import nominal_motion
 from controllers.models.operating_range import rest_voltages
+from pma_gym.data.signals import SIGNALS
 from pma_gym.envs import PMAEnv, StationInfo
 from pma_gym.plant.forms.linear import linearize
 from pma_gym.plant.model import load_model
@@ -34,7 +35,7 @@ def full_response(where: StationInfo, position: float, steps: int) -> np.ndarray
     rest = plant.settle(0.0, pressure=where.pressure).zero_contraction
     radius = where.model.parameters["rotor"].radius if quantity == "rotation" else 1.0
     system = linearize(plant, where.pressure, rest - radius * position, "relaxing")
-    sensor = where.model.parameters[SENSORS[quantity]]
+    sensor = where.model.parameters[SIGNALS[quantity].sensor]
     lagged = control.tf([1.0], [1.0 / (2.0 * math.pi * sensor.bandwidth), 1.0])
     times = where.period * np.arange(steps + 1)
     return control.step_response(lagged * system[quantity, "motor_voltage"], times).outputs[1:]

@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
 from pma_gym.discovery.preparation.noise import (
@@ -160,8 +161,8 @@ def test_continuous_readings_have_no_step():
 def test_the_daq_shows_its_step():
     readings = measured(STATION, 2, rate=128.0)
     trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
-    for channel, (_, line) in enumerate(sensors.SENSORS.values()):
-        assert step_between(trials, channel) == pytest.approx(line.resolution, rel=1e-3)
+    for channel, signal in enumerate(sensors.SENSORS.values()):
+        assert step_between(trials, channel) == pytest.approx(signal.resolution, rel=1e-3)
 
 
 def test_white_noise_has_no_slow_part_and_a_slow_sine_is_all_slow():
@@ -209,7 +210,7 @@ def test_noise_of_a_few_readings_comes_from_repeats():
 @pytest.mark.parametrize(("level", "coarse"), [(0.3e3, True), (2.3e3, False)])
 def test_a_step_that_noise_hides_makes_no_sensor_coarse(level, coarse):
     """Whole kPa in a file are nothing to a signal that scatters by more."""
-    known = Level(level, "repeats", {}, 1e3, 0.479e3, 40)
-    fine = Level(1.0, "rest segments", {}, 0.0, 1.0, 40)
+    known = Level(SIGNALS["pressure"], level, "repeats", {}, 1e3, 0.479e3, 40)
+    fine = Level(SIGNALS["load"], 1.0, "rest segments", {}, 0.0, 1.0, 40)
     sensors = coarse_sensors([fine, fine, fine, known])
     assert [each.name for each in sensors] == (["sensor_quantisation"] if coarse else [])

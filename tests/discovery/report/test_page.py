@@ -44,7 +44,7 @@ def test_the_page_needs_nothing_else_and_says_the_verdict_first(diagnoses, page_
     tags.feed(page)
     assert not tags.open
     assert all(each.startswith("data:image/png;base64,") for each in tags.loaded)
-    text = re.sub(r"<[^>]+>", " ", page.partition("<body>")[2])
+    text = re.sub(r"<[^>]+>", " ", page.rpartition("<body>")[2])
     assert text.index(diagnosis.sentence) < text.index("What to do now")
     assert not re.search(r"\bnan\b|None|\{|_friction", re.sub(r"[\w.]+_n_\w+", "", text))
     assert "Seed" in text

@@ -16,11 +16,11 @@ from pma_gym.discovery.verdict.flexible_regression import Explained, explained, 
 from pma_gym.discovery.verdict.worsened import worsened
 from pma_gym.discovery.workflow import diagnose, refit
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.plant import Plant
+from pma_gym.plant.rigs import RIGS
 from tests.discovery.laboratory import LEVELS, OFF, STATION, commanded, diagnosed, measured
 
-TRUE = dict(zip(OUTPUTS, LEVELS, strict=True))
+TRUE = dict(zip(RIGS["station"].outputs, LEVELS, strict=True))
 
 
 def logs(trials):
@@ -65,7 +65,7 @@ def test_a_tolerance_comes_before_rest_and_repeats_before_a_tolerance():
     plant = Plant(STATION)
     repeats = [plant.simulate(commanded(1)[0], seed=seed) for seed in (1, 2, 3)]
     levels = floors(repeats, stated)
-    for name in OUTPUTS:
+    for name in RIGS["station"].outputs:
         assert levels[name].source == "repeats"
         assert levels[name].level == pytest.approx(TRUE[name], rel=0.15)
 
@@ -252,7 +252,8 @@ def test_an_exact_sensor_agrees_by_a_tolerance_alone():
     silent = [Plant(STATION).simulate(each, noise=False) for each in commanded(4)]
     assert refit(silent, STATION).verdict == "undecidable"
     diagnosis = refit(
-        in_data_set(silent, tolerance={name: 2 * TRUE[name] for name in OUTPUTS}), STATION
+        in_data_set(silent, tolerance={name: 2 * level for name, level in TRUE.items()}),
+        STATION,
     )
     assert diagnosis.verdict == "agrees"
 

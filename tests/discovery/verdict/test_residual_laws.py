@@ -56,6 +56,7 @@ def test_a_straight_line_is_left_to_parameters():
     assert abs(np.polyfit(law.at, law.law, 1)[0] * np.ptp(law.at)) < 0.1 * np.max(law.law)
 
 
+@pytest.mark.campaign
 def test_an_effect_outside_the_catalogue_is_unknown():
     truth = STATION.with_effects(BUMP).replace(OFF)
     trials = measured(truth, 6, rate=32.0, kinds=(0,), kpa=(240.0, 300.0))

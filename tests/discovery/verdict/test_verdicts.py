@@ -118,6 +118,7 @@ def test_an_effect_closes_the_gap_on_trials_it_has_not_seen():
     assert load.after == pytest.approx(load.floor, rel=0.1)
 
 
+@pytest.mark.campaign
 def test_two_effects_are_both_named():
     diagnosis = diagnosed("pair")
     assert diagnosis.verdict == "effect"

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair, pairs
 from pma_gym.plant.model import Model
@@ -47,9 +48,10 @@ def both_absolute(model: Model, trials: Sequence[Trial]) -> tuple[float, float] 
 
 
 def _may_be(trial: Trial) -> bool:
-    wished = trial.commands.get("pressure_command")
+    command = SIGNALS["pressure_command"]
+    wished = trial.commands.get(command.name)
     contraction = trial.measurements.get("contraction")
-    if wished is None or contraction is None or "regulator_voltage" in trial.commands:
+    if wished is None or contraction is None or command.voltage in trial.commands:
         return False
     return float(np.nanmin(wished)) >= LEAST and bool(np.isfinite(contraction).any())
 

@@ -61,7 +61,7 @@ def pairs(model: Model, trials: Sequence[Trial], pressure: float = 0.0) -> list[
 
 
 def _with_pressure(trial: Trial, pressure: float) -> Trial:
-    if not pressure or "pressure_command" not in trial.commands:
+    wished = trial.commands.get("pressure_command")
+    if not pressure or wished is None:
         return trial
-    moved = trial.commands["pressure_command"] + pressure
-    return replace(trial, commands={**trial.commands, "pressure_command": moved})
+    return replace(trial, commands={**trial.commands, "pressure_command": wished + pressure})

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.plant import sensors
-from pma_gym.plant.compiled_model import OUTPUTS
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.units import SI_FACTORS
@@ -33,9 +33,6 @@ SURE = 6.0
 
 BETTER = 0.5
 """Largest share of the misfit of a beginning at rest that one in motion leaves."""
-
-LEAST = {"contraction": 1.5e-3, "rotation": 0.1, "load": 20.0, "pressure": 15e3}
-"""Least first speed that counts as motion (m/s, rad/s, N/s, Pa/s)."""
 
 LAST_S, SWEEP_S, AT_REST_S = 0.3, 1.0, 0.3
 """Time of the way there that has the first speed of the commands; time that it takes for their
@@ -86,7 +83,7 @@ def _said_speed(quantity: str, speed: float) -> str:
     """A first speed (SI a second) in words, with what moves."""
     column = BY_QUANTITY[quantity]
     said, unit = f"{abs(speed) / SI_FACTORS[column.unit]:.3g}", column.unit
-    if quantity == "contraction":
+    if SIGNALS[quantity].shortens:
         said, unit = f"{abs(speed):.2g}", "m"
     return f"at {said} {unit}/s ({column.name}), not at rest"
 
@@ -101,7 +98,7 @@ def moving_start(plant: Plant, trial: Trial) -> str:
     if not seen:
         return ""
     # Contraction's speed is named where it is known, else the most certain one.
-    quantity, speed, _ = max(seen, key=lambda each: (each[0] == "contraction", each[2]))
+    quantity, speed, _ = max(seen, key=lambda each: (SIGNALS[each[0]].shortens, each[2]))
     way = way_there(plant.model, trial, trial)
     if way is None:
         # No command moves: the readings settle, from where nobody knows.
@@ -131,7 +128,7 @@ def with_start(plant: Plant, trial: Trial, whole: Trial, moving: str) -> Start |
     except ValueError:
         return None
     scale = FORGOTTEN * _deviations(plant.model)
-    measured = np.array([name in trial.measurements for name in OUTPUTS])
+    measured = np.array([name in trial.measurements for name in plant.outputs])
     apart = np.any(np.abs(other - rest)[measured] > scale[measured, None], axis=0)
     last = int(np.flatnonzero(apart)[-1]) if apart.any() else 0
     begin = float(trial.time[0])
@@ -209,7 +206,7 @@ def _first_speed(trial: Trial, quantity: str) -> tuple[str, float, float] | None
     line = float(np.polyfit(time[:count], values[:count], 1)[0])
     error = noise / float(np.sqrt(np.sum((time[:count] - time[:count].mean()) ** 2)))
     sure = abs(line) / error
-    if sure < SURE or abs(line) < LEAST[quantity] or coefficients[1] / line < 0.3:
+    if sure < SURE or abs(line) < SIGNALS[quantity].least_rate or coefficients[1] / line < 0.3:
         return None
     return quantity, line, sure
 
@@ -229,9 +226,9 @@ def _stands(model: Model, trial: Trial) -> bool:
 
 
 def _outputs(plant: Plant, trial: Trial) -> Array:
-    """What the sensors would read (SI), shape (4, rows)."""
+    """What the sensors would read (SI), shape (signals, rows)."""
     simulated = plant.simulate(trial, noise=False).measurements
-    return np.stack([simulated[name] for name in OUTPUTS])
+    return np.stack([simulated[name] for name in plant.outputs])
 
 
 def _from_no_load(plant: Plant, trial: Trial) -> Array:
@@ -246,14 +243,13 @@ def _from_no_load(plant: Plant, trial: Trial) -> Array:
 
 
 def _deviations(model: Model) -> Array:
-    steps = np.array([line.resolution for _, line in sensors.SENSORS.values()])
-    return np.hypot(sensors.noise_levels(model), steps / np.sqrt(12.0))
+    return sensors.deviations(model)
 
 
 def _misfit(model: Model, trial: Trial, simulated: Array, rows: NDArray[np.bool_]) -> float:
     """Chi-square of the first readings, each signal's zero and size free, by the sensors' noise."""
     total = 0.0
-    for name, row, width in zip(OUTPUTS, simulated, _deviations(model), strict=True):
+    for name, row, width in zip(model.rig.outputs, simulated, _deviations(model), strict=True):
         measured = trial.measurements.get(name)
         if measured is None:
             continue

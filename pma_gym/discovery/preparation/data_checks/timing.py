@@ -9,10 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import MEASUREMENTS
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.data_checks.simulated import Pair
-from pma_gym.discovery.preparation.data_checks.units import ALIKE, LEAST_SPAN
+from pma_gym.discovery.preparation.data_checks.units import ALIKE
 
 Array = NDArray[np.float64]
 
@@ -73,7 +74,7 @@ def words(late: dict[str, float]) -> list[str]:
 def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
     """Lag of a signal (s), and whether it is clear; None where the signal hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 20 or np.ptp(simulated) < LEAST_SPAN[quantity]:
+    if time.size < 20 or np.ptp(simulated) < SIGNALS[quantity].least_span:
         return None
     if abs(float(np.corrcoef(simulated, measured)[0, 1])) < ALIKE / 2.0:
         return None

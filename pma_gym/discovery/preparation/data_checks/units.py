@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.discovery.preparation.data_checks.simulated import ATMOSPHERE, Pair
 
 Array = NDArray[np.float64]
@@ -102,9 +103,6 @@ PRESSURE_COMMAND_UNITS = (
     Unit(1.0, "absolute pressure", -ATMOSPHERE, command=True),
 )
 
-LEAST_SPAN = {"contraction": 1e-3, "rotation": 0.05, "load": 20.0, "pressure": 15e3}
-"""Least span of a simulated signal that shows a slope (m, rad, N, Pa)."""
-
 ALIKE = 0.9
 """Least correlation of measured and simulated that shows a slope."""
 
@@ -147,13 +145,13 @@ class Slope:
 def slope_of(pair: Pair, quantity: str) -> Slope | None:
     """Robust slope of a measured signal on the simulated one; None where it hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 8 or np.ptp(simulated) < LEAST_SPAN[quantity] or np.ptp(measured) == 0.0:
+    if time.size < 8 or np.ptp(simulated) < SIGNALS[quantity].least_span or np.ptp(measured) == 0.0:
         return None
     best = max(_correlations(time, simulated, measured), key=lambda each: abs(each[0]) + each[2])
     alike, lag, _ = best
     late = np.interp(time - lag, time, simulated)
     level = float(np.median(simulated))
-    large = abs(level) > LEAST_SPAN[quantity]
+    large = abs(level) > SIGNALS[quantity].least_span
     return Slope(
         _robust_slope(late, measured),
         alike,
@@ -201,13 +199,19 @@ def motion_unit(quantity: str, pair: Pair) -> Unit | None:
     if seen is None or abs(seen.alike) < ALIKE or AS_GIVEN[0] <= seen.slope <= AS_GIVEN[1]:
         return None
     units = MOTION_UNITS[quantity]
-    if "load_command" in pair.trial.commands and "motor_voltage" not in pair.trial.commands:
+    if _asks_for(pair, "load_command"):
         units += COMMAND_UNITS.get(quantity, ())
     fitting = [unit for unit in units if _distance(seen.slope, unit.factor) < NEAR[quantity]]
     if not fitting:
         return None
     unit = min(fitting, key=lambda each: _distance(seen.slope, each.factor))
     return unit if _is_borne_out(quantity, pair, seen, unit) else None
+
+
+def _asks_for(pair: Pair, command: str) -> bool:
+    """Whether a trial gives a command in its own unit, not as a voltage."""
+    commands = pair.trial.commands
+    return command in commands and SIGNALS[command].voltage not in commands
 
 
 def _distance(slope: float, factor: float) -> float:
@@ -221,7 +225,7 @@ _WITNESS = {"contraction": "rotation", "rotation": "contraction"}
 
 def _is_borne_out(quantity: str, pair: Pair, seen: Slope, unit: Unit) -> bool:
     """Whether something beside the slope speaks for a unit."""
-    if unit.factor == -1.0 or quantity == "load":
+    if unit.factor == -1.0 or SIGNALS[quantity].is_force:
         # No physics turns a motion round; a drive's load follows its command.
         return True
     if abs(seen.level / unit.factor - 1.0) < LEVEL:
@@ -242,11 +246,12 @@ def pressure_unit(pairs: Sequence[Pair]) -> Unit | None:
         pairs: trials beside their simulations; all that measure pressure count.
     """
     simulated, measured = _levels(pairs)
-    if not simulated.size or np.max(simulated) < LEAST_SPAN["pressure"]:
+    if not simulated.size or np.max(simulated) < SIGNALS["pressure"].least_span:
         return None
     if _off(simulated, measured, Unit(1.0, "")) < PRESSURE_FAR:
         return None
-    commanded = all("regulator_voltage" not in pair.trial.commands for pair in pairs)
+    volts = SIGNALS["pressure_command"].voltage
+    commanded = not any(volts in pair.trial.commands for pair in pairs)
     units = [*PRESSURE_UNITS, *(PRESSURE_COMMAND_UNITS if commanded else ())]
     best = min(units, key=lambda unit: _off(simulated, measured, unit))
     return best if _off(simulated, measured, best) < PRESSURE_NEAR else None
@@ -267,7 +272,7 @@ def _levels(pairs: Sequence[Pair]) -> tuple[Array, Array]:
 def _off(simulated: Array, measured: Array, unit: Unit) -> float:
     """Median share by which measured pressures miss what a unit makes of simulated ones."""
     expected = unit.factor * simulated + unit.offset
-    scale = abs(unit.factor) * max(float(np.median(simulated)), LEAST_SPAN["pressure"])
+    scale = abs(unit.factor) * max(float(np.median(simulated)), SIGNALS["pressure"].least_span)
     away = np.median(np.abs(measured - expected)) / scale
     if unit.offset:
         # The air of a high town weighs less: its share is not held against the unit.

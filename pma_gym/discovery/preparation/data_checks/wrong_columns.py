@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pma_gym.data.datasets.dataset import Dataset, NamedTrial
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.preparation.data_checks.absolute import both_absolute
 from pma_gym.discovery.preparation.data_checks.clock import wrong_clock
@@ -102,7 +103,7 @@ def _zero(quantity: str, unit: Unit, simulated: Sequence[Pair]) -> float:
 
     Its zero is free in every trial, so a whole millimetre will do.
     """
-    if quantity != "contraction":
+    if not SIGNALS[quantity].shortens:
         return 0.0
     signals = [pair.signal(quantity)[1:] for pair in simulated]
     away = float(np.median([np.median(s) - np.median(m) / unit.factor for s, m in signals]))
@@ -138,7 +139,7 @@ def _of_pressure(
 
 def _of_both(dataset: Dataset, named: Sequence[NamedTrial], given: float, off: float) -> str:
     names = [each.name for each in named]
-    both = any("pressure" in each.trial.measurements for each in named)
+    both = any(each.trial.measures("pressure") for each in named)
     what = (
         "pressure_command_kpa and pressure_kpa both read" if both else "pressure_command_kpa reads"
     )

@@ -23,6 +23,7 @@ def size_of(dataset, name):
     return diagnosis.effects[0].parameters
 
 
+@pytest.mark.campaign
 def test_missing_rows_cut_a_trial_and_the_effect_is_still_named(tmp_path):
     folder = write(tmp_path / "lab", [without(each, 2.0, 3.4) for each in logs(seconds=8.0)])
     data = checked(folder)

@@ -1,11 +1,9 @@
 """A trial's figures, phase by phase, and the dissertation's own beside them."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.suites.reproduction import Case
 from pma_gym.data.protocol import PROTOCOLS
 from pma_gym.data.serres2008 import load_table
 from pma_gym.data.trial import Trial
@@ -60,29 +58,6 @@ class PhaseScore:
     def mean(self) -> float:
         """Position in the middle of the phase, on the line: its mean over the 5 s (unit)."""
         return self.intercept + self.slope * PHASE_DURATION / 2.0
-
-
-@dataclass(frozen=True)
-class Score:
-    """A case and its figures.
-
-    Attributes:
-        case: what was run.
-        seed: of its episode.
-        phases: figures by phase; none if it failed.
-        failure: why it has no figures; empty if it has.
-        steps: control steps that it took.
-        step_seconds: time spent inside the environment's steps (s).
-        seconds: time that the case took: environment, controller, scoring (s).
-    """
-
-    case: Case
-    seed: int
-    phases: Mapping[str, PhaseScore] = field(default_factory=dict)
-    failure: str = ""
-    steps: int = 0
-    step_seconds: float = 0.0
-    seconds: float = 0.0
 
 
 def score_trial(trial: Trial, task: str) -> dict[str, PhaseScore]:

@@ -1,0 +1,184 @@
+"""What a lab does with a driven axis: its loop, its references, its sensor, its files."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hidden_effects.rigs import effect_size, files
+from benchmarks.hidden_effects.rigs.control import Controller
+from benchmarks.hidden_effects.rigs.excitation import Reference, draw_lengths, draw_reference
+from benchmarks.hidden_effects.rigs.lab_names import draw_names
+from benchmarks.hidden_effects.rigs.laws import HiddenEffect
+from benchmarks.hidden_effects.rigs.rig import Rig, draw_joint, draw_slide
+from benchmarks.hidden_effects.rigs.sensing import Sensed, Sensor, draw_sensor
+from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
+from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
+from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
+
+SIMULATORS = {"own": stick_slip.simulate, "MuJoCo": mujoco_axis.simulate}
+"""What computes the motion."""
+
+PILOT = 12.0
+"""Seconds of the first file by which an effect's size is counted, and two periods."""
+
+FARTHEST = 3.0
+"""An open loop that leads farther than so many half strokes is closed."""
+
+COLUMNS = {
+    "slide": ("load_command_n", "contraction_mm", 1e3),
+    "joint": ("torque_n_m", "angle_rad", 1.0),
+}
+"""Command, position, and the position's unit in SI units, by kind of rig."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """One file: the true motion and what was logged.
+
+    Attributes:
+        motion: the true one, with the command.
+        exact: what the sensor would read without noise (m, rad).
+        readings: of the sensor.
+    """
+
+    motion: Motion
+    exact: np.ndarray
+    readings: np.ndarray
+
+
+@dataclass(frozen=True)
+class DrivenCampaign:
+    """One rig and its files.
+
+    Attributes:
+        rig: the rig.
+        believed: as the lab's model has it.
+        sensor: of its position.
+        references: of its files.
+        repeats: by number of a file, from 0, the earlier one that it repeats.
+        bandwidth: of its loop (Hz); 0 where it is open.
+        simulator: name of what computes it.
+        seed: of the noise.
+    """
+
+    rig: Rig
+    believed: Rig
+    sensor: Sensor
+    references: Sequence[Reference]
+    repeats: Mapping[int, int]
+    bandwidth: float
+    simulator: str
+    seed: Sequence[int]
+
+    def run(self, effects: Sequence[HiddenEffect], i: int, seconds: float = math.inf) -> Run:
+        """File i, or its first seconds."""
+        rig, reference = self.rig, self.references[i]
+        rows = int(min(len(reference.q), seconds * rig.rate))
+        noise = self._noise(i)
+        between = [r for r in (each.reading() for each in effects) if r is not None]
+        sensed = Sensed(self.sensor, noise, between, 1.0 / rig.rate)
+        rests = self._rests(effects)
+        controller = Controller(self.believed, reference, sensed, self.bandwidth, rests)
+        transmission = Transmission()
+        for each in effects:
+            transmission = each.transmission(transmission)
+        start = (float(reference.q[0]), 0.0)
+        simulate = SIMULATORS[self.simulator]
+        motion = simulate(rig, tuple(effects), transmission, controller, rows, start)
+        controller.end(float(motion.q[-1]))
+        return Run(motion, np.array(sensed.exact), np.array(controller.readings))
+
+    def ratio(self, effect: HiddenEffect) -> float:
+        """Size r of an effect, by the beginning of the first file."""
+        pilot = self.run((effect,), 0, PILOT + 2.0 / self.rig.frequency)
+        changed = effect_size.change(self.rig, [pilot.motion], [pilot.exact])
+        return effect_size.size(changed, self.sensor.rms)
+
+    def held(self, effects: Sequence[HiddenEffect]) -> "DrivenCampaign":
+        """The same, with its loop closed where it would lead away without."""
+        if self.bandwidth:
+            return self
+        files_run = (self.run(effects, i) for i in range(len(self.references)))
+        far = max(float(np.abs(each.motion.q).max()) for each in files_run)
+        if far <= FARTHEST * self.rig.travel:
+            return self
+        return replace(self, bandwidth=2.0 * self.rig.frequency, repeats={})
+
+    def texts(self, effects: Sequence[HiddenEffect]) -> dict[str, str]:
+        """Texts of the lab's folder by name."""
+        command, position, factor = COLUMNS[self.rig.kind]
+        sign = -1.0 if self.rig.kind == "slide" else 1.0
+        tables, limit = [], 0.0
+        for i in range(len(self.references)):
+            run = self.run(effects, i)
+            forces = sign * run.motion.command
+            limit = max(limit, float(np.abs(forces).max()))
+            tables.append(
+                {
+                    command: (forces, files.digits(2.0 * limit / 2**16)),
+                    position: (factor * run.readings, files.digits(factor * self.sensor.step)),
+                }
+            )
+        model = files.MODELS[self.rig.kind](self.believed, limit)
+        # Without a repeat or a rest nothing but the sensor's data sheet says how much is noise.
+        stated = (
+            {} if self.repeats or self._rests(effects) else {position: factor * self.sensor.rms}
+        )
+        names = draw_names(np.random.default_rng((*self.seed, 11)))
+        return files.folder(self.rig.rate, tables, self.repeats, model, stated, names)
+
+    def truth(self) -> dict[str, Any]:
+        """What nobody must read before the diagnosis is made, besides the effects."""
+        _, position, factor = COLUMNS[self.rig.kind]
+        return {
+            "simulator": self.simulator,
+            "rig": vars(self.rig),
+            "believed": vars(self.believed),
+            "loop_hz": self.bandwidth,
+            "seconds": [len(each.q) / self.rig.rate for each in self.references],
+            "sensor": {"kind": self.sensor.kind, "step": self.sensor.step * factor},
+            "noise": {position: self.sensor.rms * factor},
+            "noise_kinds": self.sensor.noise.names,
+        }
+
+    def _rests(self, effects: Sequence[HiddenEffect]) -> bool:
+        """Whether it rests while its drive is off: where nothing else moves it."""
+        pulled = any(each.force(0.0, 0.0, 0.0) for each in effects)
+        return not pulled and not self.rig.gravity * math.sin(self.rig.gravity_angle)
+
+    def _noise(self, i: int) -> np.ndarray:
+        rng = np.random.default_rng((*self.seed, i, 7))
+        rows = np.arange(len(self.references[i].q))
+        return self.sensor.noise.draw(rng, rows / self.rig.rate)
+
+
+def draw_driven(
+    rng: np.random.Generator, kind: str, simulator: str, seed: Sequence[int]
+) -> DrivenCampaign:
+    """A campaign with a slide or a joint, whose numbers the lab knows to a tenth or so."""
+    rig = draw_joint(rng) if kind == "joint" else draw_slide(rng, springs=False)
+    believed = replace(
+        rig,
+        inertia=rig.inertia * rng.uniform(0.9, 1.1),
+        damping=rig.damping * rng.uniform(0.85, 1.15),
+        stiffness=rig.stiffness * rng.uniform(0.93, 1.07),
+        gravity=rig.gravity * rng.uniform(0.93, 1.07),
+    )
+    held = bool(rig.stiffness or rig.gravity)
+    opened = rng.random() < (0.5 if held else 0.15)
+    bandwidth = 0.0 if opened else min(rig.frequency * rng.uniform(1.5, 4.0), rig.rate / 25.0)
+    lengths = draw_lengths(rng, rig.rate, rig.frequency)
+    if opened and not held:
+        lengths = [max(5.0, min(8.0, each)) for each in lengths]
+    references = [
+        draw_reference(rng, rig.travel, rig.frequency, rig.rate, round(each * rig.rate))
+        for each in lengths
+    ]
+    repeats = {}
+    if opened and rng.random() < 0.85:
+        references[1], repeats = references[0], {1: 0}
+    sensor = draw_sensor(rng, rig)
+    return DrivenCampaign(rig, believed, sensor, references, repeats, bandwidth, simulator, seed)

@@ -1,0 +1,107 @@
+"""How large a hidden effect is: what it changes in the readings that no refit of the model can.
+
+    r = rms of that change / rms of the sensor's noise
+
+Along the true motion the lab's model lacks a force d(t). To first order its positions are off by e,
+
+    inertia e'' + damping e' + (stiffness + gravity cos(q + angle)) e = -d(t),
+
+which begins anew in each window, for the model may start where it likes there. What changes of
+inertia, damping, stiffness and gravity, and of the start of each window, do the same way is taken
+off by least squares; what is left is the change. A sensor's error is added to e as it is.
+Windows last a second, or the slowest period of the reference where that is longer.
+"""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion
+
+Array = np.ndarray
+
+WINDOW = 1.0
+"""Shortest window (s)."""
+
+SLOWEST = 0.2
+"""Slowest part of a reference over the fastest."""
+
+
+def change(rig: Rig, motions: Sequence[Motion], exact: Sequence[Array]) -> Array:
+    """What the effect changes beyond a refit (m, rad), rows of all windows in turn.
+
+    Args:
+        rig: the axis without what it hides.
+        motions: of the axis with it, one a file.
+        exact: what the sensor would read without noise, one a file.
+    """
+    rows = round(rig.rate * max(WINDOW, 1.0 / (SLOWEST * rig.frequency)))
+    parts = [_windows(rig, m, e, rows) for m, e in zip(motions, exact, strict=True)]
+    columns = np.concatenate([part for part in parts if part is not None], axis=1)
+    # (regressors, windows, rows): each window gives up its own starts first.
+    wanted, known, starts = columns[0], columns[1:-2], columns[-2:]
+    basis = np.linalg.qr(starts.transpose(1, 2, 0))[0]
+    wanted, known = _without(basis, wanted), _without(basis, known)
+    table = known.reshape(len(known), -1).T
+    scales = np.linalg.norm(table, axis=0)
+    table = table[:, scales > 1e-9 * scales.max()]
+    table = table / np.linalg.norm(table, axis=0)
+    values = wanted.ravel()
+    return values - table @ np.linalg.lstsq(table, values, rcond=1e-10)[0]
+
+
+def size(changed: Array, noise: float) -> float:
+    """Size r of a change."""
+    return float(math.sqrt(np.mean(changed**2)) / noise)
+
+
+def _without(basis: Array, signals: Array) -> Array:
+    shares = np.einsum("wrk,...wr->...wk", basis, signals)
+    return signals - np.einsum("wrk,...wk->...wr", basis, shares)
+
+
+def _windows(rig: Rig, motion: Motion, exact: Array, rows: int) -> Array | None:
+    """Responses of one file, shape (regressors, windows, rows)."""
+    count = len(motion.q) // rows
+    if not count:
+        rows, count = len(motion.q), 1
+        return None if rows < 10 else _responses(rig, motion, exact, rows, count)
+    return _responses(rig, motion, exact, rows, count)
+
+
+def _responses(rig: Rig, motion: Motion, exact: Array, rows: int, count: int) -> Array:
+    q, v, a = motion.q, motion.v, motion.a
+    weight = rig.gravity * np.sin(q + rig.gravity_angle)
+    lacking = rig.inertia * a + rig.damping * v + rig.stiffness * q + weight - motion.command
+    forces = [lacking, a, v, q if rig.stiffness else 0.0 * q]
+    forces += [np.sin(q + rig.gravity_angle), np.cos(q)] if rig.gravity else [0.0 * q, 0.0 * q]
+    shaped = np.array(forces)[:, : count * rows].reshape(len(forces), count, rows)
+    stiffness = rig.stiffness + rig.gravity * np.cos(q + rig.gravity_angle)
+    stiffness = stiffness[: count * rows].reshape(count, rows)
+    response = _integrated(rig, shaped, stiffness)
+    response[0] += (exact - q)[: count * rows].reshape(count, rows)
+    return response
+
+
+def _integrated(rig: Rig, forces: Array, stiffness: Array) -> Array:
+    """Responses to forces from rest, then to a start of 1 and to a speed of 1: trapezoidal rule."""
+    kinds, count, rows = forces.shape
+    h, zeros = 1.0 / rig.rate, np.zeros((2, count))
+    out = np.zeros((kinds + 2, count, rows))
+    e, v = np.zeros((kinds + 2, count)), np.zeros((kinds + 2, count))
+    e[-2], v[-1] = 1.0, 1.0
+    out[:, :, 0] = e
+    for k in range(1, rows):
+        before = np.concatenate([forces[:, :, k - 1], zeros])
+        after = np.concatenate([forces[:, :, k], zeros])
+        pull = before + after - stiffness[:, k - 1] * e - rig.damping * v
+        # Position by the mean of both speeds, put into the equation of the new speed.
+        k_new = stiffness[:, k]
+        right = v * rig.inertia + 0.5 * h * (pull - k_new * (e + 0.5 * h * v))
+        v_new = right / (rig.inertia + 0.5 * h * rig.damping + 0.25 * h * h * k_new)
+        e = e + 0.5 * h * (v + v_new)
+        v = v_new
+        out[:, :, k] = e
+    return out

@@ -1,0 +1,107 @@
+"""A case as the lab's folder: CSV files, dataset.toml and the model that the lab believes in."""
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from benchmarks.hidden_effects.rigs.lab_names import OURS, LabNames
+from benchmarks.hidden_effects.rigs.rig import Rig
+
+Array = np.ndarray
+
+Table = Mapping[str, tuple[Array, int]]
+"""Columns of a file by name: values, shape (rows,), and decimals."""
+
+
+def folder(
+    rate: float,
+    tables: Sequence[Table],
+    repeats: Mapping[int, int],
+    model: str,
+    tolerance: Mapping[str, float],
+    names: LabNames = OURS,
+) -> dict[str, str]:
+    """Texts of a data set's files by name.
+
+    Args:
+        rate: of all files (Hz).
+        tables: of the files.
+        repeats: by number of a file, from 0, the earlier one that it repeats.
+        model: text of the model.
+        tolerance: by column, where the lab states one.
+        names: that the lab has for its columns.
+    """
+    texts = {_name(i): _csv(rate, table, names) for i, table in enumerate(tables)}
+    lines = ['title = "Logs of a drive"', 'model = "model.toml"']
+    lines += names.lines(list(tables[0]))
+    if tolerance:
+        lines += ["", "[tolerance]", *(f"{key} = {_number(x)}" for key, x in tolerance.items())]
+    for i in range(len(tables)):
+        lines += ["", f'[trials."{_name(i)}"]', f"order = {i + 1}"]
+        if i in repeats:
+            lines.append(f'repeat_of = "{_name(repeats[i])}"')
+    return texts | {"dataset.toml": "\n".join(lines) + "\n", "model.toml": model}
+
+
+def digits(step: float) -> int:
+    """Decimals that a column needs for a step: two more than its own."""
+    return max(0, math.ceil(-math.log10(step)) + 2)
+
+
+def _name(i: int) -> str:
+    return f"run_{i + 1:02d}.csv"
+
+
+def _csv(rate: float, table: Table, names: LabNames) -> str:
+    header, columns = [names.time], []
+    for ours, (values, places) in table.items():
+        name, factor = names.of(ours)
+        decimals = names.decimals(ours, places)
+        header.append(name)
+        # Adding 0 turns -0.0 into 0.0.
+        columns.append([f"{value + 0.0:.{decimals}f}" for value in values / factor])
+    rows = [",".join(header)]
+    for i, cells in enumerate(zip(*columns, strict=True)):
+        rows.append(",".join([f"{i / rate / names.second:.9g}", *cells]))
+    return "\n".join(rows) + "\n"
+
+
+WEAKEST = 0.01
+"""Least gain that a model file takes (N/V); the line only says how a force is written as volts."""
+
+
+def _slide(rig: Rig, limit: float) -> str:
+    """Of a slide on a rigid drive, which has no key for a spring.
+
+    Nor has it a sensor: one of 100 kHz, the fastest that may be stated, would already be late by a
+    hundredth of what an encoder of 50 nm tells.
+    """
+    return f"""schema = 1
+name = "lab"
+title = "What the lab believes"
+plant = "slide"
+
+[two_way_drive]
+gain_n_per_v = {_number(max(1.2 * limit / 5.0, WEAKEST))}
+middle_v = 5
+
+[slide]
+mass_kg = {_number(rig.inertia)}
+
+[symmetric_damping]
+intercept_n_s_per_mm = {_number(rig.damping / 1e3)}
+slope_n_s_per_mm_per_kpa = 0.0
+
+[start]
+contraction_mm = 0.0
+velocity_mm_per_s = 0.0
+"""
+
+
+MODELS = {"slide": _slide}
+"""Text of a model by kind of rig."""
+
+
+def _number(value: float) -> str:
+    return f"{value:.7g}"

@@ -1,0 +1,109 @@
+"""The axis of a lab: inertia, damping, spring and gravity, and how large and fast it moves."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+GRAVITY = 9.80665
+"""m/s^2."""
+
+RATES = (100.0, 200.0, 250.0, 500.0, 1000.0, 2000.0)
+"""Sampling rates of logs (Hz)."""
+
+ACCELERATION, SPEED = 15.0, 1.5
+"""Largest of a slide (m/s^2, m/s)."""
+
+TURNING = {"acceleration": 400.0, "speed": 15.0}
+"""Largest of a joint (rad/s^2, rad/s)."""
+
+
+@dataclass(frozen=True)
+class Rig:
+    """One axis.
+
+        inertia q'' = u - damping q' - stiffness q - gravity sin(q + gravity_angle)
+
+    Attributes:
+        kind: `slide` (m, N) or `joint` (rad, N m).
+        inertia: mass or moment of inertia (kg, kg m^2).
+        damping: viscous (N s/m, N m s).
+        stiffness: of the spring about q = 0 (N/m, N m/rad); 0 without.
+        gravity: m g l of a joint (N m); 0 without.
+        gravity_angle: q is this far from hanging down (rad).
+        travel: half of the stroke that is used (m, rad).
+        frequency: fastest of the reference (Hz).
+        rate: of the log (Hz).
+    """
+
+    kind: str
+    inertia: float
+    damping: float
+    stiffness: float
+    gravity: float
+    gravity_angle: float
+    travel: float
+    frequency: float
+    rate: float
+
+    @property
+    def peak_speed(self) -> float:
+        """Of a sine over the whole stroke (m/s, rad/s)."""
+        return 2.0 * math.pi * self.frequency * self.travel
+
+    @property
+    def peak_force(self) -> float:
+        """That such a sine takes of inertia, damping, spring and gravity, added up (N, N m)."""
+        omega = 2.0 * math.pi * self.frequency
+        moving = (self.inertia * omega + self.damping) * omega * self.travel
+        return moving + self.stiffness * self.travel + self.gravity * min(1.0, self.travel)
+
+
+def draw_slide(rng: np.random.Generator, springs: bool) -> Rig:
+    """A slide: strokes of 1 mm to 1 m, 0.05 to 200 kg; with springs two times in five."""
+    travel = log_uniform(rng, 0.5e-3, 0.5)
+    mass = log_uniform(rng, 0.05, 200.0)
+    frequency = _frequency(rng, travel, ACCELERATION, SPEED)
+    stiff = rng.random() < 0.4 and springs
+    return _drawn(rng, "slide", mass, travel, frequency, stiff, 0.0)
+
+
+def draw_joint(rng: np.random.Generator) -> Rig:
+    """A joint: 0.05 to 2 rad to each side, 1e-5 to 10 kg m^2; gravity and spring in some."""
+    travel = log_uniform(rng, 0.05, 2.0)
+    inertia = log_uniform(rng, 1e-5, 10.0)
+    frequency = _frequency(rng, travel, TURNING["acceleration"], TURNING["speed"])
+    omega = 2.0 * math.pi * frequency
+    gravity = inertia * (omega * rng.uniform(0.4, 1.0)) ** 2 if rng.random() < 0.4 else 0.0
+    return _drawn(rng, "joint", inertia, travel, frequency, rng.random() < 0.3, gravity)
+
+
+def _frequency(rng: np.random.Generator, travel: float, acceleration: float, speed: float) -> float:
+    most = min(
+        8.0, math.sqrt(acceleration / travel) / 2.0 / math.pi, speed / travel / 2.0 / math.pi
+    )
+    return log_uniform(rng, 0.3 * most, most)
+
+
+def _drawn(
+    rng: np.random.Generator,
+    kind: str,
+    inertia: float,
+    travel: float,
+    frequency: float,
+    spring: bool,
+    gravity: float,
+) -> Rig:
+    omega = 2.0 * math.pi * frequency
+    damping = inertia * omega * log_uniform(rng, 0.1, 1.5)
+    stiffness = inertia * (omega * rng.uniform(0.7, 2.5)) ** 2 if spring else 0.0
+    rates = [rate for rate in RATES if rate >= 30.0 * frequency]
+    rate = float(rng.choice(rates))
+    # A whole number of milliradians: it is written into a file.
+    angle = round(rng.uniform(-0.3, 0.3), 3) if gravity else 0.0
+    return Rig(kind, inertia, damping, stiffness, gravity, angle, travel, frequency, rate)
+
+
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """A number whose logarithm is uniform between two ends."""
+    return float(math.exp(rng.uniform(math.log(low), math.log(high))))

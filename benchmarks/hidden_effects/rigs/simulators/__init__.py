@@ -1,0 +1,1 @@
+"""What computes the motions and forces of rigs: integrators of this folder, and MuJoCo."""

@@ -1,0 +1,92 @@
+"""From the logged command to the force that acts: line between rows, delay, lag, gain by sign."""
+
+import math
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """What a drive makes of its command.
+
+    Attributes:
+        delay: the force comes so much later (s).
+        lag: time constant of a first-order lag (s); 0 without.
+        forward: gain of positive commands.
+        backward: gain of negative commands.
+    """
+
+    delay: float = 0.0
+    lag: float = 0.0
+    forward: float = 1.0
+    backward: float = 1.0
+
+
+@dataclass
+class Drive:
+    """The force between rows, for commands that are joined linearly.
+
+    `push` tells the command of the next row; `at` is the force within the interval that it ends.
+    Before the first row the command is that of the first row.
+
+    Attributes:
+        transmission: of the drive.
+        interval: between rows (s).
+    """
+
+    transmission: Transmission
+    interval: float
+    _late: list[float] = field(default_factory=list)
+    _commands: list[float] = field(default_factory=list)
+    _lagged: float = 0.0
+    _whole: int = 0
+    _part: float = 0.0
+
+    def begin(self, command: float) -> None:
+        """The command of the first row, which has been there for long."""
+        gained = self._gained(command)
+        self._commands, self._lagged = [gained], gained
+        rows = self.transmission.delay / self.interval
+        self._whole, self._part = math.floor(rows), rows - math.floor(rows)
+        self._late = [gained, gained, gained]
+
+    def push(self, command: float) -> None:
+        """The command of the next row."""
+        if len(self._commands) > 1:
+            self._lagged = self.at(self.interval)
+        self._commands.append(self._gained(command))
+        rows = [len(self._commands) - 1 - self._whole - each for each in (2, 1, 0)]
+        self._late = [self._commands[max(row, 0)] for row in rows]
+
+    def at(self, time: float) -> float:
+        """Force (N, N m) so many seconds after the row before the last."""
+        part = self._part
+        before, start, end = self._late
+        span, lag = self.interval, self.transmission.lag
+        if not part:
+            return _line(start, end, time / span, self._lagged, lag, span)
+        # The bend of a late command lies within the interval.
+        bend = part * span
+        first = start + (before - start) * part
+        if time <= bend:
+            slope = (start - before) / span
+            return _lagged(first, slope, time, self._lagged, lag)
+        at_bend = _lagged(first, (start - before) / span, bend, self._lagged, lag)
+        return _lagged(start, (end - start) / span, time - bend, at_bend, lag)
+
+    def _gained(self, command: float) -> float:
+        gain = self.transmission.forward if command > 0.0 else self.transmission.backward
+        return gain * command
+
+
+def _line(start: float, end: float, share: float, lagged: float, lag: float, span: float) -> float:
+    if not lag:
+        return start + (end - start) * share
+    return _lagged(start, (end - start) / span, share * span, lagged, lag)
+
+
+def _lagged(start: float, slope: float, time: float, lagged: float, lag: float) -> float:
+    """Exact response of a first-order lag to a ramp, from the value that it had at its start."""
+    if not lag:
+        return start + slope * time
+    settled = start - slope * lag
+    return settled + slope * time + (lagged - settled) * math.exp(-time / lag)

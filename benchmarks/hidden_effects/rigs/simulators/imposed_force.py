@@ -1,0 +1,51 @@
+"""The force that an imposed motion takes, row by row: what sticks is a spring between two slips.
+
+A part with dry friction sits behind a play and a stiff spring. Where the spring's force reaches the
+level of friction the part slips along; after a turn the play has to be crossed first. This is exact
+where the motion is monotone between rows.
+"""
+
+import numpy as np
+
+from benchmarks.hidden_effects.rigs.excitation import Reference
+from benchmarks.hidden_effects.rigs.imposed_rig import ImposedRig
+from benchmarks.hidden_effects.rigs.laws import Backlash, HiddenEffect, summed
+
+Array = np.ndarray
+
+PRESLIDING = 5e-4
+"""Travel in which a stuck part's spring reaches the level of friction, in half strokes."""
+
+
+def simulate(
+    rig: ImposedRig, effects: tuple[HiddenEffect, ...], motion: Reference, pressure: float
+) -> Array:
+    """Force of the drive (N), shape (rows,).
+
+    Args:
+        rig: the rig.
+        effects: what it hides; a `Backlash` is the play before the part with dry friction.
+        motion: that the drive imposes.
+        pressure: in the file (Pa).
+    """
+    extra, kinetic, _ = summed(effects)
+    play = sum(each.size for each in effects if isinstance(each, Backlash))
+    force = rig.mass * motion.a + rig.damping * motion.v + rig.stiffness * motion.q
+    force += rig.area * pressure
+    moves = list(zip(motion.q.tolist(), motion.v.tolist(), strict=True))
+    # A law pushes the axis; the drive pushes against it.
+    force -= [extra(q, v, pressure) for q, v in moves]
+    return force + _dry([(q, kinetic(q, v, pressure)) for q, v in moves], play, rig.travel)
+
+
+def _dry(levels: list[tuple[float, float]], play: float, travel: float) -> Array:
+    part, forces = levels[0][0], []
+    reach = PRESLIDING * travel
+    for q, level in levels:
+        away = q - part
+        stretch = max(abs(away) - 0.5 * play, 0.0)
+        share = min(stretch / reach, 1.0)
+        if stretch > reach:
+            part = q - (reach + 0.5 * play) * (1.0 if away > 0.0 else -1.0)
+        forces.append(level * share * (1.0 if away > 0.0 else -1.0))
+    return np.array(forces)

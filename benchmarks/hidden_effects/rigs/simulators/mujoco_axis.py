@@ -1,0 +1,233 @@
+"""The same axes in MuJoCo: friction loss, damping, springs, tendons, gravity and fluid are its own.
+
+Its semi-implicit Euler steps are a leapfrog: positions at the ends of steps, speeds half a step
+before. Damping takes the speed at the end of its step; half a step of it is taken off the inertia,
+so that it acts at the middle. So positions are of order 2 in the step where forces are smooth.
+"""
+
+import math
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hidden_effects.rigs import laws
+from benchmarks.hidden_effects.rigs.laws import HiddenEffect, summed
+from benchmarks.hidden_effects.rigs.rig import GRAVITY, Rig
+from benchmarks.hidden_effects.rigs.simulators.drive import Drive, Transmission
+from benchmarks.hidden_effects.rigs.simulators.stick_slip import Motion, Source
+
+LONGEST = 0.25e-3
+"""Longest step (s)."""
+
+RADIUS = 0.1
+"""Of gyration of a slide's body (m); only its drag depends on it."""
+
+FAR = 6.0
+"""Where transverse springs are anchored, in half strokes: 2 % off a cube at the end of it."""
+
+
+class NoMujoco(ImportError):
+    """MuJoCo is not installed; the message has the command."""
+
+
+def mujoco() -> ModuleType:
+    """The library.
+
+    Raises:
+        NoMujoco: it is not installed.
+    """
+    try:
+        import mujoco as library
+    except ImportError:
+        raise NoMujoco(
+            "half of the cases of block rigs are simulated by MuJoCo, which is not installed; "
+            "install the extra: pip install 'pma-gym[foreign]'"
+        ) from None
+    return library
+
+
+def simulate(
+    rig: Rig,
+    effects: tuple[HiddenEffect, ...],
+    transmission: Transmission,
+    source: Source,
+    rows: int,
+    start: tuple[float, float] = (0.0, 0.0),
+    longest: float = LONGEST,
+) -> Motion:
+    """The motion under commands that are joined linearly; as `stick_slip.simulate`.
+
+    Args:
+        rig: the rig.
+        effects: what it hides.
+        transmission: of the drive.
+        source: of the commands.
+        rows: of the log.
+        start: position and speed.
+        longest: step at most (s).
+    """
+    library, interval = mujoco(), 1.0 / rig.rate
+    steps = max(1, int(np.ceil(interval / longest - 1e-9)))
+    drive, h = Drive(transmission, interval), interval / steps
+    world = World(library, rig, effects, h)
+    table = np.empty((rows, 4))
+    command = source(0, start[0])
+    drive.begin(command)
+    world.begin(*start, drive.at(0.0))
+    for row in range(rows):
+        if row:
+            command = source(row, table[row - 1, 0])
+            drive.push(command)
+            for i in range(steps):
+                world.step(drive.at(i * h))
+                if i == 0:
+                    # Only the step from a row on knows what accelerates there.
+                    table[row - 1, 1:3] = world.begun()
+        table[row] = *world.state(), command
+    return Motion(np.arange(rows) * interval, *table.T)
+
+
+class World:
+    """A model of MuJoCo with one axis, and the effects that change with its state."""
+
+    def __init__(
+        self, library: ModuleType, rig: Rig, effects: tuple[HiddenEffect, ...], h: float
+    ) -> None:
+        self.library, self.rig, self.h = library, rig, h
+        native = [each for each in effects if _native(rig, each)]
+        self.model = library.MjModel.from_xml_string(_document(rig, native, h))
+        self.data: Any = library.MjData(self.model)
+        rest = tuple(e for e in effects if e not in native)
+        self.one_way = [e for e in rest if isinstance(e, laws.DirectionalDamping)]
+        self.extra, self.kinetic, _ = summed(tuple(e for e in rest if e not in self.one_way))
+        self.force = self.data.qfrc_applied
+        self.friction, self.damping = self.model.dof_frictionloss, self.model.dof_damping
+
+    def begin(self, q: float, v: float, u: float) -> None:
+        """Start; the speed is that of half a step before."""
+        self.data.qpos[0], self.data.qvel[0] = q, v
+        self._apply(u)
+        self.library.mj_forward(self.model, self.data)
+        self.data.qvel[0] = v - 0.5 * self.h * self.data.qacc[0]
+
+    def step(self, u: float) -> None:
+        """One step under a force of the drive at its start (N, N m)."""
+        self._apply(u)
+        self.library.mj_step(self.model, self.data)
+
+    def state(self) -> tuple[float, float, float]:
+        """Position, speed and acceleration."""
+        data = self.data
+        return data.qpos[0], data.qvel[0] + 0.5 * self.h * data.qacc[0], data.qacc[0]
+
+    def begun(self) -> tuple[float, float]:
+        """Speed and acceleration where the last step began."""
+        data = self.data
+        return data.qvel[0] - 0.5 * self.h * data.qacc[0], data.qacc[0]
+
+    def inverse(self, q: float, v: float, a: float, u: float) -> float:
+        """Force of the drive (N, N m) that such a motion takes; `u` is what laws are given."""
+        data = self.data
+        data.qpos[0], data.qvel[0] = q, v
+        self._apply(u)
+        data.ctrl[0] = 0.0
+        data.qacc[0] = a
+        self.library.mj_inverse(self.model, data)
+        return float(data.qfrc_inverse[0] - self.force[0])
+
+    def _apply(self, u: float) -> None:
+        q, v = self.data.qpos[0], self.data.qvel[0]
+        self.data.ctrl[0] = u
+        self.force[0] = self.extra(q, v, u)
+        self.friction[0] = self.kinetic(q, v, u)
+        extra = sum(each.size for each in self.one_way) if v > 0.0 else 0.0
+        self.damping[0] = self.rig.damping + extra
+
+
+def _native(rig: Rig, effect: HiddenEffect) -> bool:
+    """Whether MuJoCo has it itself."""
+    if isinstance(effect, (laws.Spring, laws.EndBumper)):
+        return True
+    if rig.kind == "slide":
+        return isinstance(effect, (laws.ConstantForce, laws.HardeningSpring, laws.QuadraticDrag))
+    return not rig.gravity and isinstance(effect, laws.Gravity)
+
+
+def _document(rig: Rig, effects: list[HiddenEffect], h: float) -> str:
+    """MJCF of a rig: a slide along x, or a hinge about y that swings in the plane of gravity."""
+    pull, density, tendons, spring = 0.0, 0.0, "", rig.stiffness
+    weight, angle = rig.gravity, rig.gravity_angle
+    for effect in effects:
+        if isinstance(effect, laws.ConstantForce):
+            # The rail is tilted.
+            pull = effect.size / _inertia(rig, h)
+        elif isinstance(effect, laws.QuadraticDrag):
+            # Of a box with the body's inertia: 2 density width height speed^2.
+            density = effect.size / (3.0 * RADIUS**2)
+        elif isinstance(effect, laws.Spring):
+            spring += effect.size
+        elif isinstance(effect, laws.HardeningSpring):
+            tendons += _transverse(effect.size, rig.travel)
+        elif isinstance(effect, laws.EndBumper):
+            tendons += (
+                f'<fixed stiffness="{effect.size!r}" springlength="-1e6 {effect.at!r}">'
+                '<joint joint="axis" coef="1"/></fixed>'
+            )
+        elif isinstance(effect, laws.Gravity):
+            weight, angle = effect.size, effect.angle
+    anchors = "".join(
+        f'<site name="{name}" pos="0 {sign * FAR * rig.travel!r} 0"/>'
+        for name, sign in (("left", 1.0), ("right", -1.0))
+    )
+    down = -GRAVITY if rig.kind == "joint" else 0.0
+    return f"""<mujoco>
+  <compiler angle="radian" inertiafromgeom="false" boundmass="0" boundinertia="0"/>
+  <option timestep="{h!r}" integrator="implicitfast" gravity="{pull!r} 0 {down!r}"
+          density="{density!r}" iterations="100" tolerance="1e-14"/>
+  <worldbody>{anchors}
+    <body>{_body(rig, weight, angle, h)}
+      <joint name="axis" {_joint(rig, spring, h)}/><site name="pin"/>
+    </body>
+  </worldbody>
+  <tendon>{tendons}</tendon>
+  <actuator><motor joint="axis"/></actuator>
+</mujoco>"""
+
+
+def _joint(rig: Rig, spring: float, h: float) -> str:
+    kind = 'type="slide" axis="1 0 0"' if rig.kind == "slide" else 'type="hinge" axis="0 1 0"'
+    # Stuck, it creeps as slowly as MuJoCo allows.
+    hard = f'solreffriction="{2.0 * h!r} 1" solimpfriction="0.9999 0.9999 0.001 0.5 2"'
+    return f'{kind} damping="{rig.damping!r}" stiffness="{spring!r}" {hard}'
+
+
+def _body(rig: Rig, weight: float, angle: float, h: float) -> str:
+    """Mass and inertia; half of a pendulum's inertia is that of a point mass."""
+    inertia = _inertia(rig, h)
+    if rig.kind == "slide":
+        return _inertial("0 0 0", inertia, inertia * RADIUS**2)
+    if not weight:
+        return _inertial("0 0 0", 1.0, inertia)
+    length = 0.5 * rig.inertia * GRAVITY / weight
+    place = f"{-length * math.sin(angle)!r} 0 {-length * math.cos(angle)!r}"
+    return _inertial(place, weight / GRAVITY / length, inertia - 0.5 * rig.inertia)
+
+
+def _inertia(rig: Rig, h: float) -> float:
+    return rig.inertia - 0.5 * h * rig.damping
+
+
+def _inertial(place: str, mass: float, inertia: float) -> str:
+    own = f"{inertia!r} {inertia!r} {inertia!r}"
+    return f'<inertial pos="{place}" mass="{mass!r}" diaginertia="{own}"/>'
+
+
+def _transverse(cubic: float, travel: float) -> str:
+    """Two springs across the rail, without force in the middle: together a cube of the travel."""
+    away = FAR * travel
+    return "".join(
+        f'<spatial stiffness="{cubic * away * away!r}" springlength="{away!r}">'
+        f'<site site="{name}"/><site site="pin"/></spatial>'
+        for name in ("left", "right")
+    )

@@ -1,0 +1,1 @@
+"""The second wheel: controllers and benchmark for those who have no clone."""

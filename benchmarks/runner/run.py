@@ -1,0 +1,167 @@
+"""Runs what is missing of a suite's cases with a bar, and goes on where a run stopped."""
+
+import time
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from benchmarks.executors.executor import Executor
+from benchmarks.runner.case import Row
+from benchmarks.runner.execution import PendingCases, compile_kernels, execute, pending_cases
+from benchmarks.runner.journal import JOURNAL
+from benchmarks.runner.provenance import check_folder, run_info, write_run, write_stations
+from benchmarks.suites.suite import Entry, FrozenSuite
+
+FAILED, INTERRUPTED = 1, 130
+"""Exit codes."""
+
+
+@dataclass(frozen=True)
+class SuiteRun:
+    """A run of a suite into a folder.
+
+    Attributes:
+        todo: what was to be run, and what the journal had.
+        rows: of all cases that are done, in the order in which they came.
+        info: what the run was made with.
+        began: `time.perf_counter()` when it began (s).
+        complete: whether every case is done.
+    """
+
+    todo: PendingCases
+    rows: list[Row]
+    info: dict[str, Any]
+    began: float
+    complete: bool
+
+    def finish(self, out: Path) -> None:
+        """Write that the run is complete, and how long it took."""
+        self.info["wall_time_s"] = time.perf_counter() - self.began
+        write_run(out, self.info, complete=True)
+
+
+def run_missing(
+    suite: FrozenSuite, entries: Sequence[Entry], out: Path, executor: Executor, console: Console
+) -> SuiteRun:
+    """Run what a folder's journal lacks of a suite.
+
+    Args:
+        suite: the suite.
+        entries: controllers to run.
+        out: folder of the results; made if need be.
+        executor: where the cases run.
+        console: where to print.
+    Returns:
+        The run; Ctrl-C ends it early, says so, and what is done stays in the journal.
+    Raises:
+        SuiteError: the folder has another suite's results.
+    """
+    began = time.perf_counter()
+    check_folder(suite, out)
+    todo = pending_cases(suite, entries, out)
+    console.print(_greeting(todo, entries, out, executor.jobs), highlight=False)
+    info = run_info(todo, entries, out, executor.jobs)
+    write_run(out, info, complete=False)
+    rows = list(todo.known.values())
+    try:
+        complete = _run(todo, entries, out, executor, rows, console)
+    except KeyboardInterrupt:
+        complete = False
+    run = SuiteRun(todo, rows, info, began, complete)
+    if not complete:
+        say_interrupted(run, out, console)
+    return run
+
+
+def say_interrupted(run: SuiteRun, out: Path, console: Console) -> None:
+    """Say how much is done, and how it goes on."""
+    console.print(
+        f"Interrupted: {len(run.rows)} of {len(run.todo.cases)} cases are done and stay in "
+        f"{out / JOURNAL}. The same command goes on from there.",
+        highlight=False,
+    )
+
+
+def _run(
+    todo: PendingCases,
+    entries: Sequence[Entry],
+    out: Path,
+    executor: Executor,
+    rows: list[Row],
+    console: Console,
+) -> bool:
+    """Run what is missing; adds to the rows."""
+    if not todo.missing:
+        return True
+    with console.status("drawing the stations, compiling their equations"):
+        write_stations(out, todo.suite)
+        compile_kernels(todo.suite)
+    with _progress(console) as progress:
+        advance = _bars(progress, todo, entries)
+
+        def on_done(row: Row) -> None:
+            rows.append(row)
+            advance(row)
+
+        return execute(todo, executor, out, on_done)
+
+
+def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int) -> str:
+    suite, done = todo.suite, len(todo.known)
+    words = (
+        f"Suite {suite.name} version {suite.version}: {len(suite.stations)} stations, "
+        f"{len(suite.episodes)} episodes, {len(entries)} controllers: {len(todo.cases)} cases, "
+        f"{jobs} at a time"
+    )
+    if done:
+        words += f"\n{done} cases are done in {out / JOURNAL} and used again"
+    if todo.outdated:
+        words += (
+            f"\n{todo.outdated} rows there were made with other code, another version or another "
+            "file of these controllers; they stay there, are not used, and their cases run anew"
+        )
+    return words
+
+
+def _progress(console: Console) -> Progress:
+    return Progress(
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("{task.fields[failed]}", markup=False),
+        console=console,
+    )
+
+
+def _bars(
+    progress: Progress, todo: PendingCases, entries: Sequence[Entry]
+) -> Callable[[Row], None]:
+    """A bar for each controller and one for all, which rows move on."""
+    wanted = Counter(case.spec.name for case in todo.cases)
+    done = Counter(name for name, _ in todo.known)
+    failures = Counter[str]()
+    bars = {
+        entry.spec.name: progress.add_task(
+            entry.spec.label,
+            total=wanted[entry.spec.name],
+            completed=done[entry.spec.name],
+            failed="",
+        )
+        for entry in entries
+    }
+    whole = progress.add_task("all", total=len(todo.cases), completed=len(todo.known), failed="")
+
+    def advance(row: Row) -> None:
+        name = row["controller"]
+        failures[name] += bool(row["failure"])
+        words = f"{failures[name]} failed" if failures[name] else ""
+        progress.update(bars[name], advance=1, failed=words)
+        progress.update(whole, advance=1)
+
+    return advance

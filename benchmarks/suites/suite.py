@@ -1,0 +1,225 @@
+"""What a frozen suite is: stations, episodes on them, the controllers that are compared."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
+
+from benchmarks.runner.controller_spec import ControllerSpec
+from benchmarks.suites.recipe import Recipe
+from benchmarks.suites.stations import DrawnStation, draw_station
+from benchmarks.suites.target import Target
+from controllers.design import designs
+from pma_gym.plant.model import Model, load_model
+from pma_gym.tasks import named_task
+
+SUITES = Path(__file__).parent
+
+
+class SuiteError(ValueError):
+    """A suite or a selection that cannot be; the message says what there is."""
+
+
+NOMINAL = -1
+"""Number of the station that is as its model."""
+
+
+class Episode(NamedTuple):
+    """What happens on a station: a task at a pressure, with noise of its own.
+
+    Attributes:
+        station: number of the station; `NOMINAL` for the one that is as its model.
+        task: name of the task.
+        pressure_kpa: gauge pressure (kPa).
+        repeat: which of the episodes that differ in their noise alone.
+    """
+
+    station: int
+    task: str
+    pressure_kpa: float
+    repeat: int
+
+    @property
+    def name(self) -> str:
+        """What tells it from the others: `17/rotation/300/0`."""
+        return f"{self.station}/{self.task}/{self.pressure_kpa:g}/{self.repeat}"
+
+
+class EpisodePlan(NamedTuple):
+    """Trials that are dealt to the stations in turn, so that each comes equally often.
+
+    Attributes:
+        tasks: names of the tasks.
+        pressures_kpa: pressures of each of them (kPa).
+        per_station: how many trials a station gets; all of them if 0.
+        repeats: episodes of each, with noise of their own.
+    """
+
+    tasks: tuple[str, ...]
+    pressures_kpa: tuple[float, ...]
+    per_station: int = 0
+    repeats: int = 1
+
+    def trials(self, number: int) -> list[tuple[str, float]]:
+        """Task and pressure (kPa) of what the station of a number gets, evenly spread.
+
+        >>> EpisodePlan(("rotation",), (275, 300, 350, 400), per_station=2).trials(1)
+        [('rotation', 300), ('rotation', 400)]
+        """
+        deck = [(task, pressure) for task in self.tasks for pressure in self.pressures_kpa]
+        taken = self.per_station or len(deck)
+        chosen = {(number + round(k * len(deck) / taken)) % len(deck) for k in range(taken)}
+        return [deck[at] for at in sorted(chosen)]
+
+
+class Entry(NamedTuple):
+    """A controller of a suite.
+
+    Attributes:
+        spec: who.
+        only: tasks that it can do; all if empty.
+        models: models that it runs on, where a suite has several; all if empty.
+    """
+
+    spec: ControllerSpec
+    only: tuple[str, ...] = ()
+    models: tuple[str, ...] = ()
+
+    def does(self, task: str) -> bool:
+        """Whether it can do a task."""
+        return not self.only or task in self.only
+
+
+@dataclass(frozen=True, eq=False)
+class FrozenSuite:
+    """Stations, episodes on them, and who is compared.
+
+    Attributes:
+        source: name of the suite, or path of its file, by which it is loaded again.
+        name: what results call it.
+        title: one line for people.
+        version: changes whenever a number does.
+        seed: every episode's seed is derived from it.
+        model: name of the model that controllers receive.
+        environment: keyword arguments of the environments.
+        stations: numbers of the stations, in order.
+        recipe: how stations are drawn; None if only the nominal one is there.
+        episode_plans: which trials they get.
+        entries: who is compared, in the order of the tables.
+        targets: what is asked of them.
+        digest: of all numbers, controllers and targets apart.
+        only_by_name: whether it is so long that it runs only where it is named.
+    """
+
+    source: str
+    name: str
+    title: str
+    version: int
+    seed: int
+    model: str
+    environment: Mapping[str, Any]
+    stations: tuple[int, ...]
+    recipe: Recipe | None
+    episode_plans: tuple[EpisodePlan, ...]
+    entries: tuple[Entry, ...]
+    targets: tuple[Target, ...]
+    digest: str
+    only_by_name: bool = False
+
+    keep_pace: ClassVar[bool] = True
+    """Whether a controller from a file must on average answer within a control period."""
+    has_lines: ClassVar[bool] = False
+    """Whether rows have the regression line of every phase too."""
+
+    def __reduce__(self) -> tuple[Callable[..., "FrozenSuite"], tuple[object, ...]]:
+        """Pickled as its source: another process reads its file."""
+        return _read, (self.source,)
+
+    @cached_property
+    def episodes(self) -> tuple[Episode, ...]:
+        """Every episode, station by station."""
+        return tuple(
+            Episode(station, task, pressure, repeat)
+            for at, station in enumerate(self.stations)
+            for plan in self.episode_plans
+            for task, pressure in plan.trials(at)
+            for repeat in range(plan.repeats)
+        )
+
+    @property
+    def control_rate_hz(self) -> float:
+        """Control steps a second (Hz)."""
+        return float(self.environment["control_rate_hz"])
+
+    @property
+    def tasks(self) -> tuple[str, ...]:
+        """Names of its tasks."""
+        return tuple(dict.fromkeys(task for plan in self.episode_plans for task in plan.tasks))
+
+    def runs(self, entry: Entry, episode: Episode) -> bool:
+        """Whether a controller of the suite runs an episode."""
+        return entry.does(episode.task)
+
+    def seed_of(self, episode: Episode, controller: str = "") -> int:
+        """An episode's seed, the same for every controller: they are compared under one noise."""
+        digest = hashlib.sha256(f"{self.seed}:{episode.name}".encode()).digest()
+        return int.from_bytes(digest[:4], "big")
+
+    def station(self, number: int) -> DrawnStation:
+        """A station by its number."""
+        if number == NOMINAL:
+            return DrawnStation(self.nominal, (), ())
+        assert self.recipe is not None
+        return _station(self.recipe, number)
+
+    @cached_property
+    def nominal(self) -> Model:
+        """The model that controllers receive."""
+        return load_model(self.model)
+
+    def nominal_of(self, number: int) -> Model:
+        """The model that controllers receive on a station."""
+        return self.nominal
+
+    def case_name(self, episode: Episode, controller: str) -> str:
+        """What tells a case from the suite's others: `pid/17/rotation/300/0`."""
+        return f"{controller}/{episode.name}"
+
+    def entry(self, spec: ControllerSpec) -> Entry:
+        """The suite's entry of a controller; one of its own for a controller it does not have.
+
+        Raises:
+            SuiteError: none of the suite's tasks is of a kind that the controller can do.
+        """
+        for entry in self.entries:
+            if entry.spec.source == spec.source:
+                return entry
+        kinds = spec.kinds
+        able = tuple(task for task in self.tasks if kind_of(task) in kinds)
+        if kinds and not able:
+            there = sorted({kind_of(task) for task in self.tasks})
+            raise SuiteError(
+                f"{spec.name} does {', '.join(sorted(kinds))} alone, and suite {self.name} "
+                f"has {', '.join(there)}; name another controller, or another suite"
+            )
+        return Entry(spec, able)
+
+
+def kind_of(task: str) -> str:
+    """Kind of a task of a suite."""
+    known = named_task(task)
+    assert known is not None
+    return designs.kind_of(known)
+
+
+@lru_cache(maxsize=4096)
+def _station(recipe: Recipe, number: int) -> DrawnStation:
+    return draw_station(recipe, number)
+
+
+def _read(source: str) -> FrozenSuite:
+    from benchmarks.suites.frozen import frozen_suite
+
+    return frozen_suite(source)

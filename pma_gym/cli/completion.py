@@ -1,0 +1,34 @@
+"""What a shell completes: names of models and tasks; files where there is none of these."""
+
+from collections.abc import Iterable
+from typing import Annotated
+
+import typer
+
+from pma_gym.data.protocol import PROTOCOLS
+from pma_gym.plant.model import shipped_models
+from pma_gym.tasks import EVERY_TASK
+
+
+def model_names(incomplete: str) -> list[str]:
+    """Shipped models that begin so."""
+    return _beginning(incomplete, shipped_models())
+
+
+def task_names(incomplete: str) -> list[str]:
+    """Tasks that begin so."""
+    return _beginning(incomplete, EVERY_TASK)
+
+
+def dissertation_tasks(incomplete: str) -> list[str]:
+    """Tasks of the dissertation that begin so."""
+    return _beginning(incomplete, PROTOCOLS)
+
+
+def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+    return [name for name in names if name.startswith(incomplete)]
+
+
+NamedModel = Annotated[
+    str, typer.Option(help="Shipped name or TOML file.", autocompletion=model_names)
+]

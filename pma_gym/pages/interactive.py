@@ -1,0 +1,108 @@
+"""Figures to zoom, hover and filter, drawn by the reader's browser without a network.
+
+`plotly-basic.min.js` is plotly.js 4.1.1 (basic bundle, MIT licence beside it), from npm's package
+`plotly.js-basic-dist-min`; a page holds it once, however many figures it has.
+"""
+
+import html
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pma_gym.printable import printable
+
+_HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Trace:
+    """A curve or a cloud of points.
+
+    Attributes:
+        name: in the legend, where a click hides it and a double click shows it alone.
+        x: of the points.
+        y: of the points; NaN leaves a gap.
+        color: `#rrggbb`; empty for the colour of text.
+        lines: whether points are joined.
+        notes: what hovering shows beside the coordinates, a text a point; none if empty.
+    """
+
+    name: str
+    x: Sequence[float]
+    y: Sequence[float]
+    color: str = ""
+    lines: bool = True
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class InteractiveFigure:
+    """A figure that only the HTML page has; print and Markdown have pictures.
+
+    Attributes:
+        name: of the figure on its page.
+        caption: below it.
+        x_label: of the axis, with unit.
+        y_label: of the axis, with unit.
+        traces: what is drawn.
+        logarithmic: whether the y axis is.
+    """
+
+    name: str
+    caption: str
+    x_label: str
+    y_label: str
+    traces: Sequence[Trace]
+    logarithmic: bool = False
+
+
+def scripts(figures: Sequence[InteractiveFigure]) -> str:
+    """What stands in a page's head: the library, the figures as data, and the few lines that draw.
+
+    Empty where there are none.
+    """
+    if not figures:
+        return ""
+    library = (_HERE / "plotly-basic.min.js").read_text(encoding="utf-8")
+    draw = (_HERE / "interactive.js").read_text(encoding="utf-8")
+    # No name in the data can end the script: `<` is written as its escape.
+    data = json.dumps([_document(each) for each in figures], allow_nan=False)
+    data = data.replace("<", "\\u003c")
+    return (
+        f"<script>{library}</script>\n"
+        f'<script type="application/json" id="figures">{data}</script>\n'
+        f"<script>{draw}</script>"
+    )
+
+
+def _document(figure: InteractiveFigure) -> dict[str, Any]:
+    return {
+        "name": figure.name,
+        "x": _safe(figure.x_label),
+        "y": _safe(figure.y_label),
+        "logarithmic": figure.logarithmic,
+        "traces": [
+            {
+                "name": _safe(trace.name),
+                "x": [_number(value) for value in trace.x],
+                "y": [_number(value) for value in trace.y],
+                "color": trace.color,
+                "mode": "lines" if trace.lines else "markers",
+                "notes": [_safe(note) for note in trace.notes],
+            }
+            for trace in figure.traces
+        ],
+    }
+
+
+def _safe(text: str) -> str:
+    """Text that the library shows as it is: it would read some tags."""
+    return html.escape(printable(text))
+
+
+def _number(value: float) -> float | None:
+    """Six digits are more than a screen has."""
+    return float(f"{value:.6g}") if math.isfinite(value) else None

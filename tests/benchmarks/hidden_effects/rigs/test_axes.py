@@ -1,0 +1,169 @@
+"""Both simulators of rigs against mechanics: periods, decay, stopping, breaking away, energy."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+from benchmarks.hidden_effects.rigs import laws
+from benchmarks.hidden_effects.rigs.rig import Rig
+from benchmarks.hidden_effects.rigs.simulators import mujoco_axis, stick_slip
+from benchmarks.hidden_effects.rigs.simulators.drive import Transmission
+
+SLIDE = Rig("slide", 2.0, 0.0, 0.0, 0.0, 0.0, 0.05, 2.0, 1000.0)
+JOINT = Rig("joint", 0.02, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 1000.0)
+
+
+@pytest.fixture(params=["own", "MuJoCo"])
+def simulate(request):
+    if request.param == "own":
+        return stick_slip.simulate
+    pytest.importorskip("mujoco")
+    return mujoco_axis.simulate
+
+
+def rig(base, **values):
+    return Rig(**(vars(base) | values))
+
+
+def idle(row, q):
+    return 0.0
+
+
+def moved(simulate, axis, effects, source=idle, rows=3000, start=(0.0, 0.0)):
+    return simulate(axis, effects, Transmission(), source, rows, start)
+
+
+def test_a_pendulum_swings_with_the_period_of_its_amplitude(simulate):
+    swung = moved(simulate, rig(JOINT, gravity=0.5), (), start=(1.2, 0.0))
+    period = 4.0 * math.sqrt(0.02 / 0.5) * ellipk(math.sin(0.6) ** 2)
+    down = np.flatnonzero((swung.q[:-1] > 0.0) & (swung.q[1:] <= 0.0))
+    crossings = down + swung.q[down] / (swung.q[down] - swung.q[down + 1])
+    assert np.diff(crossings) / 1000.0 == pytest.approx(period, rel=2e-5)
+
+
+def test_a_pendulum_hangs_at_its_angle(simulate):
+    heavy = rig(JOINT, gravity=0.5, gravity_angle=0.3, damping=0.2)
+    hanging = moved(simulate, heavy, (), start=(-0.1, 0.0), rows=6000)
+    assert hanging.q[-1] == pytest.approx(-0.3, abs=1e-3)
+    hidden = laws.Gravity(0.5, 0.3)
+    same = moved(simulate, rig(JOINT, damping=0.2), (hidden,), start=(-0.1, 0.0), rows=6000)
+    assert same.q == pytest.approx(hanging.q, abs=1e-6)
+
+
+def test_a_block_stops_after_its_speed_over_the_friction(simulate):
+    slid = moved(simulate, SLIDE, (laws.CoulombFriction(4.0),), start=(0.0, 1.0), rows=1000)
+    assert slid.q[-1] == pytest.approx(2.0 * 1.0 / (2.0 * 4.0), rel=1e-3)
+    assert np.flatnonzero(slid.v > 1e-3)[-1] / 1000.0 == pytest.approx(0.5, abs=2e-3)
+
+
+def test_a_sprung_block_loses_four_times_friction_over_stiffness_a_period(simulate):
+    sprung = rig(SLIDE, stiffness=200.0)
+    swung = moved(simulate, sprung, (laws.CoulombFriction(2.0),), start=(0.2, 0.0), rows=6000)
+    tops = [i for i in range(1, 5999) if swung.q[i - 1] < swung.q[i] >= swung.q[i + 1]]
+    heights = swung.q[[0, *tops]][:4]
+    assert np.diff(heights) == pytest.approx(-4.0 * 2.0 / 200.0, rel=5e-3)
+    # It rests where the spring is weaker than the friction.
+    assert abs(swung.q[-1]) < 2.0 / 200.0 and abs(swung.v[-1]) < 1e-4
+
+
+def test_it_breaks_away_at_the_static_level_and_slips_at_the_kinetic_one(simulate):
+    friction = laws.CoulombFriction(4.0, rise=0.5, stribeck=1e-3)
+
+    def ramp(row, q):
+        return 3.0 * row / 1000.0
+
+    pushed = moved(simulate, SLIDE, (friction,), ramp)
+    assert abs(pushed.q[1900]) < 1e-6
+    # From the static level on the force grows by 3 N a second above what friction falls to.
+    first = np.flatnonzero(pushed.q > 2e-6)[0] / 1000.0
+    assert 6.0 / 3.0 < first < 6.0 / 3.0 + (2e-6 * 6.0 * 2.0 / 3.0) ** (1.0 / 3.0)
+    assert pushed.a[-1] == pytest.approx((3.0 * 2.999 - 4.0) / 2.0, rel=2e-3)
+
+
+def test_the_drive_s_work_is_what_is_stored_and_what_is_lost(simulate):
+    damped = rig(SLIDE, damping=3.0, stiffness=150.0)
+
+    def push(row, q):
+        return 30.0 * math.sin(2.0 * math.pi * 1.7 * row / 1000.0)
+
+    effects = (laws.CoulombFriction(2.0), laws.HardeningSpring(2e4))
+    driven = moved(simulate, damped, effects, push)
+    q, v = driven.q, driven.v
+    work = np.trapezoid(driven.command * v, driven.time)
+    lost = np.trapezoid(3.0 * v * v + 2.0 * np.abs(v), driven.time)
+    stored = v[-1] ** 2 + 75.0 * q[-1] ** 2 + 0.25 * 2e4 * q[-1] ** 4
+    assert work == pytest.approx(lost + stored, rel=6e-3)
+
+
+STEADY = (
+    (laws.QuadraticDrag(5.0), 2.0, math.sqrt(2.0 / 5.0)),
+    (laws.DirectionalDamping(4.0), 2.0, 0.5),
+    (laws.DirectionalDamping(4.0), -2.0, None),
+    (laws.ConstantForce(-2.0), 2.0, 0.0),
+    (laws.LoadFriction(0.25), 8.0, None),
+)
+
+
+@pytest.mark.parametrize(("effect", "push", "speed"), STEADY)
+def test_a_steady_force_ends_in_the_speed_that_balances_it(simulate, effect, push, speed):
+    driven = moved(simulate, SLIDE, (effect,), lambda row, q: push, rows=8000)
+    if speed is not None:
+        assert driven.v[-1] == pytest.approx(speed, abs=1e-3)
+    elif isinstance(effect, laws.LoadFriction):
+        assert driven.q[-1] == pytest.approx(0.5 * 8.0 * 0.75 / 2.0 * 7.999**2, rel=1e-3)
+    else:
+        assert driven.q[-1] == pytest.approx(-0.5 * 7.999**2, rel=1e-3)
+
+
+POSITION_LAWS = (
+    laws.Spring(40.0),
+    laws.HardeningSpring(3e3),
+    laws.Cogging(1.0, 0.03, 0.4),
+    laws.Detent(2.0, 0.01, 0.01),
+    laws.EndBumper(300.0, 0.02),
+    laws.EddyBrake(5.0, 0.01, 0.01),
+    laws.PositionFriction(0.5, 8.0),
+)
+
+
+@pytest.mark.parametrize("effect", POSITION_LAWS, ids=lambda each: each.name)
+def test_both_simulators_agree_on_an_effect(effect):
+    pytest.importorskip("mujoco")
+    axis = rig(SLIDE, damping=5.0, stiffness=100.0)
+
+    def push(row, q):
+        return 1.8 * math.sin(2.0 * math.pi * 1.1 * row / 1000.0) * min(1.0, row / 500.0)
+
+    own = moved(stick_slip.simulate, axis, (effect,), push)
+    other = moved(mujoco_axis.simulate, axis, (effect,), push)
+    plain = moved(stick_slip.simulate, axis, (), push)
+    assert 0.03 < np.abs(plain.q).max() < 0.06
+    changed = np.abs(own.q - plain.q).max()
+    assert changed > 1e-3
+    assert np.abs(own.q - other.q).max() < 0.03 * changed
+
+
+def test_mujoco_s_positions_are_of_order_2():
+    pytest.importorskip("mujoco")
+    damped = rig(SLIDE, damping=8.0, rate=100.0)
+    ends = []
+    for longest in (2e-3, 1e-3):
+        moved = mujoco_axis.simulate(
+            damped, (), Transmission(), lambda row, q: row / 100.0, 101, (0.1, 0.5), longest
+        )
+        ends.append(moved.q[-1])
+    # m q'' + c q' = t from q = 0.1, q' = 0.5.
+    m, c, time = 2.0, 8.0, 1.0
+    fast = 0.5 + m / c**2
+    exact = 0.1 + time**2 / 2.0 / c - m * time / c**2 + fast * m / c * (1.0 - math.exp(-c / m))
+    errors = [abs(each - exact) for each in ends]
+    assert errors[0] < 1e-5
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+
+
+def test_without_mujoco_the_message_names_the_extra(monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "mujoco", None)
+    with pytest.raises(mujoco_axis.NoMujoco, match=r"pma-gym\[foreign\]"):
+        mujoco_axis.mujoco()

@@ -1,0 +1,86 @@
+"""Reports in a browser: nothing fails, figures respond, a phone needs no sideways scroll."""
+
+import json
+
+import pytest
+
+from benchmarks.report.publish import run_report
+from pma_gym.discovery.report.page import report_page
+from tests.benchmarks.report.test_leaderboard import write_run
+from tests.discovery.conftest import *  # noqa: F403 - fixtures
+
+pytestmark = pytest.mark.browser
+MOST_BYTES = 5_000_000
+
+
+@pytest.fixture(scope="module")
+def reports(tmp_path_factory, diagnoses):  # noqa: F811
+    """Files of a leaderboard and of a diagnosis, by name."""
+    tmp_path = tmp_path_factory.mktemp("reports")
+    suite, results = write_run(tmp_path)
+    page = tmp_path / "diagnosis.html"
+    page.write_text(report_page(diagnoses["effect"], "Rig 2", {"Seed": "3"}), encoding="utf-8")
+    return {"leaderboard": run_report(suite, results, tmp_path / "board"), "diagnosis": page}
+
+
+@pytest.fixture(params=["leaderboard", "diagnosis"])
+def report(request, reports):
+    return reports[request.param]
+
+
+def test_no_error_and_no_sideways_scroll(report, open_page, scheme):
+    for width in ("phone", "desk"):
+        page, faults = open_page(report.as_uri(), width, scheme)
+        assert faults == []
+        wide = page.evaluate("document.documentElement.scrollWidth - window.innerWidth")
+        assert wide <= 0, width
+        assert page.locator(".plot .main-svg").count() > 0
+
+
+def test_colours_follow_the_reader(report, open_page):
+    paper = {}
+    for scheme in ("light", "dark"):
+        page, _ = open_page(report.as_uri(), scheme=scheme)
+        paper[scheme] = page.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert paper == {"light": "rgb(255, 255, 255)", "dark": "rgb(21, 25, 30)"}
+
+
+def test_a_figure_zooms_hovers_and_filters(report, open_page):
+    page, faults = open_page(report.as_uri())
+    plot = page.locator(".plot").first
+    plot.scroll_into_view_if_needed()
+    before = plot.evaluate("p => [...p._fullLayout.xaxis.range]")
+    box = plot.locator(".nsewdrag").bounding_box()
+    left, top = box["x"] + 0.3 * box["width"], box["y"] + 0.3 * box["height"]
+    page.mouse.move(left, top)
+    page.mouse.down()
+    page.mouse.move(left + 0.3 * box["width"], top + 0.4 * box["height"], steps=5)
+    page.mouse.up()
+    page.wait_for_timeout(500)
+    after = plot.evaluate("p => [...p._fullLayout.xaxis.range]")
+    assert after[1] - after[0] < 0.5 * (before[1] - before[0])
+    plot.locator(".legendtoggle").first.click()
+    page.wait_for_timeout(800)
+    assert "legendonly" in plot.evaluate("p => p._fullData.map(t => t.visible)")
+    plot.evaluate("p => Plotly.Fx.hover(p, [{curveNumber: 1, pointNumber: 1}])")
+    assert plot.locator(".hoverlayer .hovertext").count() > 0
+    assert faults == []
+
+
+def test_a_page_stays_small_and_loads_nothing(report, open_page):
+    assert report.stat().st_size < MOST_BYTES
+    page, _ = open_page(report.as_uri())
+    loaded = page.evaluate("performance.getEntriesByType('resource').map(e => e.name)")
+    assert [name for name in loaded if not name.startswith(("data:", "file:"))] == []
+
+
+def test_print_has_pictures_and_no_interactive_figure(report, open_page):
+    page, _ = open_page(report.as_uri())
+    page.emulate_media(media="print")
+    assert page.locator(".interactive").first.is_hidden()
+    assert page.locator("figure img").first.is_visible()
+    page.set_viewport_size({"width": 718, "height": 1000})  # A4 less margins, at 96 pixels an inch.
+    wide = page.evaluate(
+        "[...document.querySelectorAll('table, img')].map(e => e.getBoundingClientRect().right)"
+    )
+    assert max(wide) <= 718, json.dumps(wide)
