@@ -61,6 +61,6 @@ def run_comparison(
         with console.status("computing the achievable bounds that the leaderboard needs"):
             keep_bounds(suite, out)
     except KeyboardInterrupt:
-        console.print("[yellow]Interrupted:[/] all cases are done; the report computes the bounds.")
+        console.print("Interrupted: all cases are done; the report computes the bounds.")
     console.print(f"Leaderboard: {report_command(suite, out)}", highlight=False)
     return FAILED if any(row["failure"] for row in run.rows) else 0

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from benchmarks.dissertation.profiles import write_csv
 from pma_gym.studies import VERDICTS, Comparison, compare_all
@@ -75,7 +76,7 @@ def study_table(study: str, rows: Sequence[Comparison], notes: Mapping[str, int]
     for row in rows:
         style = _STYLES[row.verdict]
         _, *cells, verdict, note = _cells(row)
-        table.add_row(*cells, f"[{style}]{verdict}[/]", str(notes.get(note, "")))
+        table.add_row(*cells, Text(verdict, style), str(notes.get(note, "")))
     return table
 
 

@@ -5,6 +5,7 @@ from statistics import fmean
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.tables import columns
@@ -69,5 +70,5 @@ def _target_table(results: Results) -> Table:
     for check in check_targets(results):
         got = "—" if check.got is None else f"{check.got:.3g} {check.unit}"
         limit = f"{'<' if check.strict else '≤'} {check.limit:g} {check.unit}"
-        table.add_row(check.what, limit, got, f"[{_COLOURS[check.verdict]}]{check.verdict}[/]")
+        table.add_row(check.what, limit, got, Text(check.verdict, _COLOURS[check.verdict]))
     return table

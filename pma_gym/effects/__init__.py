@@ -55,7 +55,7 @@ from pma_gym.effects.sensors.sensor_errors import (
     POTENTIOMETER_ERROR,
     PRESSURE_TRANSDUCER_ERROR,
 )
-from pma_gym.effects.sensors.sensors import LOAD_CELL, LVDT, POTENTIOMETER, PRESSURE_TRANSDUCER
+from pma_gym.effects.sensors.sensors import SENSORS
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.slide.operator import OPERATOR
 from pma_gym.effects.slide.slide import SLIDE
@@ -116,10 +116,7 @@ CATALOGUE: dict[str, Effect] = {
         POSITION_MAP,
         SERVO,
         SERVO_INERTIA,
-        LVDT,
-        LOAD_CELL,
-        PRESSURE_TRANSDUCER,
-        POTENTIOMETER,
+        *SENSORS,
         LVDT_ERROR,
         LOAD_CELL_ERROR,
         PRESSURE_TRANSDUCER_ERROR,

@@ -51,8 +51,12 @@ def resolutions(model: Model) -> np.ndarray:
 
 
 def deviations(model: Model) -> np.ndarray:
-    """Standard deviations of a rig's readings (SI): its sensors' noise and the DAQ's rounding."""
-    return np.hypot(noise_levels(model), resolutions(model) / np.sqrt(12.0))
+    """Standard deviations of a rig's readings (SI): its sensors' noise and the DAQ's rounding.
+
+    1 of a signal that has neither: nothing is known of a sensor that the model lacks.
+    """
+    known = np.hypot(noise_levels(model), resolutions(model) / np.sqrt(12.0))
+    return np.where(known > 0.0, known, 1.0)
 
 
 def read(

@@ -1,4 +1,4 @@
-"""The pages that say how to add something work as they stand, and touch three files."""
+"""The pages that say how to add something work as they stand, and touch three or four files."""
 
 from tests.development.drill import copied, follow, run_pytest
 
@@ -39,3 +39,23 @@ def test_a_task_is_three_files(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     # The page's own test, and those that loop over every task.
     assert int(done.stdout.split(" passed")[0].split()[-1]) >= 4
+
+
+def test_a_rig_is_three_files(tmp_path):
+    copy = copied(tmp_path, "pma_gym", "pyproject.toml")
+    assert len(set(follow("add-a-rig.md", copy))) == 3
+    done = run_pytest(copy, "tests/plant/test_vertical_slide.py")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "3 passed" in done.stdout
+
+
+def test_a_sensor_is_four_files(tmp_path):
+    copy = copied(
+        tmp_path, "pma_gym", "pyproject.toml", "tests/effects/conftest.py",
+        "tests/effects/test_catalogue.py", "tests/discovery/rigs/driven_slide",
+    )  # fmt: skip
+    assert len(set(follow("add-a-sensor.md", copy))) == 4
+    done = run_pytest(copy, "tests/plant", "tests/effects", "-k", "tachometer")
+    assert done.returncode == 0, done.stdout + done.stderr
+    # The page's own two tests, and contracts of the catalogue.
+    assert int(done.stdout.split(" passed")[0].split()[-1]) >= 6

@@ -164,7 +164,12 @@ def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
     """The outcome of a case from its truth and its `diagnosis.json`."""
     hidden = tuple(effect["name"] for effect in truth["effects"])
     verdict = answer["verdict"]
-    effects = answer["effects"] if verdict == "effect" else []
+    # What is true of the rig besides what is hidden, such as the step of its encoder, is no claim.
+    true = truth.get("true_besides", ())
+    effects = [e for e in answer["effects"] if e["name"] not in true]
+    if verdict == "effect" and not effects:
+        verdict = "parameters"
+    effects = effects if verdict == "effect" else []
     named = tuple(effect["name"] for effect in effects)
     meant = set().union(*(e.get("group") or group(e["name"]) for e in truth["effects"]))
     near = any(effect["name"] in meant for effect in effects[:1])

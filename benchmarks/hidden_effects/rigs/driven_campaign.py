@@ -141,6 +141,9 @@ class DrivenCampaign:
             "seconds": [len(each.q) / self.rig.rate for each in self.references],
             "sensor": {"kind": self.sensor.kind, "step": self.sensor.step * factor},
             "noise": {position: self.sensor.rms * factor},
+            "true_besides": ["sensor_quantisation"]
+            if self.sensor.step > self.sensor.noise.white
+            else [],
             "noise_kinds": self.sensor.noise.names,
         }
 

@@ -80,3 +80,6 @@ LVDT = _sensor("lvdt", "contraction", Lvdt)
 LOAD_CELL = _sensor("load_cell", "load", LoadCell)
 PRESSURE_TRANSDUCER = _sensor("pressure_transducer", "pressure", PressureTransducer)
 POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)
+
+SENSORS: tuple[Effect, ...] = (LVDT, LOAD_CELL, PRESSURE_TRANSDUCER, POTENTIOMETER)
+"""All sensors, as the catalogue has them."""

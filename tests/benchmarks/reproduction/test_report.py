@@ -20,6 +20,7 @@ from benchmarks.runner.environment_info import git_state
 from benchmarks.suites.reproduction import load_suite
 from benchmarks.suites.suite import SuiteError
 from pma_gym.pages.document import Heading, Paragraph, Picture, TextTable, to_html, to_markdown
+from pma_gym.terminal import SafeConsole
 
 CONTROLLER = """
 class Half:
@@ -52,6 +53,15 @@ def run(tmp_path_factory, suite):
     with (folder / "terminal.txt").open("w") as terminal:
         code = run_job(suite, folder / "out", ThisProcess(), Console(file=terminal, width=120))
     return code, folder / "out", (folder / "terminal.txt").read_text()
+
+
+def test_the_terminal_shows_words_and_no_markup(tmp_path, suite):
+    shown = tmp_path / "terminal.txt"
+    with shown.open("w") as terminal:
+        run_job(suite, tmp_path / "out", ThisProcess(), SafeConsole(file=terminal, width=120))
+    text = shown.read_text()
+    assert "no figure" in text
+    assert "[/]" not in text
 
 
 @pytest.fixture

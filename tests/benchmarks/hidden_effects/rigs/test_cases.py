@@ -122,6 +122,17 @@ def test_rigs_are_of_all_sizes_and_keep_their_limits(draw):
         )
 
 
+def test_the_step_of_an_encoder_may_be_named_beside_what_is_hidden():
+    friction = ("coulomb_friction", {"dynamic_n": 2.0})
+    both = answer("effect", 0.01, ("sensor_quantisation", {}), ("coulomb_friction", {}))
+    coarse = {"true_besides": ["sensor_quantisation"]}
+    named = compare(truth("one effect", friction) | coarse, both)
+    assert named.right and not named.spurious
+    plain = answer("effect", 0.01, ("sensor_quantisation", {}))
+    assert not compare(truth("nothing") | coarse, plain).detected
+    assert compare(truth("nothing"), plain).detected
+
+
 def test_what_cannot_be_hidden_together_is_of_one_group():
     assert all(name in OFFERS for names in KNOWN.values() for name in names)
     assert group("drive_lag")[0] == "drive_lag" and "drive_delay" in group("drive_lag")
