@@ -12,7 +12,9 @@ from pma_gym.data.calibration import Calibration
 from pma_gym.units import suffix
 
 Kind = Literal["command", "measurement", "derived"]
-Measured = Literal["voltage", "displacement", "angle", "force", "torque", "pressure"]
+Measured = Literal[
+    "voltage", "displacement", "speed", "angle", "angular speed", "force", "torque", "pressure"
+]
 
 VOLTAGE_RANGE = (0.0, 10.0)
 """What the motor's drive and the regulator accept (V)."""

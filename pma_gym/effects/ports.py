@@ -9,6 +9,8 @@ together.
 import math
 from dataclasses import dataclass
 
+from pma_gym.effects.sensors.sensors import SENSORS
+
 STATES = ("contraction", "velocity", "angle", "spin", "pressure")
 
 EVERYTHING = (
@@ -131,7 +133,7 @@ may depend on."""
 
 SENSOR_PORTS: dict[str, Port] = {
     f"sensor:{output}": Port("reading on top of the truth, added", signals=_SENSOR, absent=0.0)
-    for output in ("contraction", "rotation", "load", "pressure")
+    for output in (sensor.port.removeprefix("sensor:") for sensor in SENSORS)
 }
 """Ports of the sensors, which every rig has."""
 
