@@ -8,6 +8,7 @@ import numpy as np
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.discovery.diagnosis import (
     ADDED,
+    UNFITTED,
     Approximate,
     Candidate,
     Diagnosis,
@@ -25,6 +26,7 @@ from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.fitting.trial_states import misfits, trial_states
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
 from pma_gym.discovery.report.approximate_text import why_approximate
+from pma_gym.discovery.report.noise_text import nuisances
 from pma_gym.discovery.report.range_text import widened_ranges
 from pma_gym.discovery.report.records import floors_in_file_units, gaps, judgements, trial_records
 from pma_gym.discovery.report.verdict_text import doubt, sentence, steps, twin, unidentified
@@ -32,7 +34,7 @@ from pma_gym.discovery.screening.localisation import localise
 from pma_gym.discovery.screening.residuals import residuals
 from pma_gym.discovery.screening.score_test import ScreeningScore
 from pma_gym.discovery.selection.backward_elimination import as_given
-from pma_gym.discovery.selection.forward_selection import passes
+from pma_gym.discovery.selection.forward_selection import Stage, passes
 from pma_gym.discovery.verdict.approximate import MOST_SCATTER, closing
 from pma_gym.discovery.verdict.decision import suspicious, verdict_of
 from pma_gym.discovery.verdict.findings import Findings
@@ -50,6 +52,9 @@ from pma_gym.plant.model import Model, Note
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""
+
+BOUNDLESS = 1e3
+"""Times the lower end of a positive range that count for its width, where it is wider."""
 
 Progress = Callable[[str, int, int], None]
 
@@ -128,6 +133,7 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
         law=residual_law(laws[0]) if unknown is not None and telling(findings, laws) else None,
         tones=tones(findings) if verdict == "unknown" else {},
         floors=floors_in_file_units(findings),
+        nuisances=nuisances(findings),
         adequacy=judgements(findings),
         trials=records,
         states=states,
@@ -159,7 +165,7 @@ def _effects(findings: Findings) -> tuple[NamedEffect, ...]:
             NamedEffect(
                 name=candidate.name,
                 confused_with=tuple(equal),
-                p_value=score.p_value,
+                p_value=_p_value(stage, score),
                 parameters={
                     path.partition(".")[2]: _estimate(findings, fit, path)
                     for path in candidate.fitted_paths
@@ -171,6 +177,14 @@ def _effects(findings: Findings) -> tuple[NamedEffect, ...]:
             )
         )
     return tuple(effects)
+
+
+def _p_value(stage: Stage, score: ScreeningScore) -> float:
+    """Family-wise p-value of the fit of a named effect, or what opened the gate for it."""
+    fit = stage.fits.get(score.candidate.name)
+    if fit is None or stage.scan.excess:
+        return score.p_value
+    return score.p_value_of(stage.before.chi_square - fit.chi_square)
 
 
 def _estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
@@ -189,7 +203,9 @@ def at_limit(value: float, lower: float, upper: float) -> str:
     reach = AT_LIMIT * (upper - lower)
     if value >= upper - reach:
         return "upper"
-    return "lower" if value <= lower + reach else ""
+    # An upper end that is never reached says nothing of how near the lower one is.
+    least = min(reach, BOUNDLESS * AT_LIMIT * lower) if lower > 0.0 else reach
+    return "lower" if value <= lower + least else ""
 
 
 def _bounds(findings: Findings, fit: Fitted) -> Mapping[str, tuple[float, float]]:
@@ -307,6 +323,8 @@ def _why(findings: Findings, score: ScreeningScore, chosen: bool) -> str:
                     f"explains less than {candidate.name}, by a log-likelihood of "
                     f"{rival.behind / 2:.4g}"
                 )
+    if name in findings.selection.stages[-1].unfitted:
+        return UNFITTED
     if score.resolvable is None:
         return "these data could not show it at any size"
     if not passes(findings.problem, score):

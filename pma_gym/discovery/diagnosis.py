@@ -51,6 +51,9 @@ nothing beyond noise. `unknown`: structure is missing that no effect of the cata
 ADDED = "added to the model"
 """Why a candidate is where it is, if it is in the proposed model."""
 
+UNFITTED = "could not be fitted: its score promises more than any fit of it brings"
+"""The same of a candidate that may carry the residual although its fits do not."""
+
 
 @dataclass(frozen=True)
 class Estimate:
@@ -339,6 +342,22 @@ class Floor:
 
 
 @dataclass(frozen=True)
+class Nuisance:
+    """What is neither the rig's nor white: fitted together with every candidate.
+
+    Attributes:
+        kind: `line` (of the mains), `drift` or `coloured noise`.
+        signals: by column, its root mean square in standard deviations of the noise; of coloured
+            noise the correlation from one reading to the next.
+        hertz: frequency of a line; None of others.
+    """
+
+    kind: str
+    signals: Mapping[str, float]
+    hertz: float | None = None
+
+
+@dataclass(frozen=True)
 class Judgement:
     """What the proposed model leaves of one signal, in floors (`adequacy`).
 
@@ -386,6 +405,7 @@ class Diagnosis:
         tones: where the verdict is `unknown`, the frequency (Hz) at which a signal's residual
             oscillates, for those that do.
         floors: noise by column name.
+        nuisances: mains lines, drifts and coloured noise in the readings.
         adequacy: what is left of each signal, by its column.
         states: what belongs to each trial (zeros, starts) beside the amended model, by its name.
         written: misfit of the amended model with these, over all trials, by column in its unit:
@@ -416,6 +436,7 @@ class Diagnosis:
     law: ResidualLaw | None = None
     tones: Mapping[str, float] = field(default_factory=dict)
     floors: Mapping[str, Floor] = field(default_factory=dict)
+    nuisances: tuple[Nuisance, ...] = ()
     adequacy: Mapping[str, Judgement] = field(default_factory=dict)
     states: Mapping[str, TrialState] = field(default_factory=dict)
     written: Mapping[str, float] = field(default_factory=dict)
@@ -426,6 +447,11 @@ class Diagnosis:
     warnings: tuple[str, ...] = ()
     converged: bool = True
     worsened: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+
+    @property
+    def unfitted(self) -> tuple[str, ...]:
+        """Candidates that could not be fitted, and may carry what is missing."""
+        return tuple(each.name for each in self.candidates if each.why == UNFITTED)
 
     @property
     def blind(self) -> tuple[str, ...]:
@@ -488,6 +514,10 @@ class Diagnosis:
                 "words": self.law.words,
             },
             "tones": dict(self.tones),
+            "nuisances": [
+                {"kind": each.kind, "hertz": each.hertz, "signals": dict(each.signals)}
+                for each in self.nuisances
+            ],
             "floors": {
                 signal: {
                     "value": floor.value,

@@ -18,6 +18,8 @@ from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.preparation.acceptance_floors import Stated, acceptance_floors
 from pma_gym.discovery.preparation.data_checks import check_dataset
 from pma_gym.discovery.preparation.initial_floors import initial_floors
+from pma_gym.discovery.preparation.learnt_noise import learnt_noise
+from pma_gym.discovery.preparation.mains_lines import with_lines
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
@@ -135,6 +137,7 @@ class _Work:
         own = free_parameters(given)
         _check_size(logged, own.free)
         noise = tuple(white_noise(floor.level) for floor in floors)
+        noise = learnt_noise(noise, logged, named)
         problem = FitProblem(
             trials,
             given,
@@ -146,6 +149,7 @@ class _Work:
         )
         self._tell("refitting parameters", 0, 1)
         refitted = self._timed("parameters", lambda: self._refitted(problem, journal))
+        problem, refitted = self._with_lines(problem, refitted, logged, named)
         orders = [each.order for each in named]
         known = None if None in orders else [float(order or 0.0) for order in orders]
         every = candidate_effects(given, known) if search else []
@@ -207,6 +211,23 @@ class _Work:
                 "commands and the model's drive and force"
             )
         return refit
+
+    def _with_lines(
+        self,
+        problem: FitProblem,
+        refitted: Fitted,
+        logged: Sequence[Logged],
+        named: Sequence[NamedTrial],
+    ) -> tuple[FitProblem, Fitted]:
+        """With mains lines as a nuisance of every fit, where the residual has any."""
+        whitened = problem.whitened_residuals(refitted.model)
+        held = whitened.readings(refitted.values)
+        assert held is not None
+        noise = with_lines(problem.noise, logged, simulated_less_measured(whitened, held))
+        if noise == problem.noise:
+            return problem, refitted
+        problem = replace(problem, noise=learnt_noise(noise, logged, named))
+        return problem, problem.fit(refitted.model) or refitted
 
     def _nested(self, selection: Selection) -> Selection:
         """Without the parameters of effects that the trials do not determine."""

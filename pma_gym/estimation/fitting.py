@@ -39,6 +39,10 @@ FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
 """First, least and largest such move, as a share of the parameter's value, or of its bounds' width
 where it is near 0."""
 
+BOUNDLESS = 100.0
+"""How many times a parameter's value a hundredth of its bounds' width is, from which on the bounds
+of what is positive say nothing of its scale."""
+
 CLOSE = 1e-3
 """A fit has converged when a further step would lower chi-square, counted in its mean per residual,
 by less than this: the parameters are within sqrt(CLOSE) = 3 % of a standard error of the best."""
@@ -236,7 +240,10 @@ class LevenbergMarquardt:
             return np.clip(SHOWN / shown, LEAST_MOVE * scales, MOST_MOVE * scales)
 
     def _scales(self, values: Array) -> Array:
-        return np.maximum(np.abs(values), 1e-2 * (self.upper - self.lower))
+        width = 1e-2 * (self.upper - self.lower)
+        # A limit may be anything up to one that is never reached; its own size is its scale.
+        boundless = (self.lower > 0.0) & (width > BOUNDLESS * np.abs(values))
+        return np.where(boundless, np.abs(values), np.maximum(np.abs(values), width))
 
     def _held(self) -> NDArray[np.bool_]:
         """Which parameters a bound keeps from falling further."""

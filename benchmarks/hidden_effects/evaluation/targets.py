@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from benchmarks.hidden_effects.evaluation.verdicts import RIGHT_STRUCTURE, Outcome
+from benchmarks.hidden_effects.generation.readout_noise import UGLY
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,18 @@ _FAINT = (
 
 _NOTHING = (
     Rate("false alarm", lambda o: o.detected, Target(most=0.01)),
+    Rate("a false name", lambda o: o.verdict == "effect"),
+)
+
+_SINGLE_UGLY = (
+    Rate("named right", lambda o: o.right, Target(least=0.88)),
+    Rate("right or in its group", lambda o: o.near),
+    Rate("confidently wrong", lambda o: o.wrong, Target(most=0.02)),
+    Rate("detected", lambda o: o.detected),
+)
+
+_NOTHING_UGLY = (
+    Rate("false alarm", lambda o: o.detected, Target(most=0.02)),
     Rate("a false name", lambda o: o.verdict == "effect"),
 )
 
@@ -147,12 +160,14 @@ RATES: dict[str, tuple[Rate, ...]] = {
     "parameters": _PARAMETERS,
     "pair": _PAIR,
     "unknown": _UNKNOWN,
+    **{f"single_{ugly}": _SINGLE_UGLY for ugly in UGLY},
+    **{f"nothing_{ugly}": _NOTHING_UGLY for ugly in UGLY},
     "undecidable": _UNDECIDABLE,
     "rigs": _RIGS,
 }
 """By block."""
 
-GAP_BLOCKS = ("single", "faint", "parameters", "pair")
+GAP_BLOCKS = ("single", "faint", "parameters", "pair", *(f"single_{ugly}" for ugly in UGLY))
 """Blocks whose truth the catalogue holds, so that an amended model could close the gap."""
 
 GAP_MEDIAN, GAP_TENTH = Target(least=0.95), Target(least=0.80)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from benchmarks.hidden_effects.generation.cases import Case, draw_case
 from benchmarks.hidden_effects.generation.effects import KINDS, OUTSIDE
+from benchmarks.hidden_effects.generation.readout_noise import UGLY
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,7 @@ class Block:
         trials: of a case.
         seconds: of a trial (s).
         rounds: experiments that follow on the same rig, where the diagnosis asks for one.
+        ugly: what stands in the readings beside noise (`readout_noise`); empty: nothing.
     """
 
     name: str
@@ -26,11 +28,13 @@ class Block:
     trials: int = 6
     seconds: float = 8.0
     rounds: int = 0
+    ugly: str = ""
 
     def draw(self, seed: int, number: int) -> Case:
         """Case of a number, 1 and up; the same seed and number give the same bits."""
         hidden = (self.turns[(number - 1) % len(self.turns)],) if self.turns else None
-        return draw_case(seed, number, self.name, hidden, self.trials, self.seconds, self.ratio)
+        drawn = (self.trials, self.seconds, self.ratio, self.ugly)
+        return draw_case(seed, number, self.name, hidden, *drawn)
 
 
 BLOCKS: dict[str, Block] = {
@@ -42,6 +46,8 @@ BLOCKS: dict[str, Block] = {
         Block("parameters"),
         Block("pair"),
         Block("unknown", tuple(OUTSIDE)),
+        *(Block(f"single_{ugly}", tuple(KINDS), ugly=ugly) for ugly in UGLY),
+        *(Block(f"nothing_{ugly}", ugly=ugly) for ugly in UGLY),
     )
 }
 """By name, in the order of the table."""

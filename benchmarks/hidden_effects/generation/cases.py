@@ -18,6 +18,7 @@ from benchmarks.hidden_effects.generation.effect_size import (
 from benchmarks.hidden_effects.generation.effects import ALL, KINDS, OUTSIDE, Values
 from benchmarks.hidden_effects.generation.excitation import PROTOCOLS, draw_trial
 from benchmarks.hidden_effects.generation.likelihood_ratios import odds_of_parameters
+from benchmarks.hidden_effects.generation.readout_noise import NONE, ReadoutNoise, draw_noise
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import NOMINAL, SENSORS, UNITS, Array
 from benchmarks.hidden_effects.physics.simulation import RATE, Commands
@@ -87,6 +88,7 @@ def draw_case(
     trials: int = 6,
     seconds: float = 8.0,
     ratio: tuple[float, float] = (0.5, 2.0),
+    ugly: str = "",
 ) -> Case:
     """A case of a block; the same arguments give the same bits.
 
@@ -98,6 +100,7 @@ def draw_case(
         trials: how many, the last of which repeats another.
         seconds: how long each is.
         ratio: range of the target ratio r, drawn evenly in its logarithm.
+        ugly: what stands in the readings beside noise, one of `UGLY`; empty: nothing.
     """
     g = np.random.default_rng([seed, number])
     hidden = effects if effects is not None else _draw_effects(g, block)
@@ -111,8 +114,11 @@ def draw_case(
     typical = {name: ALL[name].draw(g, largest) for name in hidden}
     targets = {name: float(np.exp(g.uniform(*np.log(ratio)))) for name in hidden}
     hidden_effects, clean = _hide(experiment, rig, typical, targets)
+    beside = draw_noise(g, ugly)
+    colours = np.array([beside.memory(i, colour) for i, colour in enumerate(colours.tolist())])
     readings = [
-        _measured(g, clean[i], levels, colours, hidden_effects["parameters"]) for i in range(trials)
+        _measured(g, clean[i], levels, colours, hidden_effects["parameters"], beside)
+        for i in range(trials)
     ]
     time = np.arange(commands.motor.shape[1]) / RATE
     log_odds = {}
@@ -127,6 +133,7 @@ def draw_case(
         "log_odds": log_odds,
         "noise_factors": dict(zip(SENSORS, levels.tolist(), strict=True)),
         "noise_memory": dict(zip(SENSORS, colours.tolist(), strict=True)),
+        "readout_noise": beside.describe(),
         "protocols": names,
         "joint_ratios": hidden_effects["joint"],
         "seed": seed,
@@ -186,7 +193,7 @@ def draw_rig(g: np.random.Generator, most: float) -> tuple[dict[str, float], dic
 
 
 def _draw_effects(g: np.random.Generator, block: str) -> tuple[str, ...]:
-    if block in ("nothing", "parameters"):
+    if block.startswith("nothing") or block == "parameters":
         return ()
     if block == "unknown":
         return (str(g.choice(list(OUTSIDE))),)
@@ -285,17 +292,19 @@ def _measured(
     levels: Array,
     colours: Array,
     parameters: Mapping[str, Values],
+    beside: ReadoutNoise = NONE,
 ) -> Array:
     """One trial's readings in file units: noise, a zero of the LVDT, the DAQ's rounding."""
     white = g.standard_normal(clean.shape)
     zero = g.normal(0.0, 0.1)
+    added = beside.added(g, np.arange(len(clean)) / RATE)
     out = np.empty_like(clean)
     for i in range(4):
         memory = float(colours[i])
         start = [memory * float(g.standard_normal())]
         keep = np.sqrt(1.0 - memory**2)
         coloured, _ = lfilter([keep], [1.0, -memory], white[:, i], zi=start)
-        out[:, i] = clean[:, i] / UNITS[i] + rigs.NOISE[i] * levels[i] * coloured
+        out[:, i] = clean[:, i] / UNITS[i] + rigs.NOISE[i] * levels[i] * (coloured + added[:, i])
     out[:, 0] += zero
     coarse = parameters.get("sensor_quantisation", {"signal": -1.0, "daq_steps": 1.0})
     for i, (gain, offset) in enumerate(rigs.VOLTS):

@@ -203,7 +203,7 @@ class FitProblem:
         """A model fitted to larger noise, ever less of it."""
         for factor in larger:
             noise = tuple(
-                Whitening(n.coefficients, factor * n.innovation, factor * n.level)
+                replace(n, innovation=factor * n.innovation, level=factor * n.level)
                 for n in self.noise
             )
             fitted = replace(self, noise=noise).fit(model, extra)

@@ -134,7 +134,7 @@ def scatter_of_repeats(
     same numbers. The mean of a difference counts too, but for signals whose zero is free.
     """
     squares, count = 0.0, 0
-    for group in _repeats(logged, named):
+    for group in repeats(logged, named):
         for i, j in zip(group, group[1:], strict=False):
             apart = difference(logged[i], logged[j], channel)
             free = logged[i].signals[channel].has_free_zero and apart.size > 1
@@ -145,7 +145,7 @@ def scatter_of_repeats(
     return float(np.sqrt(squares / count)) if count else None
 
 
-def _repeats(logged: Sequence[Logged], named: Sequence[NamedTrial]) -> list[list[int]]:
+def repeats(logged: Sequence[Logged], named: Sequence[NamedTrial]) -> list[list[int]]:
     """Trials that repeat each other, as groups of their places."""
     groups: dict[object, list[int]] = {}
     by_commands: dict[bytes, str] = {}

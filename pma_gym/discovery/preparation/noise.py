@@ -47,11 +47,15 @@ class Whitening:
         coefficients: a of r_t = a_1 r_(t-1) + ... + e_t, shape (order,).
         innovation: standard deviation of e (SI).
         level: standard deviation of r itself (SI).
+        lines: frequencies (Hz) of lines beside it, of free amplitude and phase in every trial.
+        drift: root mean square of a slow drift beside it, another in every trial (SI).
     """
 
     coefficients: tuple[float, ...]
     innovation: float
     level: float
+    lines: tuple[float, ...] = ()
+    drift: float = 0.0
 
     def white(self, series: Array, missing: NDArray[np.int64]) -> Array:
         """Whitened series, shape (..., rows); 0 where a reading that it needs is missing."""

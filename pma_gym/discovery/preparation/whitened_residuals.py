@@ -21,6 +21,7 @@ from pma_gym.discovery.preparation.assumed_range import (
     needed_reach,
 )
 from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.discovery.preparation.nuisance_projection import Projection, projection
 from pma_gym.estimation.logged import Logged
 from pma_gym.estimation.residuals import Residuals, Sums
 from pma_gym.integrator.equations import Interpolation
@@ -105,6 +106,7 @@ class WhitenedResiduals(Residuals):
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
         self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
         self._own = self._places(own or {})
+        self._projections: dict[tuple[int, int], Projection] = {}
 
     @property
     def logged(self) -> list[Logged]:
@@ -211,13 +213,38 @@ class WhitenedResiduals(Residuals):
                 continue
             missing = logged.missing[channel]
             filtered = noise.white(differences[:, channel], missing)
-            if signal.has_free_zero:
+            if noise.lines or noise.drift:
+                self._projection(logged, channel).out_of(filtered)
+            elif signal.has_free_zero:
                 one = np.ones(len(logged.time))
                 one[missing] = 0.0
                 along = noise.white(one[None], missing)[0]
                 filtered -= np.outer(filtered @ along / (along @ along), along)
             white[:, channel] = filtered
         return white
+
+    def without_nuisances(self, logged: Logged, left: Array) -> Array:
+        """Simulated less measured (SI), NaN where there is none, less lines and drifts in it.
+
+        Shape (4, rows).
+        """
+        rest = left.copy()
+        for channel, noise in enumerate(self.noise):
+            if not logged.measures[channel] or not (noise.lines or noise.drift):
+                continue
+            missing = logged.missing[channel]
+            known = np.where(np.isfinite(left[channel]), left[channel], 0.0)
+            white = noise.white(known[None].copy(), missing)[0]
+            rest[channel] -= self._projection(logged, channel).predicted(white)
+        return rest
+
+    def _projection(self, logged: Logged, channel: int) -> Projection:
+        """How nuisances are projected out of a signal of a trial; made once."""
+        key = (id(logged), channel)
+        if key not in self._projections:
+            free = logged.signals[channel].has_free_zero
+            self._projections[key] = projection(self.noise[channel], logged, channel, free)
+        return self._projections[key]
 
     def products(self, columns: Sequence[Array]) -> Pieces:
         """Products of whitened columns, as `columns` gives them."""

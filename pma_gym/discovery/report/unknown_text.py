@@ -34,9 +34,20 @@ def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
         "outdone": _outdone,
     }[reason.why]
     return (
-        f"Something is missing in model {diagnosis.given.name} that no effect of the catalogue "
-        f"carries: {_best(reason, residual)}, {beyond(reason, residual)}."
+        f"Something is missing in model {diagnosis.given.name} that {_not_carried(diagnosis)}: "
+        f"{_best(reason, residual)}, {beyond(reason, residual)}."
     ) + f"{_candidate(diagnosis)}{_tones(diagnosis)}"
+
+
+def _not_carried(diagnosis: Diagnosis) -> str:
+    """What does not carry the residual; one that could not be fitted may."""
+    if not diagnosis.unfitted:
+        return "no effect of the catalogue carries"
+    one = len(diagnosis.unfitted) == 1
+    return (
+        f"no effect carries that could be fitted; {effect_names(diagnosis.unfitted)}, which may, "
+        f"could not, although {'its score promises' if one else 'their scores promise'} more"
+    )
 
 
 def _candidate(diagnosis: Diagnosis) -> str:

@@ -7,6 +7,7 @@ from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
 from pma_gym.discovery.report.approximate_text import left_words
+from pma_gym.discovery.report.noise_text import nuisance_words
 from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.text import (
     at_its_limit,
@@ -202,8 +203,10 @@ def twin(path: str, fit: Fitted) -> str | None:
 def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> tuple[str, ...]:
     """What was done, a sentence each."""
     problem, selection = findings.problem, findings.selection
+    beside = nuisance_words(diagnosis.nuisances, len(diagnosis.floors))
     said = [
-        f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}.",
+        f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}."
+        + (f" Fitted together with every candidate: {beside}." if beside else ""),
         f"Parameters first: {len(problem.own.free)} parameters of {findings.given.name} were "
         "refitted, with the zeros of contraction and rotation free in every trial; each is held to "
         "its value as by a measurement with 10 % error, which counts only where the trials do not "

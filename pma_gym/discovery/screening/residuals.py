@@ -1,6 +1,7 @@
 """What a fit leaves of the readings, and whether that is noise."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +30,32 @@ def reestimated_noise(
     for channel, before in enumerate(problem.noise):
         parts = [part[channel] for part in left]
         known = [part for part in parts if np.isfinite(part).any()]
-        filters.append(autoregression(known, before.level) if known else before)
+        learnt = autoregression(known, before.level) if known else before
+        filters.append(replace(learnt, lines=before.lines, drift=before.drift))
     return tuple(filters)
 
 
 def residuals(whitened: WhitenedResiduals, fit: Fitted) -> list[Array]:
-    """Simulated less measured (SI), shape (signals, rows) for each trial, free zeros taken out."""
+    """Simulated less measured (SI), shape (signals, rows) for each trial, nuisances taken out."""
     readings = whitened.readings(fit.values)
     assert readings is not None
-    return simulated_less_measured(whitened, readings)
+    left = simulated_less_measured(whitened, readings)
+    return [
+        whitened.without_nuisances(logged, part)
+        for logged, part in zip(whitened.logged, left, strict=True)
+    ]
+
+
+def innovations(noise: Whitening, part: Array) -> Array:
+    """What noise of a known colour does not predict of a residual (SI), scaled to its level.
+
+    NaN where a reading that it needs is missing.
+    """
+    if not noise.coefficients:
+        return part
+    missing = np.flatnonzero(~np.isfinite(part))
+    white = noise.level * noise.white(np.nan_to_num(part)[None], missing)[0]
+    return np.where(np.isfinite(part), white, np.nan)
 
 
 def simulated_less_measured(whitened: WhitenedResiduals, readings: Sequence[Array]) -> list[Array]:
@@ -91,7 +109,9 @@ def autocorrelation_tests(
     left, signals = residuals(whitened, fit), whitened.logged[0].signals
     rate = float(np.median([1.0 / np.median(np.diff(trial.time)) for trial in problem.trials]))
     return {
-        signal.name: autocorrelation_test([part[c] for part in left], rate)
+        signal.name: autocorrelation_test(
+            [innovations(problem.noise[c], part[c]) for part in left], rate
+        )
         for c, signal in enumerate(signals)
     }
 

@@ -7,13 +7,13 @@ once, so the p-value holds for the largest of all.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
+from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 
 Array = NDArray[np.float64]
@@ -38,6 +38,10 @@ CLOSER, AT_ONCE = 24, 64
 """How many probes of a candidate a closer look simulates at most, taken evenly, and how many lie in
 memory together."""
 
+SCANNED, WIDER, BEST_SCANNED = 32, 4.0, 4
+"""Values of a parameter that a scan of its range simulates, how far it goes beyond the probes, and
+how many of the best fits start from."""
+
 LEAST_PART = 1e-6
 """Share of a probe's change that parameters must leave, or it is one of theirs."""
 
@@ -60,6 +64,7 @@ class ScreeningScore:
             signal where that is most.
         resolvable: factor on the usual size from which on it would be seen; None if it never is.
         starts: probes that explain most, with their factors, the best first.
+        null: largest gains over the catalogue of simulated residuals, shape (resamples,).
     """
 
     candidate: CandidateEffect
@@ -70,6 +75,13 @@ class ScreeningScore:
     change: float
     resolvable: float | None
     starts: tuple[tuple[int, float], ...]
+    null: Array = field(default_factory=lambda: np.empty(0), repr=False, compare=False)
+
+    def p_value_of(self, gain: float) -> float:
+        """Family-wise p-value of a gain, such as that of a fit; the score's own without a null."""
+        if not self.null.size:
+            return self.p_value
+        return float((1.0 + np.sum(self.null >= gain)) / (len(self.null) + 1.0))
 
 
 @dataclass(frozen=True)
@@ -250,6 +262,7 @@ def _judged(
                 float(abs(factors[best]) * each.changes[best]),
                 float(np.sqrt(SHOWN_GAIN / each.strengths[usual])),
                 _starts(gains, factors),
+                largest,
             )
         )
     return scores
@@ -329,3 +342,48 @@ def starting_points(
                 tried.append(values)
     gains = _simulated_gains(baseline, whitened, replace(candidate, probes=np.array(tried)))
     return [tried[k] for k in np.argsort(-gains, kind="stable")]
+
+
+def scanned_starts(
+    baseline: Baseline, whitened: WhitenedResiduals, score: ScreeningScore
+) -> list[Array]:
+    """Where to begin fits of a candidate whose chi-square is rugged: the best of its whole range.
+
+    Every parameter of its size is scanned, in steps of equal ratio, at the shapes of the probes; of
+    a candidate without a size each parameter is.
+    """
+    candidate = score.candidate
+    if not len(candidate.probes):
+        return []
+    sizes = candidate.amplitudes if candidate.amplitudes.any() else candidate.fitted
+    if not sizes.any():
+        sizes = np.ones(len(candidate.paths), bool)
+    lower, upper = bounds(candidate.paths)
+    tried = []
+    shapes = np.unique(candidate.probes[:, ~sizes], axis=0)
+    for place in np.flatnonzero(sizes):
+        probed, absent = candidate.probes[:, place], candidate.absent[place]
+        # A limit begins at its neutral value, which is never reached; a size counts from there.
+        limit = bool(abs(absent) > np.abs(probed).max())
+        away = np.abs(probed if limit else probed - absent)
+        away = away[away > 0.0]
+        if not away.size:
+            continue
+        least, most = float(away.min()), float(away.max())
+        for step in np.geomspace(least / WIDER, most * WIDER, SCANNED):
+            for shape in shapes[:: -(-len(shapes) // 3)]:
+                for sign in (1.0, -1.0) if candidate.signs.any() and not limit else (1.0,):
+                    values = candidate.probes[score.probe].copy()
+                    values[~sizes] = shape
+                    values[place] = step if limit else absent + sign * step
+                    tried.append(np.clip(values, lower, upper))
+    if not tried:
+        return []
+    values = np.unique(np.array(tried), axis=0)
+    gains = np.concatenate(
+        [
+            _simulated_gains(baseline, whitened, replace(candidate, probes=values[k : k + AT_ONCE]))
+            for k in range(0, len(values), AT_ONCE)
+        ]
+    )
+    return [values[k] for k in np.argsort(-gains, kind="stable")[:BEST_SCANNED]]

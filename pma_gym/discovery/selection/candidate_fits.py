@@ -8,12 +8,24 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
-from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, starting_points
+from pma_gym.discovery.screening.score_test import (
+    Baseline,
+    ScreeningScore,
+    scanned_starts,
+    starting_points,
+)
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
 """How many fits of a candidate are started, and how many where none came near the trials."""
+
+LEAST_KEPT = 0.7
+"""Share of the gain that a score promised below which a fit is tried again from a scan of the
+candidate's range."""
+
+LEAST_FITTED = 0.35
+"""The same, below which a candidate counts as one that could not be fitted."""
 
 COST = 3.0
 """Log-likelihood that a parameter costs: half the logarithm of some 400 effective readings."""
@@ -59,11 +71,35 @@ def fitted(
             not problem.far(best) if caught else before.chi_square - best.chi_square >= each.gain
         ):
             break
+    if best is None or before.chi_square - best.chi_square < LEAST_KEPT * each.gain:
+        for begun in scanned_starts(baseline, whitened, each):
+            fit = problem.fit(before.model, extra, {each.candidate.name: begun})
+            if fit is not None and (best is None or fit.chi_square < best.chi_square):
+                best = fit
     if best is None or best.chi_square > before.chi_square:
         # A local minimum: without the effect the fit explains more.
         return None
     journal.keep(key, kept_form(best))
     return best
+
+
+def unfitted(
+    before: Fitted, scores: Sequence[ScreeningScore], fits: dict[str, Fitted]
+) -> tuple[str, ...]:
+    """Candidates whose fits explain far less than their scores promised, and more than any fit.
+
+    Args:
+        before: the model that they were tried beside.
+        scores: of those that were fitted.
+        fits: theirs, by name, as far as there are any.
+    """
+    most = max((before.chi_square - fit.chi_square for fit in fits.values()), default=0.0)
+    gains = {name: before.chi_square - fit.chi_square for name, fit in fits.items()}
+    return tuple(
+        each.candidate.name
+        for each in scores
+        if each.gain > most and gains.get(each.candidate.name, 0.0) < LEAST_FITTED * each.gain
+    )
 
 
 def restarted(

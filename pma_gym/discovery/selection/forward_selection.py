@@ -33,6 +33,7 @@ from pma_gym.discovery.selection.candidate_fits import (
     refit,
     restarted,
     stripped,
+    unfitted,
     without_idle,
 )
 from pma_gym.plant.model import Model
@@ -81,6 +82,8 @@ class Stage:
         gate: the looks that passed.
         missing: whether the residual says of itself that something is missing.
         scan: pieces of it that opened the gate by themselves.
+        unfitted: candidates that could not be fitted: their scores promise more than any fit
+            brings, and their own fits bring far less.
     """
 
     problem: FitProblem
@@ -91,6 +94,7 @@ class Stage:
     gate: tuple[ScreeningScore, ...]
     missing: bool
     scan: ScanStatistic = NO_EXCESS
+    unfitted: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -196,6 +200,7 @@ def _stage(
         scores = _refined_scores(problem, baseline, plain, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
     fits: dict[str, Fitted] = {}
+    failed: tuple[str, ...] = ()
     if gate:
         worth = [each for each in scores if each.gain > NEAR * scores[0].gain and each.starts]
         for number, each in enumerate(worth[:TRIED]):
@@ -204,9 +209,10 @@ def _stage(
             if refit is not None:
                 fits[each.candidate.name] = refit
         fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
+        failed = unfitted(before, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
-    return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan)
+    return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan, failed)
 
 
 def _refined_scores(

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pma_gym.discovery.preparation.noise import slow_part, sparse
 from pma_gym.discovery.preparation.quantisation import is_coarse
 from pma_gym.discovery.screening.autocorrelation import autocorrelation_test, tone
-from pma_gym.discovery.screening.residuals import residuals
+from pma_gym.discovery.screening.residuals import innovations, residuals
 from pma_gym.discovery.verdict.findings import Findings
 
 LEAST_SLOW = 0.02
@@ -73,7 +73,9 @@ def _slow(findings: Findings, left: list[NDArray[np.float64]]) -> NDArray[np.flo
     rate = _rate(findings)
     shares = np.zeros((2, len(findings.floors)))
     for channel, floor in enumerate(findings.floors):
-        parts = [part[channel] for part in left]
+        # Of the colour that is known from rest and repeats; what is missing must not hide in it.
+        noise = findings.problem.noise[channel]
+        parts = [innovations(noise, part[channel]) for part in left]
         shares[0, channel] = slow_part(parts, rate, floor.level) / floor.level**2
         kept = autocorrelation_test(parts, rate)
         # What a coarse sensor loses between its steps follows the motion, and no effect carries it.

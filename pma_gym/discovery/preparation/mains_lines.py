@@ -1,0 +1,119 @@
+"""Find mains lines (50 or 60 Hz, harmonics, and their aliases) in what a refitted model leaves.
+
+A line is looked for at no other frequency, against the residual beside it, and is fitted together
+with every candidate afterwards. Where its alias lies in the band that commands excite, it is not
+looked for: there it could be the rig.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import f as fisher
+
+from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.estimation.logged import Logged
+
+Array = NDArray[np.float64]
+
+MAINS_HZ, HARMONICS = (50.0, 60.0), (1, 2, 3, 4, 5, 6)
+"""Nominal frequencies of mains, and which multiples are looked for."""
+
+OFF_HZ = np.linspace(-0.2, 0.2, 9)
+"""How far the frequency of mains may be off (Hz)."""
+
+BESIDE_HZ = np.array([-2.5, -2.1, -1.7, -1.3, 1.3, 1.7, 2.1, 2.5])
+"""Where the residual beside a line is taken (Hz from it)."""
+
+LEAST_ALIAS_HZ = 4.0
+"""Alias below which a line is not looked for: commands excite the rig there."""
+
+CHANCE = 1e-5
+"""That noise is taken for a line, for one signal and one frequency."""
+
+LEAST_SIZE = 0.1
+"""Line (rms) in standard deviations of the noise, below which it counts as none."""
+
+
+def with_lines(
+    noise: Sequence[Whitening], logged: Sequence[Logged], left: Sequence[Array]
+) -> tuple[Whitening, ...]:
+    """Whitening with the lines that stand in a residual; levels are those beside them.
+
+    Args:
+        noise: of the signals.
+        logged: the trials.
+        left: simulated less measured (SI), NaN where not measured, shape (signals, rows) each.
+    """
+    lines: list[list[float]] = [[] for _ in noise]
+    powers = np.zeros(len(noise))
+    for mains in MAINS_HZ:
+        base = _frequency(mains, noise, logged, left)
+        for harmonic in HARMONICS:
+            for channel, each in enumerate(noise):
+                hertz = harmonic * base
+                if any(abs(hertz - other) < 1e-9 for other in lines[channel]):
+                    continue
+                size, chance = _line(hertz, logged, [part[channel] for part in left])
+                if chance < CHANCE and size > LEAST_SIZE * each.level:
+                    lines[channel].append(hertz)
+                    powers[channel] += size**2
+    return tuple(
+        _beside_lines(each, lines[channel], powers[channel]) if lines[channel] else each
+        for channel, each in enumerate(noise)
+    )
+
+
+def _beside_lines(noise: Whitening, lines: Sequence[float], power: float) -> Whitening:
+    """Noise beside its lines, which were in its level as it was known, and in its colour."""
+    level = float(np.sqrt(max(noise.level**2 - power, 0.25 * noise.level**2)))
+    return Whitening((), level, level, tuple(lines), noise.drift)
+
+
+def _frequency(
+    mains: float, noise: Sequence[Whitening], logged: Sequence[Logged], left: Sequence[Array]
+) -> float:
+    """The frequency near that of mains at which all residuals have most power."""
+    powers = []
+    for off in OFF_HZ:
+        power = 0.0
+        for channel, each in enumerate(noise):
+            for part, trial in zip(left, logged, strict=True):
+                if np.isfinite(part[channel]).any():
+                    power += float(_power(mains + off, trial.time, part[channel]) / each.level**2)
+        powers.append(power)
+    return mains + float(OFF_HZ[int(np.argmax(powers))])
+
+
+def line_size(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> float:
+    """Size of a line in residuals of one signal (rms, SI)."""
+    return _line(hertz, logged, parts)[0]
+
+
+def _line(hertz: float, logged: Sequence[Logged], parts: Sequence[Array]) -> tuple[float, float]:
+    """Size of a line (rms, SI), and how likely the residual beside it makes one so large."""
+    power, beside, count, rows = 0.0, 0.0, 0, 0
+    for part, trial in zip(parts, logged, strict=True):
+        known = int(np.isfinite(part).sum())
+        if known < 4 * len(BESIDE_HZ):
+            continue
+        rate = 1.0 / float(np.median(np.diff(trial.time)))
+        alias = abs(hertz - rate * np.round(hertz / rate))
+        if not LEAST_ALIAS_HZ < alias < 0.5 * rate - 1.0 / (trial.time[-1] - trial.time[0]):
+            return 0.0, 1.0
+        power += _power(hertz, trial.time, part)
+        beside += np.mean([_power(hertz + off, trial.time, part) for off in BESIDE_HZ])
+        count, rows = count + 1, rows + known
+    if not count or beside <= 0.0:
+        return 0.0, 1.0
+    ratio = power / beside
+    chance = float(fisher.sf(ratio, 2 * count, 2 * count * len(BESIDE_HZ)))
+    return float(np.sqrt(max(power - beside, 0.0) / rows)), chance
+
+
+def _power(hertz: float, time: Array, part: Array) -> float:
+    """Sum of squares (SI) that a line of free amplitude and phase explains of one trial."""
+    known = np.isfinite(part)
+    angle = 2.0 * np.pi * hertz * time[known]
+    wave = np.exp(-1j * angle)
+    return float(2.0 * np.abs(wave @ (part[known] - part[known].mean())) ** 2 / known.sum())

@@ -1,0 +1,128 @@
+"""Project nuisances (zeros, lines, drift) out of whitened differences, in the fits of all models.
+
+A line has a free amplitude and phase in every trial, a free zero any value. A drift is random: slow
+cosines whose sizes are normal numbers of known variance. With whitened columns W of variances V the
+covariance of whitened readings is I + W V W^T; multiplying by its inverse root makes them white
+again (generalised least squares). What repeats from trial to trial keeps most of its weight so;
+what differs between trials like a drift loses it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.discovery.preparation.noise import Whitening
+from pma_gym.estimation.logged import Logged
+
+Array = NDArray[np.float64]
+
+MOST_COSINES = 4
+"""Most cosines of a drift."""
+
+SLOW_SHARE = 0.1
+"""Share of a command's variance below its slowest excited frequency."""
+
+LEAST_PART = 1e-6
+"""Part of a column that others must leave, or it is one of theirs."""
+
+
+@dataclass(frozen=True)
+class Projection:
+    """A symmetric matrix I - Q^T diag(loss) Q that makes whitened readings white again.
+
+    Attributes:
+        basis: Q, orthonormal rows, shape (k, rows).
+        loss: 1 for what is projected out, less for what is known beforehand, shape (k,).
+        raw: nuisances (SI) of the rows of `basis`, shape (k, rows).
+        shrunk: share of each that is its best prediction, shape (k,).
+    """
+
+    basis: Array
+    loss: Array
+    raw: Array
+    shrunk: Array
+
+    def out_of(self, white: Array) -> None:
+        """Project nuisances out of whitened columns, shape (columns, rows), in place."""
+        white -= ((white @ self.basis.T) * self.loss) @ self.basis
+
+    def predicted(self, white: Array) -> Array:
+        """The best prediction of the nuisances (SI) in whitened readings, shape (rows,)."""
+        return ((self.basis @ white) * self.shrunk) @ self.raw
+
+
+def projection(noise: Whitening, logged: Logged, channel: int, free_zero: bool) -> Projection:
+    """How nuisances are projected out of one signal of a trial.
+
+    Args:
+        noise: of the signal.
+        logged: the trial.
+        channel: the signal.
+        free_zero: whether its zero is free.
+    """
+    time, missing = logged.time - logged.time[0], logged.missing[channel]
+    free = [np.ones(len(time))] if free_zero else []
+    for hertz in noise.lines:
+        free += [np.cos(2.0 * np.pi * hertz * time), np.sin(2.0 * np.pi * hertz * time)]
+    known = [noise.drift * each for each in drift_cosines(logged)] if noise.drift > 0.0 else []
+    if known and not free_zero:
+        known.append(np.full(len(time), noise.drift))
+
+    def white(columns: list[Array]) -> Array:
+        rows = np.reshape(columns, (-1, len(time))).copy()
+        rows[:, missing] = 0.0
+        return noise.white(rows, missing)
+
+    return _projection(free, known, white)
+
+
+def _projection(
+    free: list[Array], known: list[Array], white: Callable[[list[Array]], Array]
+) -> Projection:
+    """From columns of free size and columns of unit variance (SI)."""
+    rows = white([*free, *known])
+    left, sizes, right = np.linalg.svd(rows[: len(free)], full_matrices=False)
+    kept = sizes > LEAST_PART * sizes.max(initial=0.0)
+    basis = right[kept]
+    raw = (left[:, kept].T / sizes[kept, None]) @ np.reshape(free, (-1, rows.shape[1]))
+    loss, shrunk = np.ones(len(basis)), np.ones(len(basis))
+    if known:
+        across = rows[len(free) :] @ basis.T
+        rest = rows[len(free) :] - across @ basis
+        own = np.reshape(known, (-1, rows.shape[1])) - across @ raw
+        left, sizes, right = np.linalg.svd(rest, full_matrices=False)
+        kept = sizes > LEAST_PART * max(sizes.max(initial=0.0), 1.0)
+        basis = np.concatenate([basis, right[kept]])
+        raw = np.concatenate([raw, (left[:, kept].T / sizes[kept, None]) @ own])
+        strength = sizes[kept] ** 2
+        loss = np.append(loss, 1.0 - 1.0 / np.sqrt(1.0 + strength))
+        shrunk = np.append(shrunk, strength / (1.0 + strength))
+    return Projection(basis, loss, raw, shrunk)
+
+
+def drift_cosines(logged: Logged) -> list[Array]:
+    """Cosines of a drift of mean square 1 in all, below half the slowest excited frequency."""
+    time = logged.time - logged.time[0]
+    duration = max(float(time[-1]), 1e-300)
+    most = int(duration * slowest_hertz(logged) + 1e-9)
+    count = int(np.clip(most, 1, MOST_COSINES))
+    sizes = 1.0 / np.arange(1, count + 1)
+    sizes *= np.sqrt(2.0 / np.sum(sizes**2))
+    return [
+        size * np.cos(np.pi * k * time / duration)
+        for k, size in zip(range(1, count + 1), sizes.tolist(), strict=True)
+    ]
+
+
+def slowest_hertz(logged: Logged) -> float:
+    """The slowest frequency (Hz) that the commands of a trial excite, at least one period."""
+    slowest = np.inf
+    duration = float(logged.time[-1] - logged.time[0])
+    for command in (logged.motor, logged.regulator):
+        power = np.abs(np.fft.rfft(command - command.mean())) ** 2
+        if power.sum() > 1e-12 * len(command) * float(np.sum(command**2) + 1e-300):
+            shares = np.cumsum(power) / power.sum()
+            slowest = min(slowest, int(np.searchsorted(shares, SLOW_SHARE)) / duration)
+    return max(slowest, 1.0 / duration) if np.isfinite(slowest) else 1.0 / duration

@@ -1,0 +1,126 @@
+"""Noise as laboratories have it is learnt from repeats and rest, and projected out of every fit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pma_gym import Plant, Trial, load_model
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.discovery import diagnose
+from pma_gym.discovery.preparation.learnt_noise import learnt_noise
+from pma_gym.discovery.preparation.mains_lines import with_lines
+from pma_gym.discovery.preparation.noise import Whitening, white_noise
+from pma_gym.discovery.preparation.nuisance_projection import projection
+from pma_gym.estimation.logged import Logged
+
+RATE = 128.0
+LEVEL = 1e3
+CHANNEL = 3
+
+
+def _logged(noises: list[np.ndarray]) -> tuple[list[Logged], list[NamedTrial]]:
+    """Repeats of one trial with pressure (Pa) alone, each with its noise."""
+    model = load_model("serres2008")
+    named = []
+    for number, noise in enumerate(noises):
+        time = np.arange(len(noise)) / RATE
+        regulator = 5.0 + np.sin(2.0 * np.pi * 0.5 * time)
+        commands = {"motor_voltage": np.ones(len(time)), "regulator_voltage": regulator}
+        pressure = 3e5 + 2e4 * np.sin(2.0 * np.pi * 0.5 * time - 0.4) + LEVEL * noise
+        trial = Trial(time, commands, {"pressure": pressure})
+        named.append(NamedTrial(f"{number}", trial, repeat_of="0" if number else None))
+    return [Logged.of(model, i, each.trial) for i, each in enumerate(named)], named
+
+
+def _levels() -> list[Whitening]:
+    return [white_noise(1.0), white_noise(1.0), white_noise(1.0), white_noise(LEVEL)]
+
+
+def _coloured(rng: np.random.Generator, memory: float, rows: int) -> np.ndarray:
+    noise = np.zeros(rows)
+    for row in range(1, rows):
+        noise[row] = memory * noise[row - 1] + np.sqrt(1.0 - memory**2) * rng.standard_normal()
+    return noise
+
+
+def test_repeats_tell_the_colour_of_the_noise() -> None:
+    """An AR(1) of 0.8 is learnt from what two repeats differ by; white noise stays white."""
+    rng = np.random.default_rng(1)
+    logged, named = _logged([_coloured(rng, 0.8, 1024) for _ in range(2)])
+    learnt = learnt_noise(_levels(), logged, named)[CHANNEL]
+    assert learnt.coefficients[0] == pytest.approx(0.8, abs=0.08)
+    assert learnt.drift == 0.0
+    logged, named = _logged([rng.standard_normal(1024) for _ in range(2)])
+    assert learnt_noise(_levels(), logged, named)[CHANNEL].coefficients == ()
+
+
+def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> None:
+    """Slow cosines that differ between repeats are a drift; the same in all of them are none."""
+    rng = np.random.default_rng(2)
+    slow = np.cos(np.pi * np.arange(1024) / 1024)
+    logged, named = _logged([rng.standard_normal(1024) + s * slow for s in (1.0, -0.8)])
+    assert learnt_noise(_levels(), logged, named)[CHANNEL].drift > 0.3 * LEVEL
+    logged, named = _logged([rng.standard_normal(1024) + slow for _ in range(2)])
+    assert learnt_noise(_levels(), logged, named)[CHANNEL].drift == 0.0
+
+
+def test_only_mains_and_their_aliases_are_lines() -> None:
+    """50 Hz and the third harmonic's alias are fitted; a tone of 9 Hz is structure."""
+    rng, time = np.random.default_rng(3), np.arange(1024) / RATE
+    left = []
+    for phase in (0.1, 1.7, 4.0):
+        part = np.full((4, 1024), np.nan)
+        tones = np.sin(2 * np.pi * 50 * time + phase) + 0.5 * np.sin(2 * np.pi * 150 * time - phase)
+        tones = tones + np.sin(2 * np.pi * 9.0 * time + phase)
+        part[CHANNEL] = LEVEL * (rng.standard_normal(1024) + tones)
+        left.append(part)
+    logged, _ = _logged([np.zeros(1024)] * 3)
+    fitted = with_lines(_levels(), logged, left)[CHANNEL]
+    assert fitted.lines == pytest.approx((50.0, 150.0))
+    assert all(not each.lines for each in with_lines(_levels(), logged, left)[:CHANNEL])
+
+
+def test_a_projection_makes_noise_with_a_drift_white() -> None:
+    """Its matrix is the inverse root of the covariance, and what is free leaves nothing."""
+    logged, _ = _logged([np.zeros(200)])
+    noise = replace(white_noise(LEVEL), drift=0.7 * LEVEL, lines=(50.0,))
+    made = projection(noise, logged[0], CHANNEL, free_zero=False)
+    time = logged[0].time
+    line = np.sin(2 * np.pi * 50 * time + 0.3)[None]
+    made.out_of(line)
+    assert np.abs(line).max() < 1e-9
+    eye = np.eye(200)
+    made.out_of(eye)
+    covariance = np.eye(200)
+    random = made.loss < 1.0
+    strength = 1.0 / (1.0 - made.loss[random]) ** 2 - 1.0
+    covariance += made.basis[random].T @ (strength[:, None] * made.basis[random])
+    free = made.basis[~random]
+    outside = np.eye(200) - free.T @ free
+    assert eye @ covariance @ eye == pytest.approx(outside, abs=1e-9)
+
+
+def test_hum_is_named_and_does_not_alarm() -> None:
+    """50 Hz of 1.2 sd in all sensors: the model still agrees or data are too few, no structure."""
+    time = np.arange(0.0, 6.0, 1 / RATE)
+    rng, rig = np.random.default_rng(4), Plant(load_model("serres2008"))
+    trials = []
+    for seed, period in enumerate((2.0, 3.0, 1.5, 2.5), 1):
+        motor = 1.5 * (1.0 - np.cos(2.0 * np.pi * np.maximum(time - 1.0, 0.0) / period))
+        regulator = 5.5 + 1.5 * np.sin(2.0 * np.pi * np.maximum(time - 1.0, 0.0) / (1.4 * period))
+        commands = {"motor_voltage": motor, "regulator_voltage": regulator}
+        trial = rig.simulate(Trial(time, commands), seed=seed)
+        sizes = {"contraction": 2.5e-5, "rotation": 2e-3, "load": 0.6, "pressure": 320.0}
+        noisy = {
+            name: values
+            + 1.2 * np.sqrt(2.0) * sizes[name] * np.sin(2 * np.pi * 50 * time + rng.uniform(0, 6))
+            for name, values in trial.measurements.items()
+        }
+        trials.append(replace(trial, measurements=noisy))
+    fitted = diagnose(trials, "serres2008", propose=False)
+    assert fitted.verdict in ("agrees", "parameters", "undecidable")
+    (line,) = [each for each in fitted.nuisances if each.kind == "line"]
+    assert line.hertz == pytest.approx(50.0, abs=0.06)
+    assert set(line.signals) == {"contraction_mm", "rotation_deg", "load_n", "pressure_kpa"}
+    assert "50 Hz in all four sensors" in fitted.steps[0]
