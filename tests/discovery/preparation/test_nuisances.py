@@ -66,7 +66,7 @@ def test_a_drift_is_learnt_from_repeats_and_one_that_repeats_is_structure() -> N
 
 
 def test_only_mains_and_their_aliases_are_lines() -> None:
-    """50 Hz and the third harmonic's alias are found; a tone of 9 Hz is structure."""
+    """50 Hz and the third harmonic's alias are fitted; a tone of 9 Hz is structure."""
     rng, time = np.random.default_rng(3), np.arange(1024) / RATE
     left = []
     for phase in (0.1, 1.7, 4.0):
@@ -76,8 +76,8 @@ def test_only_mains_and_their_aliases_are_lines() -> None:
         part[CHANNEL] = LEVEL * (rng.standard_normal(1024) + tones)
         left.append(part)
     logged, _ = _logged([np.zeros(1024)] * 3)
-    found = with_lines(_levels(), logged, left)[CHANNEL]
-    assert found.lines == pytest.approx((50.0, 150.0))
+    fitted = with_lines(_levels(), logged, left)[CHANNEL]
+    assert fitted.lines == pytest.approx((50.0, 150.0))
     assert all(not each.lines for each in with_lines(_levels(), logged, left)[:CHANNEL])
 
 
@@ -118,9 +118,9 @@ def test_hum_is_named_and_does_not_alarm() -> None:
             for name, values in trial.measurements.items()
         }
         trials.append(replace(trial, measurements=noisy))
-    found = diagnose(trials, "serres2008", propose=False)
-    assert found.verdict in ("agrees", "parameters", "undecidable")
-    (line,) = [each for each in found.nuisances if each.kind == "line"]
+    fitted = diagnose(trials, "serres2008", propose=False)
+    assert fitted.verdict in ("agrees", "parameters", "undecidable")
+    (line,) = [each for each in fitted.nuisances if each.kind == "line"]
     assert line.hertz == pytest.approx(50.0, abs=0.06)
     assert set(line.signals) == {"contraction_mm", "rotation_deg", "load_n", "pressure_kpa"}
-    assert "50 Hz in all four sensors" in found.steps[0]
+    assert "50 Hz in all four sensors" in fitted.steps[0]
