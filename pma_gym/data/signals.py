@@ -31,6 +31,7 @@ class Signal:
         measures: what physical quantity it is.
         meaning: what it is, in words.
         limits: smallest and largest value in file units, where there are any.
+        other_units: in which files may hold it under a column of that unit.
         sensor: effect that measures it, with its lag and noise; "" for none.
         calibration: line of its sensor's raw voltage at the DAQ; None for a sensor that has none.
         raw_column: column of files that holds that voltage instead; "" for none.
@@ -53,6 +54,7 @@ class Signal:
     measures: Measured
     meaning: str
     limits: tuple[float, float] | None = None
+    other_units: tuple[str, ...] = ()
     sensor: str = ""
     calibration: Calibration | None = None
     raw_column: str = ""
@@ -155,6 +157,20 @@ _ALL: tuple[Signal, ...] = (
         stems=("pressure command", "pressure setpoint", "set pressure"),
     ),
     Signal(
+        "torque_command",
+        "N m",
+        "command",
+        "torque",
+        "torque asked of a joint's drive",
+    ),
+    Signal(
+        "winding_voltage",
+        "V",
+        "command",
+        "voltage",
+        "voltage at the winding of a joint's motor, of either sign",
+    ),
+    Signal(
         "contraction",
         "mm",
         "measurement",
@@ -214,6 +230,24 @@ _ALL: tuple[Signal, ...] = (
         least_rate=15e3,
         stems=("pressure", "muscle pressure", "gauge pressure"),
         words=("pressure", "druck", "p", "press"),
+    ),
+    Signal(
+        "angle",
+        "deg",
+        "measurement",
+        "angle",
+        "angle of a joint, encoder or potentiometer",
+        sensor="encoder",
+        other_units=("rad",),
+    ),
+    Signal(
+        "speed",
+        "rad/s",
+        "measurement",
+        "angular speed",
+        "speed of a joint, gyroscope or tachometer",
+        sensor="gyroscope",
+        other_units=("deg/s",),
     ),
     Signal(
         "extension",

@@ -3,7 +3,7 @@
 import difflib
 import reprlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +119,12 @@ RAW_COLUMNS: tuple[Column, ...] = tuple(
 )
 """Raw sensor volts, which a file may hold instead; decoded on reading, never written."""
 
-BY_NAME = {column.name: column for column in (*COLUMNS, *RAW_COLUMNS)}
+OTHER_UNITS: tuple[Column, ...] = tuple(
+    Column.of(replace(signal, unit=unit)) for signal in _IN_FILES for unit in signal.other_units
+)
+"""The same signals in other units, which a file may hold instead; never written."""
+
+BY_NAME = {column.name: column for column in (*COLUMNS, *RAW_COLUMNS, *OTHER_UNITS)}
 BY_QUANTITY = {column.quantity: column for column in COLUMNS}
 
 

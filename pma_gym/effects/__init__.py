@@ -16,6 +16,14 @@ from pma_gym.effects.drive.servo import SERVO, SERVO_INERTIA
 from pma_gym.effects.drive.torque_ripple import TORQUE_RIPPLE
 from pma_gym.effects.drive.two_way_drive import TWO_WAY_DRIVE
 from pma_gym.effects.effect import Effect
+from pma_gym.effects.joint.inertia import INERTIA, JOINT_START
+from pma_gym.effects.joint.motor import DC_MOTOR, TORQUE_DRIVE
+from pma_gym.effects.joint.passive_torque import (
+    JOINT_DAMPING,
+    JOINT_FRICTION,
+    JOINT_SPRING,
+    JOINT_WEIGHT,
+)
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.contractile_force import CONTRACTILE_FORCE
@@ -55,7 +63,7 @@ from pma_gym.effects.sensors.sensor_errors import (
     POTENTIOMETER_ERROR,
     PRESSURE_TRANSDUCER_ERROR,
 )
-from pma_gym.effects.sensors.sensors import SENSORS
+from pma_gym.effects.sensors.sensors import JOINT_SENSORS, SENSORS
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.slide.operator import OPERATOR
 from pma_gym.effects.slide.slide import SLIDE
@@ -124,6 +132,15 @@ CATALOGUE: dict[str, Effect] = {
         POTENTIOMETER_BACKLASH,
         LIMITS,
         VALIDITY,
+        TORQUE_DRIVE,
+        DC_MOTOR,
+        JOINT_WEIGHT,
+        JOINT_SPRING,
+        JOINT_DAMPING,
+        JOINT_FRICTION,
+        INERTIA,
+        JOINT_START,
+        *JOINT_SENSORS,
     )
 }
 """Effects by name, in the order in which plants add them up."""

@@ -129,7 +129,7 @@ class Residuals:
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
-            paths = {"start.contraction_mm": where, "start.velocity_mm_per_s": speed}
+            paths = dict(zip(self.plant.model.rig.start_paths, (where, speed), strict=True))
             self._begun = self._places({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
@@ -276,7 +276,7 @@ class Residuals:
     def _met_slide(self, space: Array, logged: Logged) -> Array:
         """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
         column = self.plant.sensor_columns[0]
-        at = column if column >= 0 else self.plant.states.index("contraction")
+        at = column if column >= 0 else self.plant.states.index(self.plant.outputs[0])
         initial_states.meet(space, space[:, :, at].copy(), logged)
         return space[:-1]
 

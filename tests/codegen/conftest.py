@@ -44,6 +44,7 @@ SIGNALS = {
     "angle": (-0.1, 2.5),
     "motor_angle": (-2.7, 0.5),
     "spin": (-4.0, 4.0),
+    "command": (-7.0, 7.0),
     "regulator_time_constant": (0.01, 0.2),
 }
 LAWS = {f"{e.name}.{law.__name__}": (e, law) for e in CATALOGUE.values() for law in e.laws()}

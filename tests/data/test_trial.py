@@ -98,7 +98,7 @@ def test_replacing_a_part_keeps_the_rest():
             r"load_n must be finite, sample 1 has inf; leave empty \(NaN\) what was not measured",
         ),
         ({"measurements": {"extension": TIME}}, "measurements are contraction, .*'extension'"),
-        ({"truth": {"speed": TIME}}, "truth are .*'speed'"),
+        ({"truth": {"haste": TIME}}, "truth are .*'haste'"),
         ({"truth": {"extension": [0, np.inf, 0]}}, "extension must be finite, sample 1 has inf"),
     ],
 )

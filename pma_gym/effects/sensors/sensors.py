@@ -53,6 +53,24 @@ class Potentiometer(NamedTuple):
     ]
 
 
+class Encoder(NamedTuple):
+    """Angle of a joint."""
+
+    bandwidth: Annotated[float, _bandwidth(1000)]
+    noise: Annotated[
+        float, Quantity("deg", 0, 45, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
+    ]
+
+
+class Gyroscope(NamedTuple):
+    """Speed of a joint."""
+
+    bandwidth: Annotated[float, _bandwidth(200)]
+    noise: Annotated[
+        float, Quantity("rad/s", 0, 1e3, f"{_ASSUMED}: 0.02 (standard deviation)", 0.0, usual=0.02)
+    ]
+
+
 def sensor_rate(signal, p):
     """Rate of a sensor's output before noise: s' = (signal - s) / tau, tau = 1 / (2 pi f).
 
@@ -80,6 +98,12 @@ LVDT = _sensor("lvdt", "contraction", Lvdt)
 LOAD_CELL = _sensor("load_cell", "load", LoadCell)
 PRESSURE_TRANSDUCER = _sensor("pressure_transducer", "pressure", PressureTransducer)
 POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)
+
+ENCODER = _sensor("encoder", "angle", Encoder)
+GYROSCOPE = _sensor("gyroscope", "speed", Gyroscope)
+
+JOINT_SENSORS: tuple[Effect, ...] = (ENCODER, GYROSCOPE)
+"""Sensors of a joint, as the catalogue has them."""
 
 SENSORS: tuple[Effect, ...] = (LVDT, LOAD_CELL, PRESSURE_TRANSDUCER, POTENTIOMETER)
 """All sensors, as the catalogue has them."""

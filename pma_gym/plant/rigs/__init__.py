@@ -1,11 +1,12 @@
 """The rigs that a model can be of, one file each: their ports, states and balances."""
 
 from pma_gym.plant.rigs.cascade import CASCADE
+from pma_gym.plant.rigs.joint import JOINT
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.slide import SLIDE
 from pma_gym.plant.rigs.station import STATION
 
 __all__ = ["RIGS", "Rig"]
 
-RIGS: dict[str, Rig] = {rig.name: rig for rig in (STATION, CASCADE, SLIDE)}
+RIGS: dict[str, Rig] = {rig.name: rig for rig in (STATION, CASCADE, SLIDE, JOINT)}
 """All rigs, by the name that a model file gives as its plant."""

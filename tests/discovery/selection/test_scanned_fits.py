@@ -23,14 +23,14 @@ def test_a_limit_that_is_never_reached_is_fitted_from_its_own_size() -> None:
     """The steps of its derivatives come from its value, not from bounds a million times as wide."""
     hidden = {"regulator_rate_limit": {"limit_kpa_per_s": 600.0}}
     rig = load_model("serres2008").with_effects(hidden)
-    found = diagnose(_trials(rig), "serres2008", propose=False)
-    assert found.verdict == "effect"
-    (effect,) = found.effects
+    fitted = diagnose(_trials(rig), "serres2008", propose=False)
+    assert fitted.verdict == "effect"
+    (effect,) = fitted.effects
     assert effect.name == "regulator_rate_limit"
     limit = effect.parameters["limit_kpa_per_s"]
     assert limit.value == pytest.approx(600.0, rel=0.02)
     assert limit.limit == ""
-    assert not found.unfitted
+    assert not fitted.unfitted
 
 
 def test_a_boundless_range_has_a_lower_end_only_where_it_begins() -> None:

@@ -1,0 +1,1 @@
+"""A joint that turns: inertia and start, motor, weight, spring, damping and friction."""

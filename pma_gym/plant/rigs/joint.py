@@ -1,0 +1,75 @@
+"""The joint: one rotary axis, turned by a drive that holds a torque or by a motor at a voltage.
+
+    J q'' = T_drive(command, q') + T(q, q', memories)
+
+Nothing holds it: a trial begins where [joint_start] says, as fast as it says. Weight, spring,
+damping and dry friction are effects at its port of torques.
+"""
+
+from collections.abc import Mapping
+
+from pma_gym.data.signals import signals
+from pma_gym.effects.effect import Parameters
+from pma_gym.effects.ports import Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.rigs.rig import Rig
+
+PORTS: dict[str, Port] = {
+    "joint_drive": Port("torque of the drive or motor (N m)", least=1, most=1),
+    "joint_torque": Port("torque on the joint (N m), added; positive as the angle grows"),
+}
+"""Ports of the joint: how many effects each takes, and what becomes of their results."""
+
+SCALES: dict[str, float] = {"angle": 1.0, "spin": 4.0}
+"""What an error is counted against (rad, rad/s)."""
+
+TURNING_RAD = 1e-8
+"""Angle (rad) by which a step may miss where the joint turns."""
+
+
+def write_equations(equations: PlantEquations) -> None:
+    """Write the balance of the joint, with the model's effects at its ports."""
+    eq = equations
+    eq.travelled = (eq["angle"], eq["spin"])
+    # Laws of friction know the rate of what they act on as `velocity`.
+    eq.let("velocity", eq["spin"])
+    eq.let("command", eq["motor_voltage"])
+    torque = eq.one("joint_drive") + eq.total("joint_torque")
+    eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}
+    eq.add_state("angle", eq["spin"], SCALES["angle"])
+    eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
+    eq.add_memories(tuple(PORTS))
+    eq.add_sensors({"angle": SCALES["angle"], "speed": SCALES["spin"]})
+    eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
+    eq.add_breakpoints()
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """0: nothing swings against another."""
+    return 0.0
+
+
+def solve_equilibrium(problem: EquilibriumProblem) -> None:
+    """Put the joint where its model says that a trial begins; its bristles are relaxed."""
+    start = problem.parameters("joint_start")
+    problem.zero[:] = problem["angle"] = start["angle"]
+    problem["spin"] = start["spin"]
+
+
+JOINT = Rig(
+    name="joint",
+    signals=signals("angle", "speed"),
+    ports=PORTS,
+    parts=("inertia", "joint_start"),
+    position_tolerances={"angle": 0.001},
+    write_equations=write_equations,
+    solve_equilibrium=solve_equilibrium,
+    fastest_oscillation=fastest_oscillation,
+    absent_signals="a joint has neither muscle nor cable; take a torque as torque_command_n_m",
+    is_free=True,
+    start_paths=("joint_start.angle_deg", "joint_start.spin_deg_per_s"),
+    has_muscle=False,
+    moving_lags={"lag_encoder": "spin"},
+    direct_commands={"torque_drive": "torque_command", "dc_motor": "winding_voltage"},
+)
