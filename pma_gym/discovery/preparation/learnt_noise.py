@@ -27,6 +27,10 @@ ENOUGH_ALIKE = 400
 CHANCE = 1e-3
 """That noise without a drift is taken for one with a drift, over all signals."""
 
+UNSURE = 2.0
+"""By what a drift that repeats tell is enlarged: a pair of them tells its size to a factor of two,
+and too small a size leaves a drift that looks like the rig's."""
+
 LEAST_DRIFT = 0.15
 """Drift (rms) in standard deviations of the noise, below which it counts as none."""
 
@@ -56,7 +60,7 @@ def learnt_noise(
         after = _coloured(before, logged, pairs, channel)
         if surely and np.isfinite(drifts[channel].share):
             # One pair of repeats tells a size badly; drifts of one rig's sensors are alike.
-            share = max(usual, drifts[channel].share)
+            share = UNSURE * max(usual, drifts[channel].share)
             if share > LEAST_DRIFT:
                 after = replace(after, drift=share * before.level)
         learnt.append(after)

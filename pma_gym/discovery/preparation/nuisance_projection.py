@@ -18,8 +18,8 @@ from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
 
-MOST_COSINES = 4
-"""Most cosines of a drift."""
+LEAST_COSINES, MOST_COSINES = 2, 4
+"""Fewest and most cosines of a drift: half a period and one period of a trial at least."""
 
 SLOW_SHARE = 0.1
 """Share of a command's variance below its slowest excited frequency."""
@@ -103,11 +103,14 @@ def _projection(
 
 
 def drift_cosines(logged: Logged) -> list[Array]:
-    """Cosines of a drift of mean square 1 in all, below half the slowest excited frequency."""
+    """Cosines of a drift of mean square 1 in all, below half the slowest excited frequency.
+
+    At least one period a trial, of a quarter of the power of half a period.
+    """
     time = logged.time - logged.time[0]
     duration = max(float(time[-1]), 1e-300)
     most = int(duration * slowest_hertz(logged) + 1e-9)
-    count = int(np.clip(most, 1, MOST_COSINES))
+    count = int(np.clip(most, LEAST_COSINES, MOST_COSINES))
     sizes = 1.0 / np.arange(1, count + 1)
     sizes *= np.sqrt(2.0 / np.sum(sizes**2))
     return [
