@@ -19,7 +19,7 @@ from benchmarks import readme_table
 from benchmarks.hidden_effects.evaluation.readme import KEPT
 from benchmarks.readme_table import FIGURES, RunError, load_run, refreshed
 from benchmarks.runner.phase_score import PHASES, measured_score
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 
 ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -58,7 +58,7 @@ def reproduce(
     """The main job; its exit code."""
     from benchmarks.reproduction.job import run_job
     from benchmarks.runner.controller_spec import ControllerError, parse_controllers
-    from benchmarks.suites.reproduction import load_suite
+    from benchmarks.suites.frozen import load_suite
     from benchmarks.suites.suite import SuiteError
     from pma_gym.plant.model import ModelError, load_model
     from pma_gym.terminal import SafeConsole

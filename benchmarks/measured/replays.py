@@ -8,7 +8,8 @@ from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summa
 from benchmarks.reproduction.results import Results, scores_of
 from benchmarks.runner.case import cases, run_case
 from benchmarks.runner.controller_spec import ControllerSpec
-from benchmarks.suites.reproduction import ReproductionSuite, load_suite
+from benchmarks.suites.frozen import load_suite
+from benchmarks.suites.reproduction import ReproductionSuite
 
 PHASE_NAMES = {
     "displacement": "displacement (tables 21, 22)",

@@ -1,5 +1,6 @@
 """Reads frozen suites from files that pin every number."""
 
+import copyreg
 import difflib
 import hashlib
 import json
@@ -175,6 +176,18 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
     return FrozenSuite(**common)
 
 
+def load_suite(name: str = "reproduction") -> ReproductionSuite:
+    """The suite of the reproduction.
+
+    >>> suite = load_suite()
+    >>> suite.models, len(suite.episodes)
+    (('station', 'cascade'), 34)
+    """
+    suite = frozen_suite(name)
+    assert isinstance(suite, ReproductionSuite)
+    return suite
+
+
 def _reproduction(given: Mapping[str, Any], common: Mapping[str, Any]) -> ReproductionSuite:
     """A suite on several models, with the report of the reproduction.
 
@@ -225,3 +238,16 @@ def _entry(given: Mapping[str, Any]) -> Entry:
 
 def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def _unpacked(source: str, models: tuple[str, ...]) -> FrozenSuite:
+    suite = frozen_suite(source)
+    return suite.on(models) if models and isinstance(suite, ReproductionSuite) else suite
+
+
+def _packed(suite: ReproductionSuite) -> tuple[Any, ...]:
+    """By source and models: controllers and trials come with each case."""
+    return _unpacked, (suite.source, tuple(suite.models))
+
+
+copyreg.pickle(ReproductionSuite, _packed)

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -68,10 +68,6 @@ class ReproductionSuite(FrozenSuite):
 
     keep_pace: ClassVar[bool] = False
     has_lines: ClassVar[bool] = True
-
-    def __reduce__(self) -> tuple[Callable[..., FrozenSuite], tuple[object, ...]]:
-        """Pickled as its source and its models: controllers and trials come with each case."""
-        return _read, (self.source, self.models)
 
     @property
     def controllers(self) -> tuple[ControllerSpec, ...]:
@@ -191,26 +187,6 @@ class ReproductionSuite(FrozenSuite):
                     f"the dissertation has no trial at {pressure:g} kPa to compare with ({known})"
                 )
         return {task: left for task, left in trials.items() if left}
-
-
-def load_suite(name: str = "reproduction") -> ReproductionSuite:
-    """The suite of the reproduction.
-
-    >>> suite = load_suite()
-    >>> suite.models, len(suite.episodes)
-    (('station', 'cascade'), 34)
-    """
-    suite = _read(name)
-    assert isinstance(suite, ReproductionSuite)
-    return suite
-
-
-def _read(source: str, models: Sequence[str] = ()) -> FrozenSuite:
-    # That module builds suites of this class.
-    from benchmarks.suites.frozen import frozen_suite
-
-    suite = frozen_suite(source)
-    return suite.on(models) if models and isinstance(suite, ReproductionSuite) else suite
 
 
 def _distinct(controllers: Sequence[ControllerSpec]) -> tuple[ControllerSpec, ...]:

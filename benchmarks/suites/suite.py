@@ -1,7 +1,7 @@
 """What a frozen suite is: stations, episodes on them, the controllers that are compared."""
 
 import hashlib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -133,10 +133,6 @@ class FrozenSuite:
     has_lines: ClassVar[bool] = False
     """Whether rows have the regression line of every phase too."""
 
-    def __reduce__(self) -> tuple[Callable[..., "FrozenSuite"], tuple[object, ...]]:
-        """Pickled as its source: another process reads its file."""
-        return _read, (self.source,)
-
     @cached_property
     def episodes(self) -> tuple[Episode, ...]:
         """Every episode, station by station."""
@@ -217,9 +213,3 @@ def kind_of(task: str) -> str:
 @lru_cache(maxsize=4096)
 def _station(recipe: Recipe, number: int) -> DrawnStation:
     return draw_station(recipe, number)
-
-
-def _read(source: str) -> FrozenSuite:
-    from benchmarks.suites.frozen import frozen_suite
-
-    return frozen_suite(source)

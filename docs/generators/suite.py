@@ -3,7 +3,7 @@
 import inspect
 from pathlib import Path
 
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 from benchmarks.tuning import tune
 from controllers import CONTROLLERS
 from generators.text import code, number, summary, table

@@ -17,7 +17,6 @@ from benchmarks.hidden_effects.baselines.signatures import SLACK_N
 from pma_gym.discovery.screening.candidates import PERIODS
 from pma_gym.effects.effect import signals
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant import sensors
 
 Array = NDArray[np.float64]
 Terms = dict[str, Array]
@@ -94,7 +93,7 @@ def motion(ready: Prepared, logged: Logged) -> Motion:
         return np.asarray(filtered) / step**order
 
     parameters = ready.refitted.model.parameters
-    late = [1.0 / (2.0 * np.pi * parameters[name].bandwidth) for name in sensors.SENSORS]
+    late = [1.0 / (2.0 * np.pi * parameters[signal.sensor].bandwidth) for signal in logged.signals]
     x, angle, load, pressure = (
         values + time * smooth(values, 1)
         for values, time in zip(logged.measured, late, strict=True)

@@ -10,7 +10,7 @@ from benchmarks.__main__ import app
 from benchmarks.executors.choice import local
 from benchmarks.reproduction import job
 from benchmarks.runner import run
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 
 COMMANDS = ["profiles", "studies", "identify", "tune", "accuracy"]
 

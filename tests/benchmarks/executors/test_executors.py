@@ -18,7 +18,7 @@ from benchmarks.executors.failures import ProcessDied, TookTooLong
 from benchmarks.executors.local import LocalProcesses
 from benchmarks.runner.controller_spec import ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 from tests.benchmarks.executors.pieces import (
     awkward,
     dies_once,

@@ -17,7 +17,7 @@ from benchmarks.runner.controller_spec import ControllerError, ControllerSpec
 from benchmarks.runner.execution import execute, pending_cases
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.runner.rollout import make_environment, rollout
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.runner.case import cases
 from benchmarks.runner.controller_spec import ControllerError, ControllerSpec, parse_controllers
-from benchmarks.suites.reproduction import load_suite
+from benchmarks.suites.frozen import load_suite
 from benchmarks.suites.suite import Episode, SuiteError
 from pma_gym.data.serres2008 import pressures
 from pma_gym.plant.model import dump_model, load_model

@@ -22,7 +22,6 @@ from pma_gym.discovery.preparation.noise import (
 )
 from pma_gym.discovery.preparation.quantisation import coarse_sensors
 from pma_gym.estimation.logged import Logged
-from pma_gym.plant import sensors
 from tests.discovery.laboratory import LEVELS, STATION, measured
 
 CHANNELS = range(4)
@@ -161,7 +160,7 @@ def test_continuous_readings_have_no_step():
 def test_the_daq_shows_its_step():
     readings = measured(STATION, 2, rate=128.0)
     trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
-    for channel, signal in enumerate(sensors.SENSORS.values()):
+    for channel, signal in enumerate(STATION.rig.signals):
         assert step_between(trials, channel) == pytest.approx(signal.resolution, rel=1e-3)
 
 

@@ -43,7 +43,7 @@ def rubbing(static, dynamic, speed, count=3):
 def fit_of(static, dynamic, speed, begun):
     """A fit of such trials with the whole law, begun at values, and on which bench."""
     logs, _ = rubbing(static, dynamic, speed)
-    noise = tuple(map(white_noise, (2e-5, 1.0, 1.0, 1.0)))
+    noise = (white_noise(2e-5),)
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     start = np.array([*begun, *DRY.absent[len(begun) :]])
     fitted = bench.fit(SLIDE, (DRY,), {DRY.name: start})
@@ -73,7 +73,7 @@ def test_friction_that_falls_with_the_speed_keeps_its_law():
 def test_a_speed_beyond_all_speeds_is_only_known_to_lie_above():
     """A static friction that hardly falls: the fall's speed is above something, no more."""
     logs, truth = rubbing(12.0, 4.0, 900.0)
-    noise = tuple(map(white_noise, (2e-4, 1.0, 1.0, 1.0)))
+    noise = (white_noise(2e-4),)
     bench = FitProblem(logs, SLIDE, free_parameters(SLIDE), noise)
     table = truth.at_the_door("coulomb_friction")
     begun = np.array([table[path.partition(".")[2]] for path in DRY.paths], float)
