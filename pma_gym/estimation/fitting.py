@@ -39,7 +39,7 @@ FIRST_MOVE, LEAST_MOVE, MOST_MOVE = 1e-3, 1e-6, 2e-2
 """First, least and largest such move, as a share of the parameter's value, or of its bounds' width
 where it is near 0."""
 
-BOUNDLESS = 100.0
+BOUNDLESS = 3000.0
 """How many times a parameter's value a hundredth of its bounds' width is, from which on the bounds
 of what is positive say nothing of its scale."""
 
