@@ -24,7 +24,7 @@ class HeldOutMisfit:
     """What a model says of readings that it was not fitted to.
 
     Attributes:
-        readings: what its sensors hold (SI), shape (4, rows) for each trial.
+        readings: what its sensors hold (SI), shape (signals, rows) for each trial.
         chi_square: of the whitened residuals of each trial, shape (trials,).
         deviance: the same of each fold, given how well the others hold the parameters
             (`PredictiveDensity.deviance`), shape (folds,); empty if that was not asked for.

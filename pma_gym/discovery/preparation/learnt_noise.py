@@ -22,7 +22,7 @@ from pma_gym.estimation.logged import Logged
 Array = NDArray[np.float64]
 
 ENOUGH_ALIKE = 400
-"""Fewest readings in repeats, or at rest, from which the colour of noise is learnt."""
+"""Least number of readings in repeats, or at rest, from which the colour of noise is learnt."""
 
 CHANCE = 1e-3
 """That noise without a drift is taken for one with a drift, over all signals."""

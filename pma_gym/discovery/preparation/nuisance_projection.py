@@ -19,7 +19,7 @@ from pma_gym.estimation.logged import Logged
 Array = NDArray[np.float64]
 
 LEAST_COSINES, MOST_COSINES = 2, 4
-"""Fewest and most cosines of a drift: half a period and one period of a trial at least."""
+"""Least and greatest number of cosines of a drift; the least is one period a trial."""
 
 SLOW_SHARE = 0.1
 """Share of a command's variance below its slowest excited frequency."""

@@ -169,7 +169,8 @@ class WhitenedResiduals(Residuals):
     def columns(self, tried: Array) -> list[Any] | None:
         """Whitened residual at the first of some parameters, and what the others change.
 
-        Shape (tried, 4, rows) for each trial, single precision; None where it cannot be simulated.
+        Shape (tried, signals, rows) for each trial, single precision; None where it cannot be
+        simulated.
         """
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Any:  # noqa: ANN401
@@ -182,7 +183,7 @@ class WhitenedResiduals(Residuals):
         return columns
 
     def readings(self, values: Array) -> list[Array] | None:
-        """What the sensors hold at parameters (SI), shape (4, rows) for each trial."""
+        """What the sensors hold at parameters (SI), shape (signals, rows) for each trial."""
 
         def work(logged: Logged, states: Array, zeros: Array, vectors: Array) -> Array:
             return np.stack([signal[0] for signal in self._held(states, zeros, vectors)])
@@ -226,7 +227,7 @@ class WhitenedResiduals(Residuals):
     def without_nuisances(self, logged: Logged, left: Array) -> Array:
         """Simulated less measured (SI), NaN where there is none, less lines and drifts in it.
 
-        Shape (4, rows).
+        Shape (signals, rows).
         """
         rest = left.copy()
         for channel, noise in enumerate(self.noise):

@@ -59,7 +59,7 @@ def nuisance_words(known: Sequence[Nuisance], signals: int) -> str:
 def _words(known: Nuisance, signals: int) -> str:
     where = listed([signal_name(each) for each in known.signals])
     if len(known.signals) == signals and signals > 1:
-        where = NUMBERS[signals]
+        where = NUMBERS.get(signals, f"all {signals} sensors")
     size = figure(float(np.median(list(known.signals.values()))), 2)
     if known.kind == "coloured noise":
         return f"coloured noise in {where}, correlation {size} from reading to reading"

@@ -91,7 +91,7 @@ class Baseline:
     Attributes:
         whitened: the trials beside it.
         values: its parameters in file units.
-        columns: whitened residual and derivatives of each trial, shape (1 + p, 4, rows).
+        columns: whitened residual and derivatives of each trial, shape (1 + p, signals, rows).
         inverse: of the curvature with the prior, shape (p, p).
     """
 

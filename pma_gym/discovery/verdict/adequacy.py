@@ -52,8 +52,9 @@ class Residual:
     """What a model leaves of trials.
 
     Attributes:
-        simulated: what its sensors hold (SI), shape (4, rows) for each trial.
-        left: simulated less measured (SI), NaN where not measured, shape (4, rows) for each trial.
+        simulated: what its sensors hold (SI), shape (signals, rows) for each trial.
+        left: simulated less measured (SI), NaN where not measured, shape (signals, rows) for each
+            trial.
     """
 
     simulated: Sequence[Array]
