@@ -130,7 +130,9 @@ def _largest(values: Array | None) -> float:
 
 def _moved(door: dict[str, Array], quantity: str) -> str:
     """A command that changes so much that a measurement must follow; empty if none does."""
-    return next((name for name in _DRIVERS[quantity] if _span(door.get(name)) >= _LARGE[name]), "")
+    return next(
+        (name for name in _DRIVERS.get(quantity, ()) if _span(door.get(name)) >= _LARGE[name]), ""
+    )
 
 
 _MUSCLE = ("regulator_voltage", "pressure_command", "pressure")

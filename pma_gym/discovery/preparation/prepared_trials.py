@@ -98,5 +98,8 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
 
 def _in_volts(trial: Trial, model: Model) -> Trial:
     """A trial whose commands are the volts that a model has for them, in every row."""
+    if model.rig.imposes_motion:
+        # A record of positions is smoothed whenever a model reads it.
+        return trial
     motor, regulator = sensors.voltages(model, trial)
     return replace(trial, commands={"motor_voltage": motor, "regulator_voltage": regulator})

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from pma_gym.data.signals import Signal
-from pma_gym.effects.effect import Parameters
+from pma_gym.effects.effect import Effect, Parameters
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -34,6 +34,9 @@ class Rig:
             [start] says.
         has_muscle: it has one, with a pressure and limits of its own.
         is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
+        muscle_ports: ports at which an effect may be missing only where a model has some there.
+        shown_shapes: parameters (field names) that this rig shows although effects hold them, such
+            as a presliding distance, of which a slide shows nothing.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
         start_paths: parameters of a free rig that say where its first signal begins, and its rate.
@@ -57,9 +60,15 @@ class Rig:
     has_muscle: bool = True
     is_diagnosable: bool = False
     imposes_motion: bool = False
+    muscle_ports: tuple[str, ...] = ()
+    shown_shapes: tuple[str, ...] = ()
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: tuple[str, ...] = ()
     direct_commands: Mapping[str, str] = field(default_factory=dict)
+
+    def holds(self, effect: Effect, stem: str) -> bool:
+        """Whether a parameter (field name) of an effect stays at its value in fits of this rig."""
+        return stem in effect.held and stem not in self.shown_shapes
 
     @property
     def outputs(self) -> tuple[str, ...]:

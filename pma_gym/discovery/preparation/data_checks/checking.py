@@ -51,7 +51,9 @@ def check_dataset(dataset: Dataset, model: Model, stop: bool = True) -> Dataset:
         _refuse(unit_proposals(dataset, named, model), stop, words)
         # Lags after units: a signal turned round has none.
         words += timing.words(timing.lags(pairs(model, [each.trial for each in named])))
-        named = _started(named, Plant(model), wholes, words)
+        if not model.rig.imposes_motion:
+            # An imposed motion is known from its first row.
+            named = _started(named, Plant(model), wholes, words)
     named, said = averaged(named)
     words += said
     return replace(dataset, trials=tuple(named), checked=tuple(words))
