@@ -82,8 +82,8 @@ def _lacking(
         return None
     if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
         return None
-    muscular = effect.port in model.rig.muscle_ports
-    if muscular and all(each.port != effect.port for each in model.effects.values()):
+    needed = model.rig.needed_ports.get(effect.port)
+    if needed and all(each.port != needed for each in model.effects.values()):
         return None
     doors = {stem: door for door, stem in effect.names_at_the_door().items()}
     shown = {

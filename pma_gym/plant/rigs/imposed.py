@@ -113,7 +113,12 @@ IMPOSED = Rig(
     has_muscle=False,
     is_diagnosable=True,
     imposes_motion=True,
-    muscle_ports=("muscle_force",),
+    needed_ports={
+        "muscle_force": "muscle_force",
+        **dict.fromkeys(
+            ("regulator_delay", "regulator_lag", "regulator_pace", "chamber"), "regulator_line"
+        ),
+    },
     shown_shapes=("presliding",),
     direct_commands={"imposed_motion": "contraction_command"},
 )

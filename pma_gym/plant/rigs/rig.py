@@ -34,7 +34,8 @@ class Rig:
             [start] says.
         has_muscle: it has one, with a pressure and limits of its own.
         is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
-        muscle_ports: ports at which an effect may be missing only where a model has some there.
+        needed_ports: port at which a model must have an effect for one to be missing at another,
+            by that other: a rig without a regulator misses no lag of one.
         shown_shapes: parameters (field names) that this rig shows although effects hold them, such
             as a presliding distance, of which a slide shows nothing.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
@@ -60,7 +61,7 @@ class Rig:
     has_muscle: bool = True
     is_diagnosable: bool = False
     imposes_motion: bool = False
-    muscle_ports: tuple[str, ...] = ()
+    needed_ports: Mapping[str, str] = field(default_factory=dict)
     shown_shapes: tuple[str, ...] = ()
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: tuple[str, ...] = ()
