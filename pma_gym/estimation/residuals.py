@@ -129,7 +129,9 @@ class Residuals:
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
-            paths = dict(zip(self.plant.model.rig.start_paths, (where, speed), strict=True))
+            paths = dict(
+                zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
+            )
             self._begun = self._places({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]

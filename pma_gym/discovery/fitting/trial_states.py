@@ -31,12 +31,9 @@ from pma_gym.units import SI_FACTORS
 Array = NDArray[np.float64]
 
 FILE = "trials.toml"
-STARTS = {"contraction": "start.contraction_mm", "velocity": "start.velocity_mm_per_s"}
-"""States of a rig that nothing holds, and where a model file says how a trial begins."""
-
 SEARCHED, LEAST_SPEED = 0.2, 1.0
 """How far about a starting velocity the best one is searched, as a share of it, and the least speed
-(mm/s) that the share is of."""
+(in the unit of a model file, mm/s or deg/s) that the share is of."""
 
 
 def trial_states(
@@ -47,7 +44,8 @@ def trial_states(
     for candidate in chosen:
         own |= candidate.own
     whitened = problem.whitened_residuals(fit.model, chosen)
-    begins = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
+    free = fit.model.rig.start_paths
+    begins = free or memory_states(fit.model)
     begun = whitened.first_states(fit.values) if begins else None
     by_trial = {}
     for i, name in enumerate(names):
@@ -57,7 +55,7 @@ def trial_states(
             parameters |= {
                 path: states[state] / SI_FACTORS[unit(path)] for state, path in begins.items()
             }
-        if _begins_freely(fit.model):
+        if free:
             parameters = _started(fit.model, problem.trials[i], parameters)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
         by_trial[name] = TrialState(_zeros(problem.trials[i], held), parameters)
@@ -71,13 +69,14 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
     first order. Dry friction is not of first order, so the velocity itself is searched here, about
     the derivative's.
     """
-    path, measured = STARTS["velocity"], trial.measurements["contraction"]
+    path = _speed_path(model)
+    measured = trial.measurements[model.rig.outputs[0]]
     about = _possible(model, trial, parameters[path])
     parameters = {**parameters, path: about}
 
     def off(velocity: float) -> float:
         held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
-        left = held["contraction"] - measured
+        left = held[model.rig.outputs[0]] - measured
         return float(np.nanvar(left))
 
     reach = SEARCHED * max(abs(about), LEAST_SPEED)
@@ -89,10 +88,10 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
 def _possible(model: Model, trial: Trial, velocity: float) -> float:
     """A starting velocity (mm/s), or that of the first readings where no rig has one like it.
 
-    Where dry friction holds a slide, its motion hardly depends on how fast it begins, and a
+    Where dry friction holds a rig, its motion hardly depends on how fast it begins, and a
     derivative leads anywhere.
     """
-    path = STARTS["velocity"]
+    path = _speed_path(model)
     (low,), (high,) = bounds([path])
     if low <= velocity <= high:
         return velocity
@@ -197,6 +196,6 @@ def _zeros(trial: Trial, held: Mapping[str, Array]) -> dict[str, float]:
     return zeros
 
 
-def _begins_freely(model: Model) -> bool:
-    """Whether a model file says how a trial begins, for nothing holds the rig."""
-    return "start" in model.parameters
+def _speed_path(model: Model) -> str:
+    """Where a model file says how fast a trial of a rig begins that nothing holds."""
+    return list(model.rig.start_paths.values())[-1]
