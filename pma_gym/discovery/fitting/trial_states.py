@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.data.signals import SIGNALS
+from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
@@ -47,6 +47,7 @@ def trial_states(
     free = fit.model.rig.start_paths
     begins = free or memory_states(fit.model)
     begun = whitened.first_states(fit.values) if begins else None
+    levels = [each.level for each in problem.noise]
     by_trial = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
@@ -56,13 +57,15 @@ def trial_states(
                 path: states[state] / SI_FACTORS[unit(path)] for state, path in begins.items()
             }
         if free:
-            parameters = _started(fit.model, problem.trials[i], parameters)
+            parameters = _started(fit.model, problem.trials[i], parameters, levels)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
         by_trial[name] = TrialState(_zeros(problem.trials[i], held), parameters)
     return by_trial
 
 
-def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dict[str, float]:
+def _started(
+    model: Model, trial: Trial, parameters: Mapping[str, float], levels: Sequence[float]
+) -> dict[str, float]:
     """A trial's own parameters with the starting velocity that fits it best.
 
     A fit moves simulations along a derivative to the velocity that fits best, which is exact to
@@ -70,19 +73,29 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
     the derivative's.
     """
     path = _speed_path(model)
-    measured = trial.measurements[model.rig.outputs[0]]
     about = _possible(model, trial, parameters[path])
     parameters = {**parameters, path: about}
 
     def off(velocity: float) -> float:
         held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
-        left = held[model.rig.outputs[0]] - measured
-        return float(np.nanvar(left))
+        return sum(
+            _misfit(each, row - trial.measurements[each.name]) / level**2
+            for each, row, level in zip(model.rig.signals, held.values(), levels, strict=True)
+            if each.name in trial.measurements
+        )
 
     reach = SEARCHED * max(abs(about), LEAST_SPEED)
     best = minimize_scalar(off, bounds=(about - reach, about + reach), method="bounded")
     fits_better = best.fun < off(about)  # type: ignore[attr-defined]
     return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
+
+
+def _misfit(signal: Signal, left: Array) -> float:
+    """Mean square of what is left of a signal (SI), about its mean where its zero is free."""
+    known = left[np.isfinite(left)]
+    if not known.size:
+        return 0.0
+    return float(np.var(known) if signal.has_free_zero else np.mean(known**2))
 
 
 def _possible(model: Model, trial: Trial, velocity: float) -> float:

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.screening.time_bins import POSITIONS
 
+NO_POSITION = Signal("position", "1", "derived", "displacement", "none that a sensor measures")
+"""Stands in where a rig measures no position: nothing is said of its motion."""
+
 
 @dataclass(frozen=True)
 class Axis:
@@ -39,8 +42,8 @@ class ConditionAxes:
 
 
 def condition_axes(signals: Sequence[Signal]) -> ConditionAxes:
-    """The conditions of a rig that measures some signals, among them a position."""
-    position = next(each for each in signals if each.measures in POSITIONS)
+    """The conditions of a rig that measures some signals."""
+    position = next((each for each in signals if each.measures in POSITIONS), NO_POSITION)
     kinds = (("pressure", ("pressure",)), ("load", ("force", "torque")), ("position", POSITIONS))
     levels = []
     for kind, measures in kinds:

@@ -38,6 +38,7 @@ class Rig:
             state that is its rate.
         start_paths: parameters of a free rig that say where a trial begins, by the state that is
             there then: its position, then its speed.
+        imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
 
@@ -56,6 +57,7 @@ class Rig:
     is_free: bool = False
     has_muscle: bool = True
     is_diagnosable: bool = False
+    imposes_motion: bool = False
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
