@@ -40,7 +40,8 @@ class Rig:
             as a presliding distance, of which a slide shows nothing.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
-        start_paths: parameters of a free rig that say where its first signal begins, and its rate.
+        start_paths: parameters of a free rig that say where a trial begins, by the state that is
+            there then: its position, then its speed.
         imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
@@ -64,7 +65,7 @@ class Rig:
     needed_ports: Mapping[str, str] = field(default_factory=dict)
     shown_shapes: tuple[str, ...] = ()
     moving_lags: Mapping[str, str] = field(default_factory=dict)
-    start_paths: tuple[str, ...] = ()
+    start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
 
     def holds(self, effect: Effect, stem: str) -> bool:

@@ -18,6 +18,9 @@ from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import STATION, commanded, diagnosed
 
+ONE, TWO = ("hysteresis",), ("hysteresis", "creep")
+"""Names of one effect, and of two with laws of their own."""
+
 SIZES = (6.0, 6.0, 8.0, 8.0)
 """Hysteresis (N) in each trial: of no one size, as where it depends on what nobody logged."""
 
@@ -58,6 +61,11 @@ def test_neither_several_effects_nor_fitted_readings_name_by_what_they_close():
     several, seen = closing(gaps(4.0, 1.1), TWO), closing(gaps(4.0, 1.1, held_out=False), ONE)
     assert several is not None and not several.named
     assert seen is not None and not seen.named
+
+
+def test_terms_of_one_law_count_as_one():
+    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("coulomb_friction", "pressure_friction"))
+    assert friction is not None and friction.named
 
 
 def test_a_share_of_hardly_anything_is_none():
