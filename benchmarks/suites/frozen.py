@@ -167,7 +167,7 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         "episode_plans": episode_plans,
         "entries": tuple(_entry(entry) for entry in document["controllers"]),
         "targets": tuple(parse_target(given) for given in document.get("targets", ())),
-        "digest": _digest(document | {"environment": environment}),
+        "digest": _digest({**document, "environment": environment}),
         "only_by_name": document.get("only_by_name", False),
     }
     if "reproduction" in document:
