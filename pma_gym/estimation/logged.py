@@ -1,13 +1,12 @@
 """Measured trials as a fit reads them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data import calibration
-from pma_gym.data.signals import Signal
+from pma_gym.data.quality.daq_levels import at_daq_end
+from pma_gym.data.signals import VOLTAGE_RANGE, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
@@ -22,12 +21,14 @@ class Logged:
     Attributes:
         signals: what the rig's sensors measure, in the order of readings.
         time: times (s), shape (rows,).
-        motor: motor voltage (V), shape (rows,).
+        motor: motor voltage (V), or the command that the drive takes as it comes (SI), shape
+            (rows,).
         regulator: regulator voltage (V), shape (rows,).
         measured: readings (SI), 0 where missing, shape (signals, rows).
         missing: rows without a reading that counts, by output.
         counts: 1 where a reading counts, else 0, shape (signals, rows).
         measures: whether there is any that does, by output.
+        motor_span: range of the motor's command: of its voltage, else what the trial goes through.
     """
 
     signals: tuple[Signal, ...]
@@ -38,6 +39,7 @@ class Logged:
     missing: list[NDArray[np.int64]]
     counts: Array
     measures: list[bool]
+    motor_span: float
 
     @classmethod
     def of(cls, model: Model, number: int, trial: Trial) -> "Logged":
@@ -54,7 +56,8 @@ class Logged:
         nothing = np.full(len(trial.time), np.nan)
         signals = model.rig.signals
         measured = np.stack([trial.measurements.get(each.name, nothing) for each in signals])
-        absent = np.isnan(measured) | _at_an_end(signals, measured)
+        ends = [at_daq_end(each, row) for each, row in zip(signals, measured, strict=True)]
+        absent = np.isnan(measured) | np.stack(ends)
         if absent.all():
             raise ValueError(f"trial {number} has no measurements to fit a model to")
         return cls(
@@ -66,6 +69,7 @@ class Logged:
             [np.flatnonzero(row) for row in absent],
             np.where(absent, 0.0, 1.0),
             [not row.all() for row in absent],
+            float(np.ptp(motor if sensors.direct_command(model) else VOLTAGE_RANGE)),
         )
 
     def row(self, rows: Array, *measures: str) -> Array:
@@ -94,14 +98,3 @@ class Logged:
     def count(self) -> int:
         """How many readings there are."""
         return self.measured.size - sum(rows.size for rows in self.missing)
-
-
-def _at_an_end(signals: Sequence[Signal], measured: Array) -> NDArray[np.bool_]:
-    """Whether readings (SI), shape (signals, rows), are the first or last that the DAQ has."""
-    volts = np.stack(
-        [
-            np.zeros(len(row)) if each.calibration is None else each.calibration.to_volts(row)
-            for each, row in zip(signals, measured, strict=True)
-        ]
-    )
-    return np.abs(volts) >= calibration.DAQ_LIMIT - 1.5 * calibration.DAQ_STEP

@@ -27,7 +27,7 @@ PORTS: dict[str, Port] = {
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "operator": "nobody settles a slide that nothing holds; take plant = 'station'",
+    "hand_push": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
 """Effects that would fit a port and mean nothing there, and why."""
@@ -87,7 +87,10 @@ SLIDE = Rig(
         "that drives it is read by [columns] as load_command_n"
     ),
     is_free=True,
-    start_paths=("start.contraction_mm", "start.velocity_mm_per_s"),
+    start_paths={
+        "contraction": "start.contraction_mm",
+        "velocity": "start.velocity_mm_per_s",
+    },
     has_muscle=False,
     is_diagnosable=True,
     moving_lags={"lag_lvdt": "velocity"},
