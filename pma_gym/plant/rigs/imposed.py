@@ -22,7 +22,6 @@ from pma_gym.plant.rigs.station import TURNING_M
 PORTS: dict[str, Port] = {
     "imposed_motion": Port("acceleration of what the drive moves (m/s^2)", least=1, most=1),
     "muscle_force": Port("force of the muscle (N), added; positive shortens it"),
-    "slide_force": Port("force on what moves (N), added; positive in the direction of contraction"),
     "contact_force": Port(
         "force on what moves (N), added; positive in the direction of contraction"
     ),
@@ -36,7 +35,6 @@ PORTS: dict[str, Port] = {
 """Ports of the rig: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "operator": "the motion is imposed, whoever pulls; take [constant_force] for a force beside it",
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }
@@ -66,7 +64,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("regulator_time_constant", lag.time_constant if lag else 1.0 / corner)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     at_once = corner * eq["pressure_command"], corner
-    force = eq.total("muscle_force") + eq.total("slide_force") + eq.total("contact_force")
+    force = eq.total("muscle_force") + eq.total("contact_force")
     resistance = eq.total("muscle_damping") * eq.product("damping_factor")
     eq.outputs = {
         "contraction": eq["contraction"],
@@ -119,6 +117,5 @@ IMPOSED = Rig(
             ("regulator_delay", "regulator_lag", "regulator_pace", "chamber"), "regulator_line"
         ),
     },
-    shown_shapes=("presliding",),
     direct_commands={"imposed_motion": "contraction_command"},
 )
