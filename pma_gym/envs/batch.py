@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.engine.options import Pressure, parse_pressure, parse_pressures
+from pma_gym.engine.option_checks import Pressure, parse_pressure, parse_pressures
 from pma_gym.engine.plain_values import plain_scalar
 
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import Options, check_known
+from pma_gym.engine.option_checks import check_known
+from pma_gym.engine.options import Options
 from pma_gym.envs.pma_env import NOT_BEGUN, RESET_OPTIONS, PMAEnv
 from pma_gym.envs.rendering.history import History, RecordingEngine
 from pma_gym.envs.summary import step_info

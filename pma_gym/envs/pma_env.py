@@ -15,15 +15,8 @@ from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.cpu.step_writer import BAD_ACTION
 from pma_gym.engine.engine import Engine
-from pma_gym.engine.options import (
-    EnvironmentOptions,
-    Pressure,
-    check_known,
-    check_named,
-    parse_options,
-    parse_pressure,
-    parse_task,
-)
+from pma_gym.engine.option_checks import Pressure, check_known, check_named, parse_pressure
+from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.snapshot import put, take
 from pma_gym.engine.state_layout import OPERATOR, PARTS, START, TRUTH
 from pma_gym.envs.batch import parse_seed

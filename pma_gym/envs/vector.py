@@ -16,16 +16,14 @@ from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import ActionError, Engine
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import (
-    EnvironmentOptions,
+from pma_gym.engine.option_checks import (
     Pressure,
     check_count,
     check_known,
     check_named,
-    parse_options,
     parse_pressures,
-    parse_task,
 )
+from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.plain_values import plain_scalar
 from pma_gym.engine.snapshot import put, take
 from pma_gym.engine.state_layout import PARTS
