@@ -15,11 +15,13 @@ class FreeParameter:
 
     Attributes:
         path: `effect.parameter_unit`, as in `Model.paths`.
+        name: `effect.parameter`, without a unit.
         place: its place in the vector that compiled functions read.
         quantity: its unit and bounds.
     """
 
     path: str
+    name: str
     place: int
     quantity: Quantity
 
@@ -42,7 +44,7 @@ def free_parameters(model: Model, paths: Sequence[str]) -> list[FreeParameter]:
                 f"{path} cannot be fitted: it is "
                 + ("a row of numbers" if stem in law.rows else "what residuals are counted in")
             )
-        parameters.append(
-            FreeParameter(path, 1 + names.index(f"{effect}.{stem}"), law.quantities[stem])
-        )
+        name = f"{effect}.{stem}"
+        place = 1 + names.index(name)
+        parameters.append(FreeParameter(path, name, place, law.quantities[stem]))
     return parameters

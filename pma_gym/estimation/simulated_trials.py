@@ -47,6 +47,7 @@ class SimulatedTrials:
 
     Attributes:
         free: the free parameters.
+        factors: SI value of one unit in files of each, shape (p,).
         start: their values in the model, in file units, shape (p,).
         count: number of readings that count.
         deviations: standard deviations of the sensors (SI), shape (signals,).
@@ -71,8 +72,8 @@ class SimulatedTrials:
         self.interpolation: Interpolation = interpolation
         self.free = free_parameters(self.plant.model, free)
         places = [parameter.place for parameter in self.free]
-        self._factors = np.array([parameter.quantity.factor for parameter in self.free])
-        self.start: Array = self.plant.vector[places] / self._factors
+        self.factors = np.array([parameter.quantity.factor for parameter in self.free])
+        self.start: Array = self.plant.vector[places] / self.factors
         self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
         self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
         self.deviations: Array = sensors.deviations(self.plant.model)
@@ -119,7 +120,7 @@ class SimulatedTrials:
         """As `_each`, but `work` gets several trials at once, by their numbers."""
         vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
         for column, parameter in enumerate(self.free):
-            vectors[:, parameter.place] = tried[:, column] * self._factors[column]
+            vectors[:, parameter.place] = tried[:, column] * self.factors[column]
         moved = self._moved_starts()
         count, number = len(tried) + bool(moved), len(self.plant.states)
         every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
