@@ -56,6 +56,8 @@ def _effect(effect: Effect, common: str) -> str:
         parts.append(f"Steps end about where this is 0: {_law(effect.breakpoint)}")
     if effect.path_breakpoint:
         parts.append(f"Steps end about this far on: {_law(effect.path_breakpoint)}")
+    if effect.release_path:
+        parts.append(f"Backlash opens this far on: {_law(effect.release_path)}")
     if effect.signature:
         parts.append(f"Signature in data: {effect.signature}.")
     rows = [_parameter(name, quantity) for name, quantity in effect.quantities.items()]

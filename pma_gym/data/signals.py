@@ -171,6 +171,16 @@ _ALL: tuple[Signal, ...] = (
         "voltage at the winding of a joint's motor, of either sign",
     ),
     Signal(
+        "contraction_command",
+        "mm",
+        "command",
+        "displacement",
+        "motion that another drive imposes; grows as a muscle shortens",
+        other_units=("m", "um", "in"),
+        measured="contraction",
+        stems=("contraction command", "imposed displacement", "crosshead"),
+    ),
+    Signal(
         "contraction",
         "mm",
         "measurement",
@@ -248,6 +258,15 @@ _ALL: tuple[Signal, ...] = (
         "speed of a joint, gyroscope or tachometer",
         sensor="gyroscope",
         other_units=("deg/s",),
+    ),
+    Signal(
+        "force",
+        "N",
+        "measurement",
+        "force",
+        "force on a drive that imposes a motion; positive pulls in the direction of contraction",
+        sensor="force_sensor",
+        other_units=("kN", "lbf", "kip"),
     ),
     Signal(
         "extension",

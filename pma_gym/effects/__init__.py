@@ -3,6 +3,11 @@
 from pma_gym.effects.cable.cable import CABLE
 from pma_gym.effects.cable.hanging_load import HANGING_LOAD
 from pma_gym.effects.cable.leg import LEG
+from pma_gym.effects.contact.backlash import BACKLASH
+from pma_gym.effects.contact.cogging import COGGING
+from pma_gym.effects.contact.constant_force import CONSTANT_FORCE
+from pma_gym.effects.contact.imposed_motion import IMPOSED_MOTION
+from pma_gym.effects.contact.pressure_friction import PRESSURE_FRICTION
 from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
 from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
 from pma_gym.effects.drive.current_imbalance import CURRENT_IMBALANCE
@@ -58,12 +63,13 @@ from pma_gym.effects.residual_law import (
 )
 from pma_gym.effects.sensors.potentiometer_backlash import POTENTIOMETER_BACKLASH
 from pma_gym.effects.sensors.sensor_errors import (
+    FORCE_SENSOR_ERROR,
     LOAD_CELL_ERROR,
     LVDT_ERROR,
     POTENTIOMETER_ERROR,
     PRESSURE_TRANSDUCER_ERROR,
 )
-from pma_gym.effects.sensors.sensors import JOINT_SENSORS, SENSORS
+from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
 from pma_gym.effects.slide.operator import OPERATOR
 from pma_gym.effects.slide.slide import SLIDE
@@ -141,6 +147,13 @@ CATALOGUE: dict[str, Effect] = {
         INERTIA,
         JOINT_START,
         *JOINT_SENSORS,
+        IMPOSED_MOTION,
+        CONSTANT_FORCE,
+        PRESSURE_FRICTION,
+        COGGING,
+        BACKLASH,
+        FORCE_SENSOR,
+        FORCE_SENSOR_ERROR,
     )
 }
 """Effects by name, in the order in which plants add them up."""

@@ -47,6 +47,9 @@ class Effect:
         path_breakpoint: distance (m) from where a travel begins, by `memory`, `direction` and `p`,
             to where the rate-independent law changes form; not above 0 where it does so nowhere.
             Steps end close to it.
+        release_path: way (m) until the memory exerts no force any more, by `memory`, `direction`
+            and `p`; where backlash lies before the effect, its gap is crossed then. None for an
+            effect that backlash does not reach.
         event: event function: a signal at whose zero the law has a kink; steps end there.
         breakpoint: a signal at whose zero the law changes form smoothly; steps end close to it.
         signature: what sets the effect apart in measured data.
@@ -72,6 +75,7 @@ class Effect:
     rate: Callable | None = None
     rate_independent_law: Callable | None = None
     path_breakpoint: Callable | None = None
+    release_path: Callable | None = None
     event: Callable | None = None
     breakpoint: Callable | None = None
     signature: str = ""
@@ -232,7 +236,12 @@ class Effect:
 
     def laws(self) -> Iterator[Callable]:
         """The law and those beside it, where there are any."""
-        of_memory = (self.rate, self.rate_independent_law, self.path_breakpoint)
+        of_memory = (
+            self.rate,
+            self.rate_independent_law,
+            self.path_breakpoint,
+            self.release_path,
+        )
         every = (self.law, *of_memory, self.event, self.breakpoint)
         yield from (law for law in every if law is not None)
 

@@ -8,9 +8,11 @@ code, Python text and derivatives are made.
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from pma_gym.codegen.generic import where
 from pma_gym.codegen.graph import Value
 from pma_gym.codegen.trace import trace
 from pma_gym.effects import Effect
+from pma_gym.effects.arithmetic import positive
 from pma_gym.effects.effect import Parameters, signals
 from pma_gym.integrator.equations import Breakpoint, Equations, Interpolation, RateIndependentState
 
@@ -69,13 +71,43 @@ class PlantEquations(Equations):
         start, parameters = self[name], self.parameters[effect.name]
         direction = self["direction"]
         self.travel = self.travelled[0] - self["origin"]
-        after = trace(effect.rate_independent_law, start, self.travel, direction, parameters)
+        given = {"memory": start, "travel": self._travel_of(effect), "direction": direction}
+        law = effect.rate_independent_law
+        after = trace(law, *({**given, "p": parameters}[name] for name in signals(law)))
         state = RateIndependentState(name, start, after, effect.memory_scale)
         self.rate_independent_states.append(state)
         if effect.path_breakpoint:
             distance = trace(effect.path_breakpoint, start, direction, parameters)
             self.path_breakpoints.append(distance)
         return after
+
+    def _travel_of(self, effect: Effect) -> Value:
+        """The way that an effect's memory has gone since the step began, less what backlash loses.
+
+        Backlash loses it once what rubs is relaxed: until then the drive is still pushed.
+        """
+        assert self.travel is not None
+        gaps = self.at("lost_motion")
+        if effect in gaps:
+            direction = self["direction"]
+            left = direction * self.travel - self._release(direction)
+            return direction * trace(positive, left)
+        if not effect.release_path:
+            return self.travel
+        travel = self.travel
+        for gap in gaps:
+            travel = travel - (self.memory(gap) - self[gap.memory_names[0]])
+        return travel
+
+    def _release(self, direction: Value) -> Value:
+        """How far the drive moves before nothing that rubs pushes it any more (m)."""
+        longest = self.graph.constant(0.0)
+        for effect in self.effects.values():
+            if effect.release_path:
+                start, own = self[effect.memory_names[0]], self.parameters[effect.name]
+                way = trace(effect.release_path, start, direction, own)
+                longest = where(way > longest, way, longest)
+        return longest
 
     def total(self, port: str) -> Value:
         """The sum over the effects at a port."""

@@ -10,7 +10,9 @@ from pma_gym.data.calibration import Calibration
 from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, VOLTAGE_RANGE, SampleError, TrialError
+from pma_gym.effects.contact.imposed_motion import following_rate
 from pma_gym.effects.effect import Parameters
+from pma_gym.plant.imposed_motion import level_command, motion_command
 from pma_gym.plant.model import Model
 from pma_gym.units import SI_FACTORS
 
@@ -120,6 +122,8 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
         TrialError: a command is missing, or is less than 0 or more than 0-10 V give; a
             `SampleError` where it is one sample's.
     """
+    if model.rig.imposes_motion:
+        return _imposed(model, trial)
     direct = [c for drive, c in model.rig.direct_commands.items() if drive in model.parameters]
     if direct:
         return _direct(trial, direct[0]), np.zeros(len(trial.time))
@@ -131,6 +135,56 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     if not model.rig.has_muscle:
         return motor, np.zeros(len(motor))
     return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
+
+
+def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
+    """Positions that are asked for (m), and regulator voltage (V) or, without a line, pressure.
+
+    A motion or pressure that was measured and not commanded is the command; no pressure is none.
+    """
+    drive = model.parameters["imposed_motion"]
+    smooth = drive.bandwidth, following_rate(drive)
+    (name,) = model.rig.direct_commands.values()
+    positions = _given(trial, name)
+    if positions is None:
+        raise TrialError(
+            f"the trial has no motion: give {BY_QUANTITY[name].name}, the position that the drive "
+            "was asked for or that was measured, by [columns] if the log has another name for it"
+        )
+    _check_bandwidth(trial, drive.bandwidth)
+    motion = motion_command(trial.time, positions, *smooth)
+    line = model.parameters.get("regulator_line")
+    if line is not None:
+        return motion, _voltage(trial, "regulator_voltage", "pressure_command", line)
+    pressure = _given(trial, "pressure_command")
+    if pressure is None:
+        return motion, np.zeros(len(motion))
+    return motion, level_command(trial.time, pressure, *smooth)
+
+
+def _check_bandwidth(trial: Trial, bandwidth: float) -> None:
+    """Refuse a record with too few rows for the bandwidth of its motion."""
+    if len(trial.time) < 2:
+        return
+    rate = 1.0 / float(np.median(np.diff(trial.time)))
+    if bandwidth > 0.5 * rate:
+        raise TrialError(
+            f"imposed_motion.bandwidth_hz must be at most half of the rows in a second, "
+            f"{0.5 * rate:.4g} Hz for this trial, got {bandwidth:.4g} Hz; give the model a smaller "
+            "one, or log faster"
+        )
+
+
+def _given(trial: Trial, command: str) -> np.ndarray | None:
+    """A command (SI), or what was measured of it; linear over empty cells, None if all are."""
+    for values in (
+        trial.commands.get(command),
+        trial.measurements.get(SIGNALS[command].measured),
+    ):
+        if values is not None and not np.isnan(values).all():
+            there = ~np.isnan(values)
+            return np.interp(trial.time, trial.time[there], values[there])
+    return None
 
 
 def _direct(trial: Trial, name: str) -> np.ndarray:

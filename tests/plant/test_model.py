@@ -161,7 +161,7 @@ BROKEN = {
     "no head": (GOOD.replace('plant = "station"\n', ""), "a model needs .* missing: plant"),
     "unknown plant": (
         GOOD.replace('"station"', '"rig"'),
-        "one of station, cascade, slide, joint, got 'rig'",
+        "one of station, cascade, slide, joint, imposed, got 'rig'",
     ),
     "unknown effect": (
         GOOD.replace("[coulomb_friction]", "[coulomb_fricton]"),

@@ -12,6 +12,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import ModelError
 from pma_gym.plant.rigs import RIGS
+from tests.plant.test_imposed import imposed
 from tests.plant.test_joint import joint
 
 ROOT = Path(__file__).parents[2]
@@ -19,6 +20,7 @@ MODELS = {
     "station": "station",
     "cascade": "cascade",
     "joint": joint(torque_drive=True),
+    "imposed": imposed(),
     "slide": str(ROOT / "tests/discovery/rigs/driven_slide/model.toml"),
 }
 """A model of every rig, by the rig's name."""
@@ -28,6 +30,7 @@ FIRST = {
     "station": Trial(np.arange(3) * 0.01, _STATION),
     "cascade": Trial(np.arange(3) * 0.01, _STATION),
     "joint": Trial(np.arange(3) * 0.01, {"torque_command": np.full(3, 0.1)}),
+    "imposed": Trial(np.arange(3) * 0.01, {"contraction_command": np.full(3, 0.01)}),
     "slide": Trial(np.arange(3) * 0.01, {"load_command": np.full(3, 1.0)}),
 }
 """A trial of every rig."""
@@ -98,7 +101,8 @@ def test_at_most_ten_comparisons_name_a_signal():
 
 def test_an_unknown_rig_is_refused_with_those_there_are():
     model = load_model("station")
-    with pytest.raises(ModelError, match="one of station, cascade, slide, joint, got 'lift'"):
+    known = "station, cascade, slide, joint, imposed"
+    with pytest.raises(ModelError, match=f"one of {known}, got 'lift'"):
         type(model)("m", "m", "lift", dict(model.parameters))
 
 

@@ -51,6 +51,13 @@ class PotentiometerError(NamedTuple):
     offset: Annotated[float, Quantity("deg", -45, 45, "assumption: 1", 0.0, usual=1)]
 
 
+class ForceSensorError(NamedTuple):
+    """Error of the force that a drive measures which imposes a motion."""
+
+    gain: Annotated[float, _GAIN]
+    offset: Annotated[float, Quantity("N", -1e5, 1e5, "assumption: 5", 0.0, usual=5)]
+
+
 def sensor_error(signal, p):
     """What a sensor stands on beside the truth.
 
@@ -87,3 +94,4 @@ LVDT_ERROR = _error("lvdt", "contraction", LvdtError)
 LOAD_CELL_ERROR = _error("load_cell", "load", LoadCellError)
 PRESSURE_TRANSDUCER_ERROR = _error("pressure_transducer", "pressure", PressureTransducerError)
 POTENTIOMETER_ERROR = _error("potentiometer", "rotation", PotentiometerError)
+FORCE_SENSOR_ERROR = _error("force_sensor", "force", ForceSensorError)

@@ -71,6 +71,15 @@ class Gyroscope(NamedTuple):
     ]
 
 
+class ForceSensor(NamedTuple):
+    """Force on a drive that imposes a motion."""
+
+    bandwidth: Annotated[float, _bandwidth(1000)]
+    noise: Annotated[
+        float, Quantity("N", 0, 1e5, f"{_ASSUMED}: 0.5 (standard deviation)", 0.0, usual=0.5)
+    ]
+
+
 def sensor_rate(signal, p):
     """Rate of a sensor's output before noise: s' = (signal - s) / tau, tau = 1 / (2 pi f).
 
@@ -101,6 +110,8 @@ POTENTIOMETER = _sensor("potentiometer", "rotation", Potentiometer)
 
 ENCODER = _sensor("encoder", "angle", Encoder)
 GYROSCOPE = _sensor("gyroscope", "speed", Gyroscope)
+
+FORCE_SENSOR = _sensor("force_sensor", "force", ForceSensor)
 
 JOINT_SENSORS: tuple[Effect, ...] = (ENCODER, GYROSCOPE)
 """Sensors of a joint, as the catalogue has them."""

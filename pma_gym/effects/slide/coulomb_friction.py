@@ -24,7 +24,7 @@ class CoulombFriction(NamedTuple):
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force", usual=10)
+        float, Quantity("um", 0.1, 20000, "assumption: 10 um at full static force", usual=10)
     ]
 
 
@@ -93,6 +93,19 @@ def friction_bend(memory, direction, p):
     return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * left
 
 
+def release_path(memory, direction, p):
+    """Way that a turn takes until the bristles are relaxed: they are elastic on their way back.
+
+    Args:
+        memory: deflection z where the travel begins.
+        direction: 1 where the motion is in the direction of contraction, else -1.
+        p: parameters with presliding (m).
+    Returns:
+        Way (m); 0 where the motion deflects them further.
+    """
+    return p.presliding * positive(-direction * memory)
+
+
 def stribeck_bend(velocity, p):
     """Speed beyond that at which nine tenths of what static exceeds dynamic are gone.
 
@@ -116,6 +129,7 @@ COULOMB_FRICTION = Effect(
     law=friction_force,
     rate_independent_law=friction_path,
     path_breakpoint=friction_bend,
+    release_path=release_path,
     breakpoint=stribeck_bend,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "

@@ -25,7 +25,8 @@ def equilibrium_at(
         ValueError: a voltage out of 0-10 V, or no contraction within twice the limits balances
             the load.
     """
-    check_voltages(motor_voltage, regulator_voltage)
+    if not plant.model.rig.direct_commands:
+        check_voltages(motor_voltage, regulator_voltage)
     commands = np.array([motor_voltage], float), np.array([regulator_voltage], float)
     problem = _solve(plant, *commands, None)
     if problem.unbalanced:

@@ -1,6 +1,7 @@
 """The rigs that a model can be of, one file each: their ports, states and balances."""
 
 from pma_gym.plant.rigs.cascade import CASCADE
+from pma_gym.plant.rigs.imposed import IMPOSED
 from pma_gym.plant.rigs.joint import JOINT
 from pma_gym.plant.rigs.rig import Rig
 from pma_gym.plant.rigs.slide import SLIDE
@@ -8,5 +9,5 @@ from pma_gym.plant.rigs.station import STATION
 
 __all__ = ["RIGS", "Rig"]
 
-RIGS: dict[str, Rig] = {rig.name: rig for rig in (STATION, CASCADE, SLIDE, JOINT)}
+RIGS: dict[str, Rig] = {rig.name: rig for rig in (STATION, CASCADE, SLIDE, JOINT, IMPOSED)}
 """All rigs, by the name that a model file gives as its plant."""

@@ -37,6 +37,7 @@ class Rig:
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
         start_paths: parameters of a free rig that say where its first signal begins, and its rate.
+        imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
 
@@ -55,6 +56,7 @@ class Rig:
     is_free: bool = False
     has_muscle: bool = True
     is_diagnosable: bool = False
+    imposes_motion: bool = False
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: tuple[str, ...] = ()
     direct_commands: Mapping[str, str] = field(default_factory=dict)

@@ -1,0 +1,40 @@
+"""A force that comes again with the way: cogging of magnets, ripple of a screw or a guide."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.arithmetic import cosine
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+
+class Cogging(NamedTuple):
+    """Parameters of `cogging_force`."""
+
+    amplitude: Annotated[float, Quantity("N", 0, 1e6, "assumption: 1", 0.0, usual=1)]
+    periods: Annotated[float, Quantity("1/m", 1, 1e4, "assumption: 100, one in 10 mm", usual=100)]
+    phase: Annotated[float, Quantity("deg", -180, 180, "where the position's zero is", usual=0)]
+
+
+def cogging_force(contraction, p):
+    """Force that is periodic in the position, and takes no energy.
+
+        F = amplitude cos(2 pi periods x + phase)
+
+    Args:
+        contraction: position x (m).
+        p: Cogging: amplitude (N), periods in a metre (1/m), phase (rad).
+    Returns:
+        Force (N); positive in the direction of contraction.
+    Source:
+        First harmonic of what magnets and teeth do.
+    """
+    return p.amplitude * cosine(6.283185307179586 * p.periods * contraction + p.phase)
+
+
+COGGING = Effect(
+    name="cogging",
+    port="contact_force",
+    parameters=Cogging,
+    law=cogging_force,
+    signature="force periodic in the position, the same in both directions and at every speed",
+)

@@ -1,0 +1,58 @@
+"""A motion that another drive imposes: a tensile tester, a cylinder, a shaker."""
+
+from typing import Annotated, NamedTuple
+
+from pma_gym.effects.effect import Effect
+from pma_gym.units import Quantity
+
+FOLLOWING = 2.0
+"""Corner of the states that follow the motion, in bandwidths of its record: `motion_command`
+takes their lag out beforehand. Not much faster: between rows the command is a line, and states
+that are faster than the rows would move by its slopes."""
+
+_TURN = 6.283185307179586
+
+
+class ImposedMotion(NamedTuple):
+    """Parameters of `imposed_acceleration`."""
+
+    bandwidth: Annotated[
+        float,
+        Quantity(
+            "Hz", 1e-3, 1e5, "assumption: 10, testers turn within a tenth of a second", usual=10
+        ),
+    ]
+
+
+def following_rate(p):
+    """Corner (rad/s) of the states that follow the motion."""
+    return _TURN * FOLLOWING * p.bandwidth
+
+
+def imposed_acceleration(command, contraction, velocity, p):
+    """Acceleration of what is moved, which follows a command without overshoot.
+
+        x'' = w^2 (c - x) - 2 w x',   w = 2 pi 2 bandwidth
+
+    Args:
+        command: position c that is asked for (m), the record ahead of the states' lag.
+        contraction: position x (m).
+        velocity: its rate (m/s).
+        p: ImposedMotion: bandwidth (Hz) at which the record's amplitude is halved.
+    Returns:
+        Acceleration (m/s^2).
+    Source:
+        Two equal real poles: the fastest that does not overshoot.
+    """
+    corner = following_rate(p)
+    return corner * (corner * (command - contraction) - 2.0 * velocity)
+
+
+IMPOSED_MOTION = Effect(
+    name="imposed_motion",
+    port="imposed_motion",
+    parameters=ImposedMotion,
+    law=imposed_acceleration,
+    held=("bandwidth",),
+    signature="the motion is the input: it is the record, smoothed without a lag",
+)

@@ -1,0 +1,79 @@
+"""The motion that a record of positions stands for: smooth, with its velocity, and without a lag.
+
+A record of positions is noisy, and differences of it are more so. The motion is the natural cubic
+spline s that makes least
+
+    sum w_i (y_i - s(t_i))^2 + lambda int s''^2 dt,   lambda = (2 pi bandwidth)^-4
+
+(Reinsch 1967), which passes slow motion, halves the amplitude at the bandwidth and shifts nothing.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+
+Array = NDArray[np.float64]
+
+
+def smoothed(time: Array, values: Array, bandwidth: float) -> tuple[Array, Array, Array]:
+    """The smooth motion of a record.
+
+    Args:
+        time: increasing times (s), shape (n,).
+        values: the record (SI), shape (n,).
+        bandwidth: frequency (Hz) at which its amplitude is halved.
+    Returns:
+        The motion, its rate and the rate of that (SI), shape (n,) each.
+    """
+    rows = len(time)
+    if rows < 3:
+        rate = np.zeros(rows) if rows < 2 else np.full(2, np.diff(values) / np.diff(time))
+        return values.copy(), rate, np.zeros(rows)
+    curvature = np.zeros(rows)
+    steps = np.diff(time)
+    left, right = 1.0 / steps[:-1], 1.0 / steps[1:]
+    middle = -left - right
+    # Each reading stands for the time to its neighbours, whatever the clock.
+    weights = 0.5 * (np.append(steps, 0.0) + np.append(0.0, steps))
+    penalty = (2.0 * np.pi * bandwidth) ** -4 / weights
+    bands = np.zeros((3, rows - 2))
+    bands[2] = (steps[:-1] + steps[1:]) / 3.0
+    bands[2] += left**2 * penalty[:-2] + middle**2 * penalty[1:-1] + right**2 * penalty[2:]
+    bands[1, 1:] = steps[1:-1] / 6.0
+    bands[1, 1:] += middle[:-1] * left[1:] * penalty[1:-2] + right[:-1] * middle[1:] * penalty[2:-1]
+    bands[0, 2:] = right[:-2] * left[2:] * penalty[2:-2]
+    bends = left * values[:-2] + middle * values[1:-1] + right * values[2:]
+    curvature[1:-1] = solveh_banded(bands, bends)
+    taken = np.zeros(rows)
+    taken[:-2] += left * curvature[1:-1]
+    taken[1:-1] += middle * curvature[1:-1]
+    taken[2:] += right * curvature[1:-1]
+    motion = values - penalty * taken
+    slopes = np.diff(motion) / steps
+    rate = np.append(slopes - steps * (2.0 * curvature[:-1] + curvature[1:]) / 6.0, 0.0)
+    rate[-1] = slopes[-1] + steps[-1] * (curvature[-2] + 2.0 * curvature[-1]) / 6.0
+    return motion, rate, curvature
+
+
+def motion_command(time: Array, positions: Array, bandwidth: float, corner: float) -> Array:
+    """Command at which states with two equal poles are on the smooth motion of a record.
+
+    Args:
+        time: increasing times (s), shape (n,).
+        positions: the record (m), shape (n,).
+        bandwidth: of the motion (Hz).
+        corner: of the states (rad/s).
+    """
+    motion, rate, curvature = smoothed(time, positions, bandwidth)
+    command = motion + (2.0 * rate + curvature / corner) / corner
+    # A trial begins where its first command holds the states.
+    command[0] = motion[0]
+    return command
+
+
+def level_command(time: Array, levels: Array, bandwidth: float, corner: float) -> Array:
+    """The same for a state with one pole, such as a measured pressure."""
+    level, rate, _ = smoothed(time, levels, bandwidth)
+    command = level + rate / corner
+    command[0] = level[0]
+    return command

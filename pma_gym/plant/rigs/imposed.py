@@ -1,0 +1,113 @@
+"""The imposed motion: another drive moves a muscle, a rod or a seal; force is what is measured.
+
+    x'' = w^2 (c - x) - 2 w x'                         c the motion's record ahead of the states
+    F = F_muscle(P, x, memories) + F_contact(P, x, x', memories) - B x'
+
+The motion is the input, so nothing has to balance: F is what the drive feels, without the inertia
+of what hangs on it. The pressure is commanded behind a regulator, or as it was measured.
+"""
+
+from collections.abc import Mapping
+
+from pma_gym.codegen.trace import trace
+from pma_gym.data.signals import signals
+from pma_gym.effects.contact.imposed_motion import following_rate
+from pma_gym.effects.effect import Parameters
+from pma_gym.effects.ports import STATION_PORTS, Port
+from pma_gym.plant.composition import PlantEquations
+from pma_gym.plant.equilibrium.problem import EquilibriumProblem
+from pma_gym.plant.rigs.rig import Rig
+from pma_gym.plant.rigs.station import TURNING_M
+
+PORTS: dict[str, Port] = {
+    "imposed_motion": Port("acceleration of what the drive moves (m/s^2)", least=1, most=1),
+    "muscle_force": Port("force of the muscle (N), added; positive shortens it"),
+    "slide_force": Port("force on what moves (N), added; positive in the direction of contraction"),
+    "contact_force": Port(
+        "force on what moves (N), added; positive in the direction of contraction"
+    ),
+    "lost_motion": Port("way that is lost before what rubs (m)", most=1),
+    **{name: STATION_PORTS[name] for name in ("muscle_damping", "damping_factor", "chamber")},
+    "regulator_line": Port("pressure that the regulator settles at (Pa)", most=1),
+    "regulator_delay": STATION_PORTS["regulator_delay"],
+    "regulator_lag": Port("rate of the pressure (Pa/s)", most=1),
+    "regulator_pace": STATION_PORTS["regulator_pace"],
+}
+"""Ports of the rig: how many effects each takes, and what becomes of their results."""
+
+REFUSED_EFFECTS: dict[str, str] = {
+    "operator": "the motion is imposed, whoever pulls; take [constant_force] for a force beside it",
+    "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
+    "residual_load": "there is no load beside the force that is measured",
+}
+"""Effects that would fit a port and mean nothing there, and why."""
+
+SCALES: dict[str, float] = {
+    "contraction": 25e-3,
+    "velocity": 0.4,
+    "pressure": 500e3,
+    "force": 500.0,
+}
+"""What an error is counted against (SI): roughly the range of each quantity in a trial."""
+
+
+def write_equations(equations: PlantEquations) -> None:
+    """Write the motion and the force, with the model's effects at its ports."""
+    eq = equations
+    eq.travelled = (eq["contraction"], eq["velocity"])
+    # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
+    eq.let("command", eq["motor_voltage"])
+    acceleration = eq.one("imposed_motion")
+    regulated = bool(eq.at("regulator_line"))
+    eq.let("pressure_asked", eq.one("regulator_line") if regulated else eq["regulator_voltage"])
+    eq.let("pressure_command", eq.passed("regulator_delay", "pressure_asked"))
+    corner = trace(following_rate, eq.parameters["imposed_motion"])
+    lag = eq.parameters.get("regulator_lag")
+    eq.let("regulator_time_constant", lag.time_constant if lag else 1.0 / corner)
+    eq.let("regulator_pace", eq.product("regulator_pace"))
+    at_once = corner * eq["pressure_command"], corner
+    force = eq.total("muscle_force") + eq.total("slide_force") + eq.total("contact_force")
+    resistance = eq.total("muscle_damping") * eq.product("damping_factor")
+    eq.outputs = {"force": force - resistance * eq["velocity"], "pressure": eq["pressure"]}
+    eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
+    eq.add_state("velocity", acceleration, SCALES["velocity"])
+    source = eq.one("regulator_lag") if lag else at_once
+    eq.add_decaying("pressure", source, SCALES["pressure"], "chamber")
+    eq.add_memories(tuple(PORTS))
+    eq.add_sensors(SCALES)
+    eq.add_event("turning", eq["velocity"], TURNING_M, turning=True)
+    # No rate depends on a memory of the way, which is exact over any step that does not turn.
+    eq.path_breakpoints.clear()
+
+
+def fastest_oscillation(parameters: Mapping[str, Parameters]) -> float:
+    """0: the motion is given."""
+    return 0.0
+
+
+def solve_equilibrium(problem: EquilibriumProblem) -> None:
+    """Put the states where the first commands hold them."""
+    problem.relax("pressure")
+    problem["velocity"] = 0.0
+    problem.relax("contraction", of="velocity")
+
+
+IMPOSED = Rig(
+    name="imposed",
+    signals=signals("force", "pressure"),
+    ports=PORTS,
+    parts=(),
+    position_tolerances={"contraction": 0.001, "velocity": 0.01},
+    write_equations=write_equations,
+    solve_equilibrium=solve_equilibrium,
+    fastest_oscillation=fastest_oscillation,
+    refused_effects=REFUSED_EFFECTS,
+    absent_signals=(
+        "the motion is imposed, so force is what is compared; a measured motion is read by "
+        "[columns] as contraction_command_mm, a measured force as force_n"
+    ),
+    has_muscle=False,
+    is_diagnosable=True,
+    imposes_motion=True,
+    direct_commands={"imposed_motion": "contraction_command"},
+)
