@@ -4,6 +4,7 @@ A rig says which of them it has. All that code asks of a signal stands here, so 
 its name, and a new one is a row of this table.
 """
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -42,6 +43,10 @@ class Signal:
         starts_at_zero: a trial counts it from its own first reading.
         shortens: it grows where the muscle shortens, so it counts against a pull.
         lengthens: it grows where the muscle is pulled out.
+        called: what people call it, where that is not its name.
+        forwards, backwards: what a rig does while it grows, and while it falls.
+        slowest: smallest rate that counts as motion (SI per s), at most; infinite where only its
+            trials say.
         least_span: smallest range in which a slope shows (SI).
         least_rate: smallest rate that counts as motion where a trial begins (SI per s).
         stems: names that files of others may give it, without unit.
@@ -65,6 +70,10 @@ class Signal:
     starts_at_zero: bool = False
     shortens: bool = False
     lengthens: bool = False
+    called: str = ""
+    forwards: str = "moving forwards"
+    backwards: str = "moving back"
+    slowest: float = math.inf
     least_span: float = 0.0
     least_rate: float = 0.0
     stems: tuple[str, ...] = ()
@@ -192,6 +201,9 @@ _ALL: tuple[Signal, ...] = (
         reading="extension",
         has_free_zero=True,
         shortens=True,
+        forwards="shortening",
+        backwards="pulling out",
+        slowest=0.5e-3,
         least_span=1e-3,
         least_rate=1.5e-3,
         stems=("contraction", "displacement", "position", "stroke"),
@@ -206,6 +218,7 @@ _ALL: tuple[Signal, ...] = (
         sensor="potentiometer",
         calibration=calibration.POTENTIOMETER,
         raw_column="potentiometer_v",
+        called="rotation of the pulley",
         has_free_zero=True,
         starts_at_zero=True,
         least_span=0.05,
@@ -249,6 +262,8 @@ _ALL: tuple[Signal, ...] = (
         "angle of a joint, encoder or potentiometer",
         sensor="encoder",
         other_units=("rad",),
+        forwards="turning forwards",
+        backwards="turning back",
     ),
     Signal(
         "speed",

@@ -193,9 +193,9 @@ class _Work:
         model = load_model(self.wanted or asked.model or DEFAULT_MODEL)
         if not model.rig.is_diagnosable:
             raise ModelError(
-                f"model {model.name} is a {model.plant}; a diagnosis needs a station or a slide, "
-                "the balance of forces that effects act on; give serres2008, station or one made "
-                "of them"
+                f"model {model.name} is a {model.plant}; a diagnosis needs a station, a slide or a "
+                "joint, the balance of forces that effects act on; give serres2008, station or one "
+                "made of them, or a model of your rig"
             )
         if asked.folder is not None and asked.checked is None:
             # Trials that come from files; what a program made needs no such doubts.

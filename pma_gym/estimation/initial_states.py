@@ -1,10 +1,10 @@
-"""How a trial of a slide that nothing holds began: what its first readings say, and a correction.
+"""How a trial of a rig that nothing holds began: what its first readings say, and a correction.
 
 A start of 0.2 mm/s more leads 0.2 mm further within a second, far more than a sensor's noise; no
 derivative of first readings is that exact. So every trial is simulated once more with another
-velocity at its start, and each simulation is moved along the difference to where it meets the
-measured contraction best. To first order that is a fit of the starting velocity beside whatever
-else is fitted.
+speed at its start, and with another position where its zero is the rig's own; each simulation is
+moved along the differences to where it meets the readings best. To first order that is a fit of
+the starting position and speed beside whatever else is fitted.
 """
 
 from collections.abc import Sequence
@@ -20,37 +20,49 @@ FIRST_S, FIRST_ROWS = 0.05, 8
 """Time (s) and least number of first readings that a start is taken from."""
 
 MOVE = 1e-3
-"""By how much a starting velocity is moved for its difference (m/s)."""
+"""By how much a starting position or speed is moved for its difference (SI)."""
 
 
 def starts(trials: Sequence[Logged]) -> tuple[Array, Array]:
-    """Contraction (m) and its rate (m/s) where trials begin, shape (trials,) each."""
+    """Position and its rate (SI) where trials begin, shape (trials,) each."""
     fitted = np.array([_start(logged) for logged in trials])
     return fitted[:, 0], fitted[:, 1]
 
 
-def meet(states: Array, held: Array, logged: Logged) -> None:
-    """Move simulations along what another starting velocity changes, to the measured contraction.
+def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int) -> None:
+    """Move simulations along what other starts change, to the readings.
 
     Args:
-        states: of all simulations, the last of which is the first with another starting velocity,
-            shape (tried + 1, rows, states); all but the last are changed in place.
-        held: what the sensor of contraction holds in them (m), shape (tried + 1, rows).
+        states: of all simulations, the last of which are the first with another start each, shape
+            (tried + further, rows, states); the others are changed in place.
+        held: what the sensors hold in them (SI), shape (tried + further, signals, rows).
         logged: what was measured.
+        levels: standard deviations of the signals (SI), shape (signals,).
+        further: how many other starts there are.
     """
-    there = _there(logged)
-    change = held[-1] - held[0]
-    along = change[there] - change[there].mean() if there.any() else np.zeros(1)
-    size = float(along @ along)
-    if not np.isfinite(size) or size == 0.0:
+    along, off = [], []
+    measured = [channel for channel, known in enumerate(logged.measures) if known]
+    for channel in measured:
+        there = _there(logged, channel)
+        # One signal has no weight beside another.
+        weight = levels[measured[0]] / levels[channel]
+        change = weight * (held[-further:, channel, there] - held[0, channel, there])
+        if logged.signals[channel].has_free_zero:
+            change = change - change.mean(axis=1, keepdims=True)
+        along.append(change)
+        off.append(weight * (logged.measured[channel, there] - held[:-further, channel, there]))
+    moves = np.concatenate(along, axis=1)
+    sizes = moves @ moves.T
+    if not np.isfinite(sizes).all() or not sizes.any():
         return
-    off = logged.measured[0, there] - held[:-1][:, there]
-    shares = (off @ along) / size
-    states[:-1] += shares[:, None, None] * (states[-1] - states[0])
+    # What one start does as well as the other is shared between them.
+    shares = np.concatenate(off, axis=1) @ moves.T @ np.linalg.pinv(sizes, hermitian=True)
+    for share, moved in zip(shares.T, states[-further:] - states[0], strict=True):
+        states[:-further] += share[:, None, None] * moved
 
 
 def _start(logged: Logged) -> tuple[float, float]:
-    there = np.flatnonzero(_there(logged))
+    there = np.flatnonzero(_there(logged, 0))
     if len(there) < 3:
         return 0.0, 0.0
     time, values = logged.time[there] - logged.time[0], logged.measured[0, there]
@@ -60,7 +72,7 @@ def _start(logged: Logged) -> tuple[float, float]:
     return float(fitted(0.0)), float(fitted.deriv()(0.0))
 
 
-def _there(logged: Logged) -> NDArray[np.bool_]:
+def _there(logged: Logged, channel: int) -> NDArray[np.bool_]:
     there = np.ones(len(logged.time), bool)
-    there[logged.missing[0]] = False
+    there[logged.missing[channel]] = False
     return there

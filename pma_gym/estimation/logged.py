@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data import calibration
-from pma_gym.data.signals import Signal
+from pma_gym.data.signals import VOLTAGE_RANGE, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
@@ -22,12 +22,14 @@ class Logged:
     Attributes:
         signals: what the rig's sensors measure, in the order of readings.
         time: times (s), shape (rows,).
-        motor: motor voltage (V), shape (rows,).
+        motor: motor voltage (V), or the command that the drive takes as it comes (SI), shape
+            (rows,).
         regulator: regulator voltage (V), shape (rows,).
         measured: readings (SI), 0 where missing, shape (signals, rows).
         missing: rows without a reading that counts, by output.
         counts: 1 where a reading counts, else 0, shape (signals, rows).
         measures: whether there is any that does, by output.
+        motor_span: range of the motor's command: of its voltage, else what the trial goes through.
     """
 
     signals: tuple[Signal, ...]
@@ -38,6 +40,7 @@ class Logged:
     missing: list[NDArray[np.int64]]
     counts: Array
     measures: list[bool]
+    motor_span: float
 
     @classmethod
     def of(cls, model: Model, number: int, trial: Trial) -> "Logged":
@@ -66,6 +69,7 @@ class Logged:
             [np.flatnonzero(row) for row in absent],
             np.where(absent, 0.0, 1.0),
             [not row.all() for row in absent],
+            float(np.ptp(motor if sensors.direct_command(model) else VOLTAGE_RANGE)),
         )
 
     def row(self, rows: Array, *measures: str) -> Array:

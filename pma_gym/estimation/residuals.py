@@ -45,7 +45,7 @@ class Residuals(SimulatedTrials):
     rounding of the DAQ. Sensors hold what their lag makes of the truth. NaN counts for nothing, nor
     does a reading at an end of the DAQ's range, which says only that the truth lies beyond. A trial
     begins settled at its first commands, memories where they fit it best between 0 and 1 unless the
-    trial says where (`memory_start`); a slide that nothing holds, as fast as fits it best.
+    trial says where (`memory_start`); a rig that nothing holds, where and as fast as fits it best.
 
     The model's noise levels weigh the sensors. Arguments, further attributes and errors are those
     of `SimulatedTrials`.

@@ -88,7 +88,9 @@ class SimulatedTrials:
         self._begun: list[tuple[int, Array]] = []
         if self.plant.model.rig.is_free:
             where, speed = initial_states.starts(self._trials)
-            paths = dict(zip(self.plant.model.rig.start_paths, (where, speed), strict=True))
+            paths = dict(
+                zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
+            )
             self._begun = self._places({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
@@ -122,10 +124,11 @@ class SimulatedTrials:
         for column, parameter in enumerate(self.free):
             vectors[:, parameter.place] = tried[:, column] * self.factors[column]
         moved = self._moved_starts()
-        count, number = len(tried) + bool(moved), len(self.plant.states)
-        every = self._every(np.concatenate([vectors, vectors[: count - len(tried)]]))
-        for place, move in moved:
-            every[len(tried) :: count, place] += move
+        count, number = len(tried) + len(moved), len(self.plant.states)
+        every = self._every(np.concatenate([vectors, *([vectors[:1]] * len(moved))]))
+        for further, places in enumerate(moved, len(tried)):
+            for place, move in places:
+                every[further::count, place] += move
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
         commands = np.repeat(first, count, axis=0).T
@@ -154,19 +157,23 @@ class SimulatedTrials:
             results += work(block, spaces, zeros[block, : len(tried)], vectors)
         return results
 
-    def _moved_starts(self) -> list[tuple[int, float]]:
-        """Parameters that say how trials begin, and by how much each is moved once more."""
+    def _moved_starts(self) -> list[list[tuple[int, float]]]:
+        """Parameters that say how trials begin, moved in one more simulation each, and by how much.
+
+        A position whose zero is free begins anywhere.
+        """
         if self._begun:
-            return [(self._begun[-1][0], initial_states.MOVE)]
-        return [(place, memory_start.MOVE) for place, _ in self._memories]
+            free = self.plant.model.rig.signals[0].has_free_zero
+            return [[(place, initial_states.MOVE)] for place, _ in self._begun[free:]]
+        return [[(place, memory_start.MOVE) for place, _ in self._memories]] * bool(self._memories)
 
     def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
         """States of a trial that begins as fits best, shape (tried, rows, states).
 
-        The last of those given is the first with another start; x0 moves with them.
+        The last of those given are the first with another start; x0 moves with them.
         """
         if self._begun:
-            return self._met_slide(space, self._trials[number])
+            return self._met_freely(space, zeros, vectors, self._trials[number])
         shares = self._start_shares(number, space, zeros, vectors)
         space[:-1] += shares[:, None, None] * (space[-1] - space[0])
         zeros[:-1] += shares * (zeros[-1] - zeros[0])
@@ -185,12 +192,18 @@ class SimulatedTrials:
         """Differences (SI), (tried, signals, rows), in units of noise, (tried, numbers)."""
         return (left / self.deviations[:, None]).reshape(len(left), -1)
 
-    def _met_slide(self, space: Array, logged: Logged) -> Array:
-        """States of a free slide, begun as fast as fits best; shape (tried, rows, states)."""
-        column = self.plant.sensor_columns[0]
-        at = column if column >= 0 else self.plant.states.index(self.plant.outputs[0])
-        initial_states.meet(space, space[:, :, at].copy(), logged)
-        return space[:-1]
+    def _met_freely(self, space: Array, zeros: Array, vectors: Array, logged: Logged) -> Array:
+        """States of a free rig, begun as fits best; shape (tried, rows, states)."""
+        tried, further = len(vectors), len(space) - len(vectors)
+        every = np.concatenate([vectors, *([vectors[:1]] * further)])
+        held = np.stack(self._held(space, zeros, every), axis=1)
+        initial_states.meet(space, held, logged, self._levels, further)
+        return space[:tried]
+
+    @property
+    def _levels(self) -> Array:
+        """Standard deviations that signals are weighed by where a start is sought (SI)."""
+        return self.deviations
 
     def _every(self, vectors: Array) -> Array:
         """Parameters of every trial at each of some, shape (trials * tried, numbers)."""

@@ -9,7 +9,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.integrator.equations import Interpolation, check_interpolation
 from pma_gym.plant import sensors
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.condition import Condition, check_voltages
+from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.solver import equilibrium_at
 from pma_gym.plant.memory_start import begun_at
 from pma_gym.plant.simulation import Run, simulate_all
@@ -73,7 +73,7 @@ class Plant(CompiledModel):
         Raises:
             ValueError: a voltage out of 0-10 V, or a duration that is not positive.
         """
-        check_voltages(motor_voltage, regulator_voltage)
+        check_commands(self.model, motor_voltage, regulator_voltage)
         if not 0.0 < duration < float("inf"):
             raise ValueError(f"duration must be a positive time in s, got {duration!r}")
         condition.receive(motor_voltage, regulator_voltage)

@@ -124,9 +124,9 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     """
     if model.rig.imposes_motion:
         return _imposed(model, trial)
-    direct = [c for drive, c in model.rig.direct_commands.items() if drive in model.parameters]
+    direct = direct_command(model)
     if direct:
-        return _direct(trial, direct[0]), np.zeros(len(trial.time))
+        return _direct(trial, direct), np.zeros(len(trial.time))
     line, two_way = (model.parameters.get(each) for each in ("regulator_line", "two_way_drive"))
     drive, least = model.parameters.get("drive"), 0.0
     if two_way is not None:
@@ -135,6 +135,12 @@ def voltages(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:
     if not model.rig.has_muscle:
         return motor, np.zeros(len(motor))
     return motor, _voltage(trial, "regulator_voltage", "pressure_command", line)
+
+
+def direct_command(model: Model) -> str:
+    """The command that a model's drive takes as it comes; "" where a line makes volts of it."""
+    commands = model.rig.direct_commands.items()
+    return next((command for drive, command in commands if drive in model.parameters), "")
 
 
 def _imposed(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray]:

@@ -49,8 +49,8 @@ def regions(some: TimeBins) -> dict[str, NDArray[np.bool_]]:
         "slow": moving & (np.abs(some.speed) < 0.1 * FAST_MM_S),
         "slack": some.load < SLACK_N,
         "loaded": some.load > 0.9 * np.max(some.load),
-        "stretched": some.contraction < 0.0,
-        "shortened": some.contraction > 0.7 * np.max(some.contraction),
+        "stretched": some.position < 0.0,
+        "shortened": some.position > 0.7 * np.max(some.position),
         "pressed": some.pressure > HIGH_KPA,
         "early": some.order < 0.2,
         "final hold": some.phase == 2.0,
@@ -59,7 +59,7 @@ def regions(some: TimeBins) -> dict[str, NDArray[np.bool_]]:
 
 def courses(some: TimeBins) -> dict[str, Array]:
     """What effects would go along with, shape (n,) each; not centred, not scaled."""
-    rates = {name: _rate(some, getattr(some, name)) for name in ("load", "pressure", "contraction")}
+    rates = {name: _rate(some, getattr(some, name)) for name in ("load", "pressure", "position")}
     by_name = {
         "speed": some.speed,
         "direction": np.sign(np.where(some.held == 0.0, some.speed, 0.0)),
@@ -67,9 +67,9 @@ def courses(some: TimeBins) -> dict[str, Array]:
         "pressure rate": rates["pressure"],
         "venting": np.minimum(rates["pressure"], 0.0),
         "fast pressure": rates["pressure"] * np.abs(rates["pressure"]),
-        "contraction": some.contraction,
-        "contraction squared": some.contraction**2,
-        "stretch": np.minimum(some.contraction, 0.0),
+        "contraction": some.position,
+        "contraction squared": some.position**2,
+        "stretch": np.minimum(some.position, 0.0),
         "load": some.load,
         "low load": np.exp(-some.load / SLACK_N),
         "loaded speed": some.load * some.speed,
@@ -79,7 +79,7 @@ def courses(some: TimeBins) -> dict[str, Array]:
         "play": _play(some, 1.5),
     }
     for time in (2.0, 40.0):
-        by_name[f"creep {time:g} s"] = some.contraction - _lagged(some, time)
+        by_name[f"creep {time:g} s"] = some.position - _lagged(some, time)
     return by_name
 
 
@@ -139,10 +139,10 @@ def _rate(some: TimeBins, values: Array) -> Array:
 
 def _lagged(some: TimeBins, time: float) -> Array:
     """Contraction (mm) that follows with a time constant (s), from where each trial begins."""
-    output = np.empty_like(some.contraction)
+    output = np.empty_like(some.position)
     keep = np.exp(-BIN_S / time)
     for each in _by_trial(some):
-        here = some.contraction[each]
+        here = some.position[each]
         state = here[0]
         for k, value in enumerate(here):
             state = keep * state + (1.0 - keep) * value
@@ -152,9 +152,9 @@ def _lagged(some: TimeBins, time: float) -> Array:
 
 def _play(some: TimeBins, distance: float) -> Array:
     """Force of friction that builds up over a way (mm), -1 to 1: from 0 in each trial."""
-    output = np.zeros_like(some.contraction)
+    output = np.zeros_like(some.position)
     for each in _by_trial(some):
-        here, state = some.contraction[each], 0.0
+        here, state = some.position[each], 0.0
         for k in range(1, len(here)):
             state = float(np.clip(state + (here[k] - here[k - 1]) / distance, -1.0, 1.0))
             output[each.start + k] = state

@@ -26,7 +26,7 @@ _DRIVERS = {
     "load": ("motor_voltage", "load_command"),
     "pressure": ("regulator_voltage", "pressure_command"),
 }
-"""Commands that move a measurement."""
+"""Commands that move a measurement; none of a rig that may be of any size."""
 
 _LARGE = {
     "motor_voltage": 0.5,
@@ -130,7 +130,8 @@ def _largest(values: Array | None) -> float:
 
 def _moved(door: dict[str, Array], quantity: str) -> str:
     """A command that changes so much that a measurement must follow; empty if none does."""
-    return next((name for name in _DRIVERS[quantity] if _span(door.get(name)) >= _LARGE[name]), "")
+    drivers = _DRIVERS.get(quantity, ())
+    return next((name for name in drivers if _span(door.get(name)) >= _LARGE[name]), "")
 
 
 _MUSCLE = ("regulator_voltage", "pressure_command", "pressure")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.data.signals import SIGNALS
+from pma_gym.data.signals import SIGNALS, Signal
 from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY, TrialError
 from pma_gym.discovery.diagnosis import TrialState
@@ -31,12 +31,9 @@ from pma_gym.units import SI_FACTORS
 Array = NDArray[np.float64]
 
 FILE = "trials.toml"
-STARTS = {"contraction": "start.contraction_mm", "velocity": "start.velocity_mm_per_s"}
-"""States of a rig that nothing holds, and where a model file says how a trial begins."""
-
 SEARCHED, LEAST_SPEED = 0.2, 1.0
 """How far about a starting velocity the best one is searched, as a share of it, and the least speed
-(mm/s) that the share is of."""
+(in the unit of a model file, mm/s or deg/s) that the share is of."""
 
 
 def trial_states(
@@ -47,8 +44,10 @@ def trial_states(
     for candidate in chosen:
         own |= candidate.own
     whitened = problem.whitened_residuals(fit.model, chosen)
-    begins = STARTS if _begins_freely(fit.model) else memory_states(fit.model)
+    free = fit.model.rig.start_paths
+    begins = free or memory_states(fit.model)
     begun = whitened.first_states(fit.values) if begins else None
+    levels = [each.level for each in problem.noise]
     by_trial = {}
     for i, name in enumerate(names):
         parameters = {path: each[i] / SI_FACTORS[unit(path)] for path, each in own.items()}
@@ -57,28 +56,33 @@ def trial_states(
             parameters |= {
                 path: states[state] / SI_FACTORS[unit(path)] for state, path in begins.items()
             }
-        if _begins_freely(fit.model):
-            parameters = _started(fit.model, problem.trials[i], parameters)
+        if free:
+            parameters = _started(fit.model, problem.trials[i], parameters, levels)
         held = simulated(fit.model, problem.trials[i], TrialState({}, parameters))
         by_trial[name] = TrialState(_zeros(problem.trials[i], held), parameters)
     return by_trial
 
 
-def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dict[str, float]:
+def _started(
+    model: Model, trial: Trial, parameters: Mapping[str, float], levels: Sequence[float]
+) -> dict[str, float]:
     """A trial's own parameters with the starting velocity that fits it best.
 
     A fit moves simulations along a derivative to the velocity that fits best, which is exact to
     first order. Dry friction is not of first order, so the velocity itself is searched here, about
     the derivative's.
     """
-    path, measured = STARTS["velocity"], trial.measurements["contraction"]
+    path = _speed_path(model)
     about = _possible(model, trial, parameters[path])
     parameters = {**parameters, path: about}
 
     def off(velocity: float) -> float:
         held = simulated(model, trial, TrialState({}, {**parameters, path: velocity}))
-        left = held["contraction"] - measured
-        return float(np.nanvar(left))
+        return sum(
+            _misfit(each, row - trial.measurements[each.name]) / level**2
+            for each, row, level in zip(model.rig.signals, held.values(), levels, strict=True)
+            if each.name in trial.measurements
+        )
 
     reach = SEARCHED * max(abs(about), LEAST_SPEED)
     best = minimize_scalar(off, bounds=(about - reach, about + reach), method="bounded")
@@ -86,13 +90,21 @@ def _started(model: Model, trial: Trial, parameters: Mapping[str, float]) -> dic
     return {**parameters, path: float(best.x) if fits_better else about}  # type: ignore[attr-defined]
 
 
+def _misfit(signal: Signal, left: Array) -> float:
+    """Mean square of what is left of a signal (SI), about its mean where its zero is free."""
+    known = left[np.isfinite(left)]
+    if not known.size:
+        return 0.0
+    return float(np.var(known) if signal.has_free_zero else np.mean(known**2))
+
+
 def _possible(model: Model, trial: Trial, velocity: float) -> float:
     """A starting velocity (mm/s), or that of the first readings where no rig has one like it.
 
-    Where dry friction holds a slide, its motion hardly depends on how fast it begins, and a
+    Where dry friction holds a rig, its motion hardly depends on how fast it begins, and a
     derivative leads anywhere.
     """
-    path = STARTS["velocity"]
+    path = _speed_path(model)
     (low,), (high,) = bounds([path])
     if low <= velocity <= high:
         return velocity
@@ -197,6 +209,6 @@ def _zeros(trial: Trial, held: Mapping[str, Array]) -> dict[str, float]:
     return zeros
 
 
-def _begins_freely(model: Model) -> bool:
-    """Whether a model file says how a trial begins, for nothing holds the rig."""
-    return "start" in model.parameters
+def _speed_path(model: Model) -> str:
+    """Where a model file says how fast a trial of a rig begins that nothing holds."""
+    return list(model.rig.start_paths.values())[-1]

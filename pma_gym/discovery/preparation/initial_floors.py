@@ -50,7 +50,8 @@ def initial_floors(
 ) -> list[Level]:
     """Levels of the rig's signals, in their order."""
     assumed, steps, floors = sensors.noise_levels(model), sensors.resolutions(model), []
-    for channel, signal in enumerate(model.rig.signals):
+    channels = zip(model.rig.signals, sensors.deviations(model).tolist(), strict=True)
+    for channel, (signal, unknown) in enumerate(channels):
         resolution = float(steps[channel])
         step = step_between(logged, channel)
         rounding = (step or resolution) / np.sqrt(12.0)
@@ -65,7 +66,8 @@ def initial_floors(
         parts = [_readings(each, channel) for each in logged if each.measures[channel]]
         if rest is None and sparse(parts) and sources.get("repeats", 0.0) > sources[source]:
             source = "repeats"
-        level = max(sources[source], float(rounding))
+        # Of what no trial measures and the model has no sensor for, nothing is known.
+        level = max(sources[source], float(rounding)) or unknown
         distinct = len(distinct_readings(logged, channel))
         floors.append(Level(signal, level, source, sources, step, resolution, distinct))
     return floors

@@ -15,12 +15,12 @@ from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
 
 PIECE_S = 1.0
-"""Longest trial of a free slide (s): an error of its force leads it away with the square of time,
+"""Longest trial of a free rig (s): an error of its force leads it away with the square of time,
 and what starts anew forgets it."""
 
 
 def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial], tuple[str, ...]]:
-    """Trials without what their sensors read at an end of their range; a free slide's in pieces.
+    """Trials without what their sensors read at an end of their range; a free rig's in pieces.
 
     Args:
         named: the trials as they were given.
@@ -42,8 +42,8 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
         pieces = [piece for each in kept for piece in _pieces(each)]
         if len(pieces) > len(kept):
             words.append(
-                f"nothing holds this slide, so its {len(kept)} trials are taken as {len(pieces)} "
-                f"pieces of up to {PIECE_S:g} s, each with its own start"
+                f"nothing holds this {model.rig.name}, so its {len(kept)} trials are taken as "
+                f"{len(pieces)} pieces of up to {PIECE_S:g} s, each with its own start"
             )
         kept = pieces
     elif stretches(trials):
@@ -56,7 +56,7 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
 
 
 def _unused(trials: Sequence[Trial], model: Model) -> list[str]:
-    """Words on what was measured that a slide does not have."""
+    """Words on what was measured that a free rig does not have."""
     names = [
         signal.column
         for signal in SIGNALS.values()
@@ -97,6 +97,12 @@ def _pieces(named: NamedTrial) -> list[NamedTrial]:
 
 
 def _in_volts(trial: Trial, model: Model) -> Trial:
-    """A trial whose commands are the volts that a model has for them, in every row."""
+    """A trial whose commands are the volts that a model has for them, in every row.
+
+    What a drive takes as it comes keeps its name.
+    """
     motor, regulator = sensors.voltages(model, trial)
+    direct = sensors.direct_command(model)
+    if direct:
+        return replace(trial, commands={direct: motor})
     return replace(trial, commands={"motor_voltage": motor, "regulator_voltage": regulator})

@@ -109,6 +109,10 @@ class WhitenedResiduals(Residuals):
         self._projections: dict[tuple[int, int], Projection] = {}
 
     @property
+    def _levels(self) -> Array:
+        return np.array([each.level for each in self.noise])
+
+    @property
     def logged(self) -> list[Logged]:
         """The trials as they are read."""
         return self._trials

@@ -5,6 +5,7 @@ import math
 import re
 import sys
 
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
 from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Undetermined
 from pma_gym.effects import CATALOGUE
@@ -18,13 +19,6 @@ VERDICTS = {
     "undecidable": "Undecidable from these data",
 }
 """Each verdict in a few words."""
-
-_SIGNALS = {
-    "contraction_mm": "contraction",
-    "rotation_deg": "rotation of the pulley",
-    "load_n": "load",
-    "pressure_kpa": "pressure",
-}
 
 _NAMES = {"lvdt": "LVDT", "coulomb": "Coulomb"}
 _WHOLE = {"load_dependent_damping": "load-dependent damping"}
@@ -98,7 +92,8 @@ def effect_symbols(name: str) -> str:
 
 def signal_name(signal: str) -> str:
     """`contraction_mm` as `contraction`."""
-    return _SIGNALS.get(signal, signal)
+    known = SIGNALS.get(BY_NAME[signal].quantity) if signal in BY_NAME else None
+    return signal if known is None else known.called or known.name
 
 
 def signal_unit(signal: str) -> str:
@@ -287,7 +282,9 @@ def _describe(diagnosis: Diagnosis) -> list[str]:
 
 def _measure(diagnosis: Diagnosis) -> list[str]:
     if diagnosis.next_experiment is None:
-        return ["Measure trials that move the station further: more speeds, loads and pressures."]
+        rig = diagnosis.given.rig
+        more = "loads and pressures" if rig.has_muscle else "positions and forces"
+        return [f"Measure trials that move the {rig.name} further: more speeds, {more}."]
     return [
         _run_next(diagnosis),
         "Keep the given model until then: `model.toml` only has refitted parameters.",

@@ -42,19 +42,12 @@ PERIODS = tuple(range(3, 61, 3))
 SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
 
-_LAGS = {
-    "lvdt": "lvdt_lag",
-    "load_cell": "load_cell_lag",
-    "pressure_transducer": "pressure_transducer_lag",
-    "potentiometer": "potentiometer_lag",
-}
-
 
 def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> list[CandidateEffect]:
     """Every effect that a model lacks, in the order of the catalogue.
 
     Args:
-        model: the model, a station.
+        model: the model.
         orders: which repeat each trial is, 0 for the first; None where that is not known.
     """
     candidates = [
@@ -204,15 +197,15 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
 
 def _slow_sensors(model: Model) -> Iterator[CandidateEffect]:
     """Sensors that may be slower than the model says."""
-    for name, shown in _LAGS.items():
-        if name not in model.parameters:
+    for name in CATALOGUE:
+        if name not in sensors.SENSORS or name not in model.parameters:
             continue
         path = f"{name}.bandwidth_hz"
         here = values(model, [path])
         probes = here * np.array(SLOWER)[:, None]
         none = np.zeros(1, bool)
         yield CandidateEffect(
-            *(shown, name, model, (path,), ~none, here, probes, none),
+            *(f"{name}_lag", name, model, (path,), ~none, here, probes, none),
             np.zeros(len(probes), bool),
         )
 

@@ -19,6 +19,7 @@ from pma_gym.data.signals import Signal
 from pma_gym.discovery.diagnosis import Map, Place
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.screening.condition_axes import condition_axes
 from pma_gym.discovery.screening.regions import LARGEST, SMALLEST, Region, single_regions
 from pma_gym.discovery.screening.residual_maps import residual_map
 from pma_gym.discovery.screening.residuals import simulated_less_measured
@@ -71,7 +72,7 @@ def localise(
     bins = time_bins(whitened.logged, readings, residuals)
     seen = [channel for channel in range(len(bins.total)) if _has_gap(bins, channel)]
     signals = whitened.logged[0].signals
-    maps = tuple(residual_map(bins, channel, signals[channel]) for channel in seen)
+    maps = tuple(residual_map(bins, channel, signals) for channel in seen)
     return _places(bins, signals, seen, seed), maps
 
 
@@ -83,7 +84,7 @@ def _has_gap(bins: TimeBins, channel: int) -> bool:
 def _places(
     bins: TimeBins, signals: Sequence[Signal], seen: Sequence[int], seed: int
 ) -> tuple[Place, ...]:
-    singles = single_regions(bins)
+    singles = single_regions(bins, condition_axes(signals))
     regions = singles + [
         Region(first.kinds + second.kinds, "", first.inside & second.inside)
         for first, second in combinations(singles, 2)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.discovery.screening.condition_axes import ConditionAxes
 from pma_gym.discovery.screening.time_bins import TimeBins
 
 Array = NDArray[np.float64]
@@ -30,10 +31,15 @@ class Region:
     inside: Mask
 
 
-def single_regions(bins: TimeBins) -> list[Region]:
-    """Regions of one condition, those of motion first, as a person says them."""
+def single_regions(bins: TimeBins, axes: ConditionAxes) -> list[Region]:
+    """Regions of one condition, those of motion first, as a person says them.
+
+    Args:
+        bins: all trials.
+        axes: what the rig's conditions are called and given in.
+    """
     there = np.isfinite(bins.order)
-    held, speed = bins.held, bins.speed
+    held, speed, unit = bins.held, bins.speed, axes.speed.unit
     named: list[tuple[str, str, Mask]] = []
     for kind, words in (("reversal", "reversals"), ("step", "steps of a command")):
         since = np.where(there, getattr(bins, kind), np.nan)
@@ -42,27 +48,29 @@ def single_regions(bins: TimeBins) -> list[Region]:
     named.append(("motion", "while held", held > 0.0))
     named.append(("motion", "while held, more than 1 s after the last motion", held > 1.0))
     moving = held == 0.0
-    for sign, words in ((1.0, "shortening"), (-1.0, "pulling out")):
+    for sign, words in ((1.0, axes.forwards), (-1.0, axes.backwards)):
         along = np.where(moving, sign * speed, np.nan)
         named.append(("motion", f"while {words}", along > 0.0))
         named += [
-            ("motion", f"{words} faster than {v:g} mm/s", along > v)
+            ("motion", f"{words} faster than {v:g} {unit}", along > v)
             for v in _round_cuts(along[along > 0.0], (0.5, 0.8))
         ]
     named.append(("motion", "while moving", moving))
     crawl = _round_cuts(np.abs(speed[moving]), (0.3,))
     named += [
-        ("motion", f"moving slower than {v:g} mm/s", moving & (abs(speed) < v)) for v in crawl
+        ("motion", f"moving slower than {v:g} {unit}", moving & (abs(speed) < v)) for v in crawl
     ]
     phases = ("before the first command", "between the first command and the last", "")
     for number, words in enumerate(phases[:2]):
         named.append(("phase", words, bins.phase == number))
     named.append(("phase", "in the final hold", bins.phase == 2.0))
-    for kind, name, unit in _LEVELS:
-        values = getattr(bins, kind)
+    for axis in axes.levels:
+        values = getattr(bins, axis.kind)
+        # A pressure is known by its unit.
+        name = "" if axis.kind == "pressure" else f"{axis.words} "
         for cut in _round_cuts(values[there], (0.2, 0.4, 0.6, 0.8)):
-            named.append((kind, f"{name}above {cut:g} {unit}", values > cut))
-            named.append((kind, f"{name}under {cut:g} {unit}", values < cut))
+            named.append((axis.kind, f"{name}above {cut:g} {axis.unit}", values > cut))
+            named.append((axis.kind, f"{name}under {cut:g} {axis.unit}", values < cut))
     named.append(("order", "in the first half of the trials", bins.order < 0.5))
     named.append(("order", "in the second half of the trials", bins.order > 0.5))
     count = int(there.sum())
@@ -72,13 +80,6 @@ def single_regions(bins: TimeBins) -> list[Region]:
             # Of two ways to say the same, the first.
             kept.setdefault(inside.tobytes(), Region((kind,), words, inside))
     return list(kept.values())
-
-
-_LEVELS = (
-    ("pressure", "", "kPa"),
-    ("load", "load ", "N"),
-    ("contraction", "contraction ", "mm"),
-)
 
 
 def _round_cuts(values: Array, quantiles: Sequence[float]) -> list[float]:

@@ -1,6 +1,6 @@
 """Maps of a signal's residual over the two conditions that explain most of it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.diagnosis import Map
+from pma_gym.discovery.screening.condition_axes import Axis, condition_axes
 from pma_gym.discovery.screening.time_bins import TimeBins
 
 Array = NDArray[np.float64]
@@ -15,28 +16,28 @@ Array = NDArray[np.float64]
 CELLS = 10
 """Cells along each axis of a map."""
 
-_AXES: Mapping[str, str] = {
-    "pressure": "pressure (kPa)",
-    "load": "load (N)",
-    "contraction": "contraction (mm)",
-    "speed": "speed of contraction (mm/s)",
-    "reversal": "time since reversal (s)",
-    "held": "time since the last motion (s)",
-}
+_TIMES = (
+    Axis("reversal", "time since reversal", "s"),
+    Axis("held", "time since the last motion", "s"),
+)
 
 
-def residual_map(bins: TimeBins, channel: int, signal: Signal) -> Map:
-    """The signal's mean residual over the two conditions that explain most of it.
+def residual_map(bins: TimeBins, channel: int, signals: Sequence[Signal]) -> Map:
+    """A signal's mean residual over the two conditions that explain most of it.
 
     Args:
         bins: all trials.
-        channel: which of the plant's outputs.
-        signal: what that output is.
+        channel: which of the rig's signals.
+        signals: what the rig measures.
     """
+    known = condition_axes(signals)
+    axes = {
+        axis.kind: f"{axis.words} ({axis.unit})" for axis in (*known.levels, known.speed, *_TIMES)
+    }
     total, counts = bins.total[channel], bins.counts[channel]
-    edges = {name: _edges(getattr(bins, name)[counts > 0]) for name in _AXES}
+    edges = {name: _edges(getattr(bins, name)[counts > 0]) for name in axes}
     best = None
-    for x, y in combinations(_AXES, 2):
+    for x, y in combinations(axes, 2):
         sums, there = _grid(bins, x, y, edges, total), _grid(bins, x, y, edges, counts)
         filled = there > 0
         means = np.divide(sums, there, out=np.full_like(sums, np.nan), where=filled)
@@ -46,7 +47,7 @@ def residual_map(bins: TimeBins, channel: int, signal: Signal) -> Map:
             best = explained, x, y, means
     assert best is not None
     _, x, y, means = best
-    return Map(signal.column, _AXES[x], _AXES[y], edges[x], edges[y], means)
+    return Map(signals[channel].column, axes[x], axes[y], edges[x], edges[y], means)
 
 
 def _grid(bins: TimeBins, x: str, y: str, edges: Mapping[str, Array], weights: Array) -> Array:

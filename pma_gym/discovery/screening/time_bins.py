@@ -1,15 +1,20 @@
 """Trials in short ticks: the residual in each, and the conditions that the plant was in."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.signals import VOLTAGE_RANGE
 from pma_gym.estimation.logged import Logged
+from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+
+POSITIONS = ("displacement", "angle")
+"""What a position may measure."""
 
 BIN_S = 0.05
 """Readings of so long (s) are taken together: finer than any region."""
@@ -18,15 +23,17 @@ PIECE_BINS = 20
 """Ticks of a piece that is dealt as a whole: a second, longer than the memory of noise and
 plant."""
 
-MOVING = 0.5e-3
-"""Slowest speed (m/s) that counts as motion."""
+MOVING = 0.05
+"""Slowest speed that counts as motion, as a share of the largest in all trials; a signal may count
+a slower one (`Signal.slowest`)."""
 
 SMOOTH_S = 0.03
-"""Width of the mean over simulated contraction that speed is taken of (s): not each slip of dry
+"""Width of the mean over simulated position that speed is taken of (s): not each slip of dry
 friction is a reversal."""
 
-STEP_V, STEP_V_PER_S = 0.1, 8.0
-"""Least change of a command (V) between two rows, and its rate, that is a step."""
+STEP, STEP_PER_S = 0.01, 0.8
+"""Least change of a command between two rows, and its rate (1/s), that is a step, as shares of the
+command's range."""
 
 
 @dataclass(frozen=True)
@@ -37,10 +44,10 @@ class TimeBins:
         excess: sum of residual squared less 1, in units of noise, shape (signals, n).
         total: sum of the residual, shape (signals, n).
         counts: readings, shape (signals, n); 0 where a tick is padding.
-        pressure: (kPa), as simulated, as all conditions.
-        load: (N).
-        contraction: (mm).
-        speed: of contraction (mm/s), positive where the muscle shortens.
+        pressure: in its file unit (kPa), as simulated, as all conditions; 0 without one.
+        load: force or torque that is measured, in its file unit; 0 without one.
+        position: contraction or angle, in its file unit.
+        speed: of that, in its file unit a second; positive where the position grows.
         reversal: time since the last reversal of motion (s); infinite before the first.
         step: time since the last step of a command (s); infinite before the first.
         held: time since the last motion (s), 0 while moving.
@@ -53,7 +60,7 @@ class TimeBins:
     counts: Array
     pressure: Array
     load: Array
-    contraction: Array
+    position: Array
     speed: Array
     reversal: Array
     step: Array
@@ -72,16 +79,23 @@ def time_bins(
         readings: what the sensors hold (SI), shape (signals, rows) for each trial.
         residuals: those less what was measured, in units of the noise, NaN where nothing was.
     """
+    speeds = [
+        _speed(logged.time, logged.row(held, *POSITIONS))
+        for logged, held in zip(logs, readings, strict=True)
+    ]
+    still, steps = _stillness(logs[0], speeds), _step_sizes(logs)
     parts = []
     for number, (logged, held, residual) in enumerate(zip(logs, readings, residuals, strict=True)):
         order = number / max(len(logs) - 1, 1)
-        parts.append(_of_trial(logged, held, residual, order))
+        conditions = _conditions(logged, held, speeds[number], still, steps)
+        conditions["order"] = np.full(len(logged.time), order)
+        parts.append(_of_trial(logged, conditions, residual))
     return TimeBins(
         **{name: np.concatenate([p[name] for p in parts], axis=-1) for name in parts[0]}
     )
 
 
-def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dict[str, Array]:
+def _of_trial(logged: Logged, conditions: Mapping[str, Array], residual: Array) -> dict[str, Array]:
     time = logged.time
     width = max(BIN_S, float(np.median(np.diff(time)))) if len(time) > 1 else BIN_S
     starts = np.unique(np.floor((time - time[0]) / width + 1e-9), return_index=True)[1]
@@ -95,7 +109,6 @@ def _of_trial(logged: Logged, held: Array, residual: Array, order: float) -> dic
     bins = {name: np.add.reduceat(each, starts, axis=1) for name, each in sums.items()}
     # A tick's conditions are those of its middle row.
     middle = (starts + np.append(starts[1:], len(time)) - 1) // 2
-    conditions = _conditions(logged, held) | {"order": np.full(len(time), order)}
     bins |= {name: each[middle] for name, each in conditions.items()}
     spare = -len(starts) % PIECE_BINS
     return {name: _padded(each, spare) for name, each in bins.items()}
@@ -108,11 +121,25 @@ def _padded(values: Array, spare: int) -> Array:
     return np.pad(values, (0, spare), constant_values=np.nan)
 
 
-def _conditions(logged: Logged, held: Array) -> dict[str, Array]:
+def _stillness(logged: Logged, speeds: Sequence[Array]) -> float:
+    """Speed (SI) from which on a rig moves."""
+    at = logged.channel(*POSITIONS)
+    slowest = np.inf if at is None else logged.signals[at].slowest
+    return min(slowest, MOVING * max(float(np.abs(each).max()) for each in speeds))
+
+
+def _step_sizes(logs: Sequence[Logged]) -> tuple[float, float]:
+    """Least step of each command."""
+    low, high = VOLTAGE_RANGE
+    return STEP * max(logged.motor_span for logged in logs), STEP * (high - low)
+
+
+def _conditions(
+    logged: Logged, held: Array, speed: Array, still: float, steps: tuple[float, float]
+) -> dict[str, Array]:
     """Conditions of each row, from what is simulated: measured speed is mostly noise."""
-    time, contraction = logged.time, logged.row(held, "displacement", "angle")
-    speed = _speed(time, contraction)
-    moving = np.abs(speed) > MOVING
+    time = logged.time
+    moving = np.abs(speed) > still
     direction = np.where(moving, np.sign(speed), 0.0)
     # The direction of the last motion, also while held.
     last = np.maximum.accumulate(np.where(moving, np.arange(len(time)), -1))
@@ -127,22 +154,33 @@ def _conditions(logged: Logged, held: Array) -> dict[str, Array]:
         phase[rows[0] :] = 1.0
         phase[rows[-1] + 1 :] = 2.0
     return {
-        "pressure": logged.row(held, "pressure") / 1e3,
-        "load": logged.row(held, "force", "torque"),
-        "contraction": contraction * 1e3,
-        "speed": speed * 1e3,
+        "pressure": _in_unit(logged, held, "pressure"),
+        "load": _in_unit(logged, held, "force", "torque"),
+        "position": _in_unit(logged, held, *POSITIONS),
+        "speed": speed / _factor(logged, *POSITIONS),
         "reversal": _since(time, turned),
-        "step": _since(time, _stepped(logged)),
+        "step": _since(time, _stepped(logged, steps)),
         "held": np.where(moving, 0.0, np.maximum(rested, 1e-9)),
         "phase": phase,
     }
 
 
-def _speed(time: Array, contraction: Array) -> Array:
+def _factor(logged: Logged, *measures: str) -> float:
+    """SI units in the file unit of the first signal that measures one of some quantities."""
+    at = logged.channel(*measures)
+    return 1.0 if at is None else SI_FACTORS[logged.signals[at].unit]
+
+
+def _in_unit(logged: Logged, held: Array, *measures: str) -> Array:
+    """The first signal that measures one of some quantities, in its file unit; 0 without one."""
+    return logged.row(held, *measures) / _factor(logged, *measures)
+
+
+def _speed(time: Array, position: Array) -> Array:
     if len(time) < 3:
         return np.zeros(len(time))
     width = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
-    sums = np.cumsum(np.append(0.0, contraction))
+    sums = np.cumsum(np.append(0.0, position))
     half, rows = width // 2, np.arange(len(time))
     first, end = np.maximum(rows - half, 0), np.minimum(rows + half + 1, len(time))
     return np.gradient((sums[end] - sums[first]) / (end - first), time)
@@ -153,9 +191,10 @@ def _since(time: Array, event: Mask) -> Array:
     return np.where(last >= 0, time - time[np.maximum(last, 0)], np.inf)
 
 
-def _stepped(logged: Logged) -> Mask:
+def _stepped(logged: Logged, steps: tuple[float, float]) -> Mask:
     stepped = np.zeros(len(logged.time), bool)
-    for volts in (logged.motor, logged.regulator):
-        change = np.abs(np.diff(volts))
-        stepped[1:] |= (change > STEP_V) & (change > STEP_V_PER_S * np.diff(logged.time))
+    for command, least in zip((logged.motor, logged.regulator), steps, strict=True):
+        change = np.abs(np.diff(command))
+        pace = STEP_PER_S / STEP * np.diff(logged.time)
+        stepped[1:] |= (change > least) & (change > least * pace)
     return stepped

@@ -62,7 +62,11 @@ def _scales(
         speed = max(speed, float(np.abs(np.gradient(contraction, time)).max()))
         pressure = max(pressure, float(np.ptp(_known(logged, held, ("pressure",))[0])))
         seconds = max(seconds, float(logged.time[-1] - logged.time[0]))
-    si = {"mm": travel, "um": travel, "mm/s": speed, "kPa": pressure, "s": seconds, "ms": seconds}
+    turns = whitened.logged[0].channel("displacement") is None
+    lengths = ("deg", "rad") if turns else ("mm", "um")
+    speeds = ("deg/s", "rad/s") if turns else ("mm/s",)
+    si = dict.fromkeys(lengths, travel) | dict.fromkeys(speeds, speed)
+    si |= {"kPa": pressure, "s": seconds, "ms": seconds}
     return {name: size / SI_FACTORS[name] for name, size in si.items() if size > 0.0}
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pma_gym.plant.compiled_model import CompiledModel
-from pma_gym.plant.condition import Condition, check_voltages
+from pma_gym.plant.condition import Condition, check_commands
 from pma_gym.plant.equilibrium.force_balance import balances
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem, effect_parameters, put_memories
 from pma_gym.plant.model import Model
@@ -25,8 +25,7 @@ def equilibrium_at(
         ValueError: a voltage out of 0-10 V, or no contraction within twice the limits balances
             the load.
     """
-    if not plant.model.rig.direct_commands:
-        check_voltages(motor_voltage, regulator_voltage)
+    check_commands(plant.model, motor_voltage, regulator_voltage)
     commands = np.array([motor_voltage], float), np.array([regulator_voltage], float)
     problem = _solve(plant, *commands, None)
     if problem.unbalanced:

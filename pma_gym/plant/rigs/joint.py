@@ -68,8 +68,9 @@ JOINT = Rig(
     fastest_oscillation=fastest_oscillation,
     absent_signals="a joint has neither muscle nor cable; take a torque as torque_command_n_m",
     is_free=True,
-    start_paths=("joint_start.angle_deg", "joint_start.spin_deg_per_s"),
+    start_paths={"angle": "joint_start.angle_deg", "spin": "joint_start.spin_deg_per_s"},
     has_muscle=False,
+    is_diagnosable=True,
     moving_lags={"lag_encoder": "spin"},
     direct_commands={"torque_drive": "torque_command", "dc_motor": "winding_voltage"},
 )

@@ -36,7 +36,8 @@ class Rig:
         is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
-        start_paths: parameters of a free rig that say where its first signal begins, and its rate.
+        start_paths: parameters of a free rig that say where a trial begins, by the state that is
+            there then: its position, then its speed.
         imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
@@ -58,7 +59,7 @@ class Rig:
     is_diagnosable: bool = False
     imposes_motion: bool = False
     moving_lags: Mapping[str, str] = field(default_factory=dict)
-    start_paths: tuple[str, ...] = ()
+    start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -87,7 +87,10 @@ SLIDE = Rig(
         "that drives it is read by [columns] as load_command_n"
     ),
     is_free=True,
-    start_paths=("start.contraction_mm", "start.velocity_mm_per_s"),
+    start_paths={
+        "contraction": "start.contraction_mm",
+        "velocity": "start.velocity_mm_per_s",
+    },
     has_muscle=False,
     is_diagnosable=True,
     moving_lags={"lag_lvdt": "velocity"},

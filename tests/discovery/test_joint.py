@@ -1,0 +1,92 @@
+"""A joint is diagnosed as a slide is: its weight, its friction, or nothing, in its own units."""
+
+import numpy as np
+import pytest
+
+from pma_gym import Plant
+from pma_gym.data.trial import Trial
+from pma_gym.discovery import diagnose
+from pma_gym.effects import CATALOGUE
+from pma_gym.estimation.residuals import Residuals
+from pma_gym.plant.model import Model
+
+INERTIA, DAMPING, NOISE_DEG = 0.0049, 0.02, 0.02
+TABLES = {
+    "joint_weight": {"moment_n_m": 0.2, "offset_deg": 0.0},
+    "joint_friction": {
+        "static_n_m": 0.03,
+        "dynamic_n_m": 0.03,
+        "stribeck_speed_deg_per_s": 5.0,
+        "presliding_deg": 0.02,
+    },
+}
+
+
+def joint(inertia=INERTIA, **tables):
+    """A joint with a torque drive, an encoder and viscous damping."""
+    given = {
+        "torque_drive": {"gain": 1.0},
+        "joint_damping": {"coefficient_n_m_s": DAMPING},
+        **tables,
+        "inertia": {"inertia_kg_m2": inertia},
+        "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
+        "encoder": {"bandwidth_hz": 2000.0, "noise_deg": NOISE_DEG},
+    }
+    return Model("arm", "An arm", "joint", {n: CATALOGUE[n].parse(t) for n, t in given.items()})
+
+
+def logs(hidden="", count=3, seconds=4.0, rate=200.0):
+    """Trials along sums of sines, under torques that about lead there, each measured twice."""
+    generator, tables = np.random.default_rng(3), {hidden: TABLES[hidden]} if hidden else {}
+    trials = []
+    for _ in range(count):
+        time = np.arange(0.0, seconds, 1.0 / rate)
+        waves = [(generator.uniform(0.2, 0.6), f, generator.uniform(0, 6)) for f in (0.3, 0.7, 1.3)]
+        angle = sum(size * np.sin(2 * np.pi * f * time + phase) for size, f, phase in waves)
+        speed = np.gradient(angle, time)
+        torque = INERTIA * np.gradient(speed, time) + DAMPING * speed
+        torque += 0.2 * np.sin(angle) * (hidden == "joint_weight")
+        torque += 0.03 * np.sign(speed) * (hidden == "joint_friction")
+        start = {"joint_start.angle_deg": np.degrees(angle[0])}
+        start["joint_start.spin_deg_per_s"] = np.degrees(speed[0])
+        plant = Plant(joint(**tables).replace({path: float(v) for path, v in start.items()}))
+        asked = Trial(time, {"torque_command": torque})
+        exact = plant.simulate(asked, noise=False).measurements["angle"]
+        for _ in range(2):
+            noise = np.radians(NOISE_DEG) * generator.standard_normal(time.size)
+            trials.append(Trial(time, asked.commands, {"angle": exact + noise}))
+    return trials
+
+
+def test_a_trial_begins_where_and_as_fast_as_all_its_readings_say():
+    (trial, _) = logs(count=1, seconds=1.0)
+    residuals = Residuals(joint(), [trial], [])
+    left = residuals.each(residuals.start)[0][:, 0]
+    # The first readings alone would leave an error of their own noise, at every row.
+    assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.25)
+    assert abs(float(np.mean(left))) < 1e-3
+
+
+def test_a_negative_first_command_is_a_torque_like_any_other():
+    time = np.linspace(0.0, 0.1, 11)
+    held = Plant(joint()).simulate(Trial(time, {"torque_command": np.full(11, -1.0)}), noise=False)
+    assert held.measurements["angle"][-1] < 0.0
+
+
+@pytest.mark.campaign
+@pytest.mark.parametrize("hidden", ["joint_weight", "joint_friction"])
+def test_what_a_joint_hides_is_named_with_its_size(hidden):
+    diagnosis = diagnose(logs(hidden), joint(1.05 * INERTIA), propose=False)
+    assert [effect.name for effect in diagnosis.effects] == [hidden]
+    parameter = {"joint_weight": "moment_n_m", "joint_friction": "dynamic_n_m"}[hidden]
+    size = diagnosis.effects[0].parameters[parameter].value
+    assert size == pytest.approx(TABLES[hidden][parameter], rel=0.03)
+    assert all("deg" in place.region or " s " in place.region for place in diagnosis.where)
+
+
+@pytest.mark.campaign
+def test_a_joint_that_hides_nothing_has_no_effect_named():
+    diagnosis = diagnose(logs(), joint(1.05 * INERTIA), propose=False)
+    assert diagnosis.verdict in ("parameters", "agrees", "undecidable") and not diagnosis.effects
+    moved = diagnosis.parameters["inertia.inertia_kg_m2"]
+    assert moved.now.value == pytest.approx(INERTIA, rel=2e-3)
