@@ -1,7 +1,7 @@
 """Measured trials simulated by a model at many values of its free parameters.
 
 Every trial begins settled at its first commands. Where nothing says how a memory stands or how
-fast a free slide moves then, each trial is simulated once more with another start, and moved along
+fast a free rig moves then, each trial is simulated once more with another start, and moved along
 the difference to where it meets its readings best.
 """
 
