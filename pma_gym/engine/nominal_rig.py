@@ -19,19 +19,19 @@ def rig_model(task: Task, options: Options) -> Model:
             f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
             "which has no muscle; take station or serres2008"
         )
-    operated = options.disturbing.operator_force != 0.0
-    if not model.rig.balances_loads and (operated or task.load or task.exercise):
-        what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
+    pushed = options.disturbing.hand_push_force != 0.0
+    if not model.rig.balances_loads and (pushed or task.load or task.exercise):
+        what = f"disturbances={options.disturbances!r}" if pushed else f"task {task.name}"
         held = "plays an operator" if task.exercise else "holds a load"
-        why = "somebody pulls at its slide" if operated else f"the motor {held}"
+        why = "somebody pulls at its slide" if pushed else f"the motor {held}"
         raise ValueError(
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"
         )
     model = nominal_model(task, model)
-    if not operated or "operator" in model.parameters:
+    if not pushed or "hand_push" in model.parameters:
         return model
-    return model.with_effects({"operator": {"share": 1.0}})
+    return model.with_effects({"hand_push": {"share": 1.0}})
 
 
 def nominal_model(task: Task, model: Model) -> Model:

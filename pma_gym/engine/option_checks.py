@@ -63,15 +63,15 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
         raise unknown_name(what, value, names)
 
 
-def check_operator(human: Operator) -> None:
+def check_operator(operator: Operator) -> None:
     """Refuse an operator whom nobody could be.
 
     Raises:
         ValueError: names the number, its range and unit, and what came.
     """
-    for name, value in human._asdict().items():
+    for name, value in operator._asdict().items():
         lower, upper, unit = OPERATOR_BOUNDS[name]
-        check_number(f"human.{name}", value, lower, upper, unit)
+        check_number(f"operator.{name}", value, lower, upper, unit)
 
 
 def check_pressure(pressure: object) -> None:

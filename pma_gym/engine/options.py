@@ -22,6 +22,7 @@ from pma_gym.engine.option_checks import (
     unknown_name,
 )
 from pma_gym.engine.plain_values import plain_options
+from pma_gym.engine.renamed_options import renamed_options
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
@@ -82,7 +83,7 @@ class Options:
             the same effects (it does not survive JSON).
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
-        human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
+        operator: who works in an exercise: "random" (drawn at every reset), "typical", or a
             `pma_gym.tasks.Operator` (which does not survive JSON).
         safety: whether an exercise has its safety layer between agent and regulator.
         tolerance: largest error of an internal step of the integrator, as a share of what the
@@ -106,7 +107,7 @@ class Options:
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
-    human: str | Operator = "random"
+    operator: str | Operator = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
     max_episode_steps: int | None = None
@@ -187,7 +188,7 @@ class EnvironmentOptions(TypedDict, total=False):
     randomisation: str | Randomisation
     regulator_action: bool
     disturbances: str
-    human: str | Operator
+    operator: str | Operator
     safety: bool
     tolerance: float
     max_episode_steps: int | None
@@ -207,6 +208,7 @@ def parse_options(
         TypeError: an unknown keyword, with the nearest known one.
         ValueError: a value that is out of range or of the wrong kind.
     """
+    given = renamed_options(given, caller, stacklevel=3)
     check_keywords(caller, given, [field.name for field in fields(Options)], others)
     if isinstance(given.get("max_episode_steps"), DefaultSteps):
         # Of the registered options, not of these: nobody asked for it.
@@ -233,12 +235,12 @@ def parse_options(
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
-    if isinstance(options.human, Operator):
-        check_operator(options.human)
-    elif options.human not in OPERATORS:
+    if isinstance(options.operator, Operator):
+        check_operator(options.operator)
+    elif options.operator not in OPERATORS:
         raise ValueError(
-            f"human must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
-            f"{options.human!r}"
+            f"operator must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
+            f"{options.operator!r}"
         )
     check_pressure(options.pressure_kpa)
     check_tolerance(options.tolerance)
@@ -267,10 +269,10 @@ def parse_task(given: str | Task, options: Options) -> Task:
 def _check_exercise(task: Task, options: Options) -> None:
     """Refuse what an exercise cannot have, and what nothing else has a use for."""
     if task.exercise is None:
-        for name, usual in (("human", "random"), ("safety", True)):
+        for name, usual in (("operator", "random"), ("safety", True)):
             if getattr(options, name) != usual:
                 raise ValueError(
-                    f"{name} is of the operator of an exercise, and task {task.name} has none; "
+                    f"{name} is an option of exercises, and task {task.name} is none; "
                     "leave it out, or take isokinetic_exercise, isotonic_exercise or "
                     "profile_exercise"
                 )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
 from pma_gym.engine.options import Options
-from pma_gym.engine.state_layout import OPERATOR, PARTS, START, TRUTH
+from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
 from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
 from pma_gym.envs.summary import episode_summary
 from pma_gym.plant.condition import Condition
@@ -94,6 +94,7 @@ class Episode:
         return Measurement(taken, *self._row[self._measured].tolist())
 
     reading = renamed_attribute("reading", "measurement")
+    human = renamed_attribute("human", "operator")
 
     @property
     def truth(self) -> dict[str, float]:
@@ -117,21 +118,21 @@ class Episode:
         return truth[self.task.protocol.quantity]
 
     @property
-    def human(self) -> Operator | None:
+    def operator(self) -> Operator | None:
         """The operator of this exercise; None without one, or before. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
-        return Operator(*(self._number(f"human_{name}") for name in Operator._fields))
+        return Operator(*(self._number(f"operator_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
-        """What disturbed the last step: the regulator's jump (V) and the operator's force (N)."""
+        """What disturbed the last step: the regulator's jump (V) and the hand's force (N)."""
         jumps = [name for name in self._offsets if name.startswith("jump_step_")]
         count = self._count - 1
         volts = [
             self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
         ]
-        force = self._number(OPERATOR) if OPERATOR in self._offsets else 0.0
+        force = self._number(HAND_PUSH) if HAND_PUSH in self._offsets else 0.0
         return sum(volts), force
 
     @property

@@ -143,11 +143,11 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     |---|---|
     | `none` (default) | |
     | `regulator` | the regulator's pressure jumps by 25 kPa, away from its line and back in turn |
-    | `operator` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
-    | `regulator_and_operator` | both |
+    | `hand_push` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
+    | `regulator_and_hand_push` | both |
 
     A jump adds volts to the regulator's command, by the nominal line and as far as
-    0-10 V go; the operator's force adds to the muscle's at the slide. Both come with the control
+    0-10 V go; the hand's force adds to the muscle's at the slide. Both come with the control
     step after their time. `env.disturbance` and `env.events` tell, but not controllers.
 
     ## Info
