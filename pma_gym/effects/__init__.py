@@ -7,6 +7,7 @@ from pma_gym.effects.contact.backlash import BACKLASH
 from pma_gym.effects.contact.cogging import COGGING
 from pma_gym.effects.contact.constant_force import CONSTANT_FORCE
 from pma_gym.effects.contact.imposed_motion import IMPOSED_MOTION
+from pma_gym.effects.contact.piston_force import PISTON_FORCE
 from pma_gym.effects.contact.pressure_friction import PRESSURE_FRICTION
 from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
 from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
@@ -148,6 +149,7 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_START,
         *JOINT_SENSORS,
         IMPOSED_MOTION,
+        PISTON_FORCE,
         CONSTANT_FORCE,
         PRESSURE_FRICTION,
         COGGING,
