@@ -111,6 +111,7 @@ IMPOSED = Rig(
     has_muscle=False,
     is_diagnosable=True,
     imposes_motion=True,
+    modifying_ports=("lost_motion",),
     needed_ports={
         "muscle_force": "muscle_force",
         **dict.fromkeys(

@@ -36,6 +36,7 @@ class Rig:
         is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
         needed_ports: port at which a model must have an effect for one to be missing at another,
             by that other: a rig without a regulator misses no lag of one.
+        modifying_ports: ports whose effects do nothing but change what others do.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
         start_paths: parameters of a free rig that say where a trial begins, by the state that is
@@ -61,6 +62,7 @@ class Rig:
     is_diagnosable: bool = False
     imposes_motion: bool = False
     needed_ports: Mapping[str, str] = field(default_factory=dict)
+    modifying_ports: tuple[str, ...] = ()
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
