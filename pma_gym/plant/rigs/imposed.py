@@ -57,6 +57,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.travelled = (eq["contraction"], eq["velocity"])
     # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
     eq.let("command", eq["motor_voltage"])
+    eq.let("position", eq["contraction"])
     acceleration = eq.one("imposed_motion")
     regulated = bool(eq.at("regulator_line"))
     eq.let("pressure_asked", eq.one("regulator_line") if regulated else eq["regulator_voltage"])
