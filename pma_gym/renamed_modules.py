@@ -32,6 +32,7 @@ RENAMED_MODULES: Mapping[str, str] = {
     "pma_gym.data.dataset": "pma_gym.data.datasets.dataset",
     "pma_gym.data.trial_files": "pma_gym.data.files.trial_files",
     "pma_gym.data.trial_values": "pma_gym.data.files.trial_values",
+    "pma_gym.effects.slide.operator": "pma_gym.effects.slide.hand_push",
     "pma_gym.effects.own": "pma_gym.effects.user_effects",
     "pma_gym.plant.exercise": "pma_gym.plant.exercise_device.device",
     "pma_gym.plant.fitting": "pma_gym.estimation.fitting",

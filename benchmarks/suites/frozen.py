@@ -17,6 +17,7 @@ from benchmarks.suites.target import parse_target
 from pma_gym.document_shape import ListOf, Maybe, Real, Whole, check_shape
 from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options
+from pma_gym.engine.renamed_options import first_names, renamed_options
 from pma_gym.limits import LimitError
 from pma_gym.plant.model import is_path, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
@@ -151,10 +152,8 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
             f"a suite must have at most {MOST_EPISODES} episodes, got {episodes}; lower "
             "stations.count, per_station or repeats"
         )
-    frozen = {key: value for key, value in document.items() if key not in UNFROZEN}
-    if "of" in stations:
-        frozen["of"] = frozen_suite(stations["of"]).digest
-    parse_options(document["environment"])
+    environment = renamed_options(document["environment"], f"suite {document['name']}")
+    parse_options(environment)
     common: dict[str, Any] = {
         "source": source,
         "name": document["name"],
@@ -162,13 +161,13 @@ def parse_suite(source: str, document: Mapping[str, Any]) -> FrozenSuite:
         "version": document["version"],
         "seed": document["seed"],
         "model": document["model"],
-        "environment": dict(document["environment"]),
+        "environment": environment,
         "stations": numbers,
         "recipe": _recipe(stations, document["model"]),
         "episode_plans": episode_plans,
         "entries": tuple(_entry(entry) for entry in document["controllers"]),
         "targets": tuple(parse_target(given) for given in document.get("targets", ())),
-        "digest": _digest(json.dumps(frozen, sort_keys=True)),
+        "digest": _digest({**document, "environment": environment}),
         "only_by_name": document.get("only_by_name", False),
     }
     if "reproduction" in document:
@@ -236,8 +235,13 @@ def _entry(given: Mapping[str, Any]) -> Entry:
     return Entry(spec, tuple(given.get("only", ())), tuple(given.get("models", ())))
 
 
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:16]
+def _digest(document: Mapping[str, Any]) -> str:
+    """Digest of all that moves a figure, by the names that it was first written with."""
+    frozen = {key: value for key, value in document.items() if key not in UNFROZEN}
+    frozen["environment"] = first_names(document["environment"])
+    if "of" in document.get("stations", {}):
+        frozen["of"] = frozen_suite(document["stations"]["of"]).digest
+    return hashlib.sha256(json.dumps(frozen, sort_keys=True).encode()).hexdigest()[:16]
 
 
 def _unpacked(source: str, models: tuple[str, ...]) -> FrozenSuite:

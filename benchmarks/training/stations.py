@@ -19,10 +19,10 @@ TRAINING = 128
 VALIDATION_FIRST, VALIDATION = 10_000, 64
 """Number of the first station that policies are validated on, and how many there are."""
 
-OPERATOR = {"operator": {"share": 1.0}}
-"""What an environment with an operator adds to its model."""
+HAND_PUSH = {"hand_push": {"share": 1.0}}
+"""What an environment with a pushing hand adds to its model."""
 
-ADDED = ("operator", "leg")
+ADDED = ("hand_push", "leg")
 """Effects that an environment adds to its model: of somebody at the slide, of an exercise."""
 
 
@@ -85,7 +85,7 @@ def _station(recipe: Recipe, number: int, added: tuple[str, ...]) -> Model:
         return draw_station(recipe, number).model
     *others, last = added
     model = _station(recipe, number, tuple(others))
-    if last == "operator":
-        return model.with_effects(OPERATOR)
+    if last == "hand_push":
+        return model.with_effects(HAND_PUSH)
     # Any exercise will do: all have the leg that controllers receive.
     return nominal_model(EXERCISES["isokinetic_exercise"], model)

@@ -47,9 +47,9 @@ def disturbances() -> str:
         said = []
         if sizes.regulator_step:
             said.append(f"jumps of the regulator by {sizes.regulator_step / 1e3:g} kPa")
-        if sizes.operator_force:
+        if sizes.hand_push_force:
             said.append(
-                f"pulses of {sizes.operator_force:g} N at the slide, {PULSE_S[0]:g} to "
+                f"pulses of {sizes.hand_push_force:g} N at the slide, {PULSE_S[0]:g} to "
                 f"{PULSE_S[1]:g} s long"
             )
         rows.append([code(name), ", ".join(said)])

@@ -82,7 +82,7 @@ from pma_gym.effects.sensors.sensor_errors import (
 )
 from pma_gym.effects.sensors.sensors import FORCE_SENSOR, JOINT_SENSORS, SENSORS
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION
-from pma_gym.effects.slide.operator import OPERATOR
+from pma_gym.effects.slide.hand_push import HAND_PUSH
 from pma_gym.effects.slide.slide import SLIDE
 from pma_gym.effects.slide.start import START
 
@@ -111,7 +111,7 @@ CATALOGUE: dict[str, Effect] = {
         SLOW_CREEP,
         HYSTERESIS,
         COULOMB_FRICTION,
-        OPERATOR,
+        HAND_PUSH,
         RESIDUAL_FORCE_OF_CONTRACTION,
         RESIDUAL_FORCE_OF_VELOCITY,
         RESIDUAL_FORCE_OF_PRESSURE,

@@ -13,6 +13,7 @@ import numpy as np
 from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.effects import CATALOGUE
 from pma_gym.engine.plain_values import plain_options, plain_sequence
+from pma_gym.engine.renamed_options import renamed_options
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
 from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE, check_tolerance
@@ -81,7 +82,7 @@ class Options:
             the same effects (it does not survive JSON).
         regulator_action: whether a second action commands the regulator (0-10 V).
         disturbances: name of disturbances in `pma_gym.tasks.DISTURBANCES`.
-        human: who the operator of an exercise is: "random" (drawn at every reset), "typical", or a
+        operator: who works in an exercise: "random" (drawn at every reset), "typical", or a
             `pma_gym.tasks.Operator` (which does not survive JSON).
         safety: whether an exercise has its safety layer between agent and regulator.
         tolerance: largest error of an internal step of the integrator, as a share of what the
@@ -105,7 +106,7 @@ class Options:
     randomisation: str | Randomisation = "none"
     regulator_action: bool = False
     disturbances: str = "none"
-    human: str | Operator = "random"
+    operator: str | Operator = "random"
     safety: bool = True
     tolerance: float = DEFAULT_TOLERANCE
     max_episode_steps: int | None = None
@@ -186,7 +187,7 @@ class EnvironmentOptions(TypedDict, total=False):
     randomisation: str | Randomisation
     regulator_action: bool
     disturbances: str
-    human: str | Operator
+    operator: str | Operator
     safety: bool
     tolerance: float
     max_episode_steps: int | None
@@ -206,6 +207,7 @@ def parse_options(
         TypeError: an unknown keyword, with the nearest known one.
         ValueError: a value that is out of range or of the wrong kind.
     """
+    given = renamed_options(given, caller, stacklevel=3)
     check_keywords(caller, given, [field.name for field in fields(Options)], others)
     if isinstance(given.get("max_episode_steps"), DefaultSteps):
         # Of the registered options, not of these: nobody asked for it.
@@ -232,12 +234,12 @@ def parse_options(
     if not callable(options.randomisation):
         check_named("randomisation", options.randomisation, RANDOMISATIONS)
     check_named("disturbances", options.disturbances, DISTURBANCES)
-    if isinstance(options.human, Operator):
-        check_operator(options.human)
-    elif options.human not in OPERATORS:
+    if isinstance(options.operator, Operator):
+        check_operator(options.operator)
+    elif options.operator not in OPERATORS:
         raise ValueError(
-            f"human must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
-            f"{options.human!r}"
+            f"operator must be one of {', '.join(OPERATORS)} or a pma_gym.tasks.Operator, got "
+            f"{options.operator!r}"
         )
     check_pressure(options.pressure_kpa)
     check_tolerance(options.tolerance)
@@ -266,10 +268,10 @@ def parse_task(given: str | Task, options: Options) -> Task:
 def _check_exercise(task: Task, options: Options) -> None:
     """Refuse what an exercise cannot have, and what nothing else has a use for."""
     if task.exercise is None:
-        for name, usual in (("human", "random"), ("safety", True)):
+        for name, usual in (("operator", "random"), ("safety", True)):
             if getattr(options, name) != usual:
                 raise ValueError(
-                    f"{name} is of the operator of an exercise, and task {task.name} has none; "
+                    f"{name} is an option of exercises, and task {task.name} is none; "
                     "leave it out, or take isokinetic_exercise, isotonic_exercise or "
                     "profile_exercise"
                 )
@@ -300,19 +302,19 @@ def rig_model(task: Task, options: Options) -> Model:
             f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
             "which has no muscle; take station or serres2008"
         )
-    operated = options.disturbing.operator_force != 0.0
-    if not model.rig.balances_loads and (operated or task.load or task.exercise):
-        what = f"disturbances={options.disturbances!r}" if operated else f"task {task.name}"
+    pushed = options.disturbing.hand_push_force != 0.0
+    if not model.rig.balances_loads and (pushed or task.load or task.exercise):
+        what = f"disturbances={options.disturbances!r}" if pushed else f"task {task.name}"
         held = "plays an operator" if task.exercise else "holds a load"
-        why = "somebody pulls at its slide" if operated else f"the motor {held}"
+        why = "somebody pulls at its slide" if pushed else f"the motor {held}"
         raise ValueError(
             f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
             "take station or serres2008"
         )
     model = nominal_model(task, model)
-    if not operated or "operator" in model.parameters:
+    if not pushed or "hand_push" in model.parameters:
         return model
-    return model.with_effects({"operator": {"share": 1.0}})
+    return model.with_effects({"hand_push": {"share": 1.0}})
 
 
 def nominal_model(task: Task, model: Model) -> Model:
@@ -398,15 +400,15 @@ def check_named(what: str, value: object, known: Iterable[str]) -> None:
         raise _unknown(what, value, names)
 
 
-def check_operator(human: Operator) -> None:
+def check_operator(operator: Operator) -> None:
     """Refuse an operator whom nobody could be.
 
     Raises:
         ValueError: names the number, its range and unit, and what came.
     """
-    for name, value in human._asdict().items():
+    for name, value in operator._asdict().items():
         lower, upper, unit = OPERATOR_BOUNDS[name]
-        _check_number(f"human.{name}", value, lower, upper, unit)
+        _check_number(f"operator.{name}", value, lower, upper, unit)
 
 
 def check_pressure(pressure: object) -> None:

@@ -15,8 +15,8 @@ PARTS: tuple[str, ...] = tuple(signal.reading or signal.name for signal in STATI
 START = "start_contraction"
 """Place of the contraction that an episode began at (m), from which a regulator's task counts."""
 
-OPERATOR = "memory_operator"
-"""Place of the force that an operator puts on the slide (N)."""
+HAND_PUSH = "memory_hand_push"
+"""Place of the force with which a hand pushes the slide (N)."""
 
 TRUTH = STATION.outputs
 """True outputs, in the order of the plant's."""
@@ -34,13 +34,13 @@ WORK = ("work", "returned")
 """Places of the work that the joint did on the device and that it took back (J)."""
 
 NOMINAL_STATION = (
-    *("told_radius", "told_drive_gain", "told_drive_offset"),
-    *("told_line_gain", "told_line_offset", "told_lag_share"),
+    *("nominal_radius", "nominal_drive_gain", "nominal_drive_offset"),
+    *("nominal_line_gain", "nominal_line_offset", "nominal_lag_share"),
 )
 """Places of what the rig's computer knows of its station, drawn or not (SI): it plays the operator,
-and keeps the exercise safe. `told_lag_share` is how far the pressure goes in a control step."""
+and keeps the exercise safe. `nominal_lag_share` is how far the pressure goes in a control step."""
 
-FILTER_STATE = ("guard_pressure", "guard_extension", "guard_speed", "guard_moment")
+FILTER_STATE = ("safety_pressure", "safety_extension", "safety_speed", "safety_moment")
 """Offsets of the safety layer's state: the pressure that the nominal regulator has come to
 (Pa), the last measured extension (m), the estimated speed (rad/s), the moment of late
 (N m)."""
@@ -135,11 +135,11 @@ class StateLayout:
         if self.task.exercise is None:
             return []
         return [
-            *(f"human_{name}" for name in Operator._fields),
-            "human_share",
+            *(f"operator_{name}" for name in Operator._fields),
+            "operator_share",
             *self.plan,
             *NOMINAL_STATION,
-            *(f"mind_{name}" for name in OperatorState._fields),
+            *(f"operator_state_{name}" for name in OperatorState._fields),
             *(FILTER_STATE if self.options.safety else ()),
             "operator_moment",
             *PEAKS,

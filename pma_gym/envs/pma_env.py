@@ -25,7 +25,7 @@ from pma_gym.engine.options import (
     parse_task,
 )
 from pma_gym.engine.snapshot import put, take
-from pma_gym.engine.state_layout import OPERATOR, PARTS, START, TRUTH
+from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
 from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
@@ -161,11 +161,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     |---|---|
     | `none` (default) | |
     | `regulator` | the regulator's pressure jumps by 25 kPa, away from its line and back in turn |
-    | `operator` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
-    | `regulator_and_operator` | both |
+    | `hand_push` | somebody at the slide pulls or pushes with 50 N, for 0.2 to 0.8 s at a time |
+    | `regulator_and_hand_push` | both |
 
     A jump adds volts to the regulator's command, by the nominal line and as far as
-    0-10 V go; the operator's force adds to the muscle's at the slide. Both come with the control
+    0-10 V go; the hand's force adds to the muscle's at the slide. Both come with the control
     step after their time. `env.disturbance` and `env.events` tell, but not controllers.
 
     ## Info
@@ -518,6 +518,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return Measurement(taken, *self._row[self._measured].tolist())
 
     reading = renamed_attribute("reading", "measurement")
+    human = renamed_attribute("human", "operator")
 
     @property
     def truth(self) -> dict[str, float]:
@@ -541,21 +542,21 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         return truth[self.task.protocol.quantity]
 
     @property
-    def human(self) -> Operator | None:
+    def operator(self) -> Operator | None:
         """The operator of this exercise; None without one, or before. Not for controllers."""
         if self.task.exercise is None or self._idle == NOT_BEGUN:
             return None
-        return Operator(*(self._number(f"human_{name}") for name in Operator._fields))
+        return Operator(*(self._number(f"operator_{name}") for name in Operator._fields))
 
     @property
     def disturbance(self) -> tuple[float, float]:
-        """What disturbed the last step: the regulator's jump (V) and the operator's force (N)."""
+        """What disturbed the last step: the regulator's jump (V) and the hand's force (N)."""
         jumps = [name for name in self._offsets if name.startswith("jump_step_")]
         count = self._count - 1
         volts = [
             self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
         ]
-        force = self._number(OPERATOR) if OPERATOR in self._offsets else 0.0
+        force = self._number(HAND_PUSH) if HAND_PUSH in self._offsets else 0.0
         return sum(volts), force
 
     @property

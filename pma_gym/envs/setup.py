@@ -12,6 +12,7 @@ import numpy as np
 from pma_gym.effects.user_effects import source_of
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.options import Options
+from pma_gym.engine.renamed_options import RENAMED_OPTIONS, RENAMED_VALUES
 from pma_gym.plant.model import Model
 from pma_gym.tasks import Task
 
@@ -32,6 +33,15 @@ _RENAMED = {
 }
 """Names of classes and fields in the texts of states that earlier versions saved."""
 
+_RENAMED_NUMBERS = {
+    "memory_operator": "memory_hand_push",
+    "human": "operator",
+    "mind": "operator_state",
+    "told": "nominal",
+    "guard": "safety",
+}
+"""Beginnings of the names of numbers in these states."""
+
 _OPTIONS = {
     # The nominal model stands elsewhere, number by number, wherever it was read from.
     field.name: field.default
@@ -41,6 +51,7 @@ _OPTIONS = {
 """Options that a setup names, and their defaults."""
 
 _OLD_NAME = re.compile(rf"\b({'|'.join(_RENAMED)})(?=[{{:])")
+_OLD_NUMBER = re.compile(rf"\b({'|'.join(_RENAMED_NUMBERS)})(?=_| |$)")
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
 
 
@@ -66,11 +77,18 @@ def setup(engine: Engine, **others: object) -> Setup:
 def with_new_names(saved: Mapping[str, Any]) -> Setup:
     """What a saved state was made with, old names in it replaced, with one deprecation warning.
 
-    >>> with_new_names({"human": "Operator{strength: 200.0}"})
-    (('human', 'Operator{strength: 200.0}'),)
+    >>> with_new_names({"operator": "Operator{strength: 200.0}"})
+    (('operator', 'Operator{strength: 200.0}'),)
     """
     texts = {str(name): str(value) for name, value in saved.items()}
-    new = {name: _OLD_NAME.sub(lambda old: _RENAMED[old[1]], text) for name, text in texts.items()}
+    new = {
+        RENAMED_OPTIONS.get(name, name): RENAMED_VALUES.get(name, {}).get(
+            text, _OLD_NAME.sub(lambda old: _RENAMED[old[1]], text)
+        )
+        for name, text in texts.items()
+    }
+    if "numbers" in new:
+        new["numbers"] = _OLD_NUMBER.sub(lambda old: _RENAMED_NUMBERS[old[1]], new["numbers"])
     if new != texts:
         warnings.warn(
             "the state was saved by an earlier version, with names that have changed; it is read; "

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pma_gym.effects import CATALOGUE
+from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.engine.snapshot import StateError
 from pma_gym.plant.model import Model, Note
 from pma_gym.units import Quantity
@@ -31,8 +32,9 @@ def parse_model_document(document: Mapping[str, Any]) -> Model:
         StateError: an unknown effect or parameter, or a value out of its bounds.
         ModelError: effects that make no plant.
     """
-    parameters = {name: _parameters(name, p) for name, p in document["parameters"].items()}
-    notes = {path: _note(path, note) for path, note in document["notes"].items()}
+    tables, kept = (with_present_names(document[key]) for key in ("parameters", "notes"))
+    parameters = {name: _parameters(name, p) for name, p in tables.items()}
+    notes = {path: _note(path, note) for path, note in kept.items()}
     name, title, plant = (str(document[key]) for key in ("name", "title", "plant"))
     return Model(name, title, plant, parameters, notes)
 

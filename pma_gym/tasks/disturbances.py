@@ -25,11 +25,11 @@ class Disturbances(NamedTuple):
 
     Attributes:
         regulator_step: by how much the regulator's pressure jumps (Pa); 0 for never.
-        operator_force: force of an operator's pulses at the slide (N); 0 for none.
+        hand_push_force: force of a hand's pulses at the slide (N); 0 for none.
     """
 
     regulator_step: float = 0.0
-    operator_force: float = 0.0
+    hand_push_force: float = 0.0
 
     def regulator_steps(self, duration: float) -> int:
         """How often the regulator jumps in an episode of a duration (s)."""
@@ -37,7 +37,7 @@ class Disturbances(NamedTuple):
 
     def pulses(self, duration: float) -> int:
         """How many pulses there are in an episode of a duration (s)."""
-        return _count(duration) if self.operator_force else 0
+        return _count(duration) if self.hand_push_force else 0
 
     def draw(
         self, duration: float, keys: NDArray[np.int64], streams: NDArray[np.int64]
@@ -64,7 +64,7 @@ class Disturbances(NamedTuple):
             (starts + shares[0] * part)[:, :steps],
             self.regulator_step * jumps,
             (starts + late)[:, :pulses],
-            (self.operator_force * pulse_signs)[:, :pulses],
+            (self.hand_push_force * pulse_signs)[:, :pulses],
             lengths[:, :pulses],
         )
 
@@ -113,8 +113,8 @@ _STEP, _FORCE = 25.0 * SI_FACTORS["kPa"], 50.0
 DISTURBANCES: dict[str, Disturbances] = {
     "none": Disturbances(),
     "regulator": Disturbances(regulator_step=_STEP),
-    "operator": Disturbances(operator_force=_FORCE),
-    "regulator_and_operator": Disturbances(_STEP, _FORCE),
+    "hand_push": Disturbances(hand_push_force=_FORCE),
+    "regulator_and_hand_push": Disturbances(_STEP, _FORCE),
 }
 """What disturbs episodes, by name: jumps of the regulator by 25 kPa away from its line and back,
 and pulses of 50 N at the slide of 0.2 to 0.8 s, both at random times and of random sign."""

@@ -221,7 +221,7 @@ class OperatorState(NamedTuple):
 
 
 def operator_step(
-    human: Operator,
+    operator: Operator,
     state: OperatorState,
     wish: Any,  # noqa: ANN401
     away: Any,  # noqa: ANN401
@@ -236,7 +236,7 @@ def operator_step(
     Numbers or traced values; the equations are the module's, a step long.
 
     Args:
-        human: who.
+        operator: who.
         state: as it was before the step.
         wish: effort times plan at the intended angle (N m).
         away: intended angle less the true one (rad).
@@ -252,17 +252,17 @@ def operator_step(
     wander = kept * state.wander + math.sqrt(1.0 - kept * kept) * normal
     cut = where(wander > FARTHEST_WANDER, FARTHEST_WANDER, wander)
     cut = where(cut < -FARTHEST_WANDER, -FARTHEST_WANDER, cut)
-    drive = state.drive + share * (wish * (1.0 + human.unsteadiness * cut) - state.drive)
-    turns = human.tremor_phase + human.tremor_rate * time
+    drive = state.drive + share * (wish * (1.0 + operator.unsteadiness * cut) - state.drive)
+    turns = operator.tremor_phase + operator.tremor_rate * time
     sine, _ = sine_cosine(turns - floor(turns))
-    moment = drive * (1.0 + human.tremor * sine) + human.stiffness * away
-    full = human.strength * knee_share(coming)
+    moment = drive * (1.0 + operator.tremor * sine) + operator.stiffness * away
+    full = operator.strength * knee_share(coming)
     able = state.freshness * full
     moment = where(moment > able, able, moment)
     moment = where(moment < 0.0, 0.0, moment)
     # Where there is no strength at all nothing is asked of it.
     used = moment / where(full > 0.0, full, 1.0)
-    freshness = state.freshness * (1.0 - period * human.fatigue * used)
+    freshness = state.freshness * (1.0 - period * operator.fatigue * used)
     return moment, OperatorState(drive, wander, freshness)
 
 

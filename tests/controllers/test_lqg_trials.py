@@ -63,8 +63,8 @@ def test_integral_action_leaves_no_offset_where_another_station_is_held():
 
 
 def test_disturbances_move_it_less_than_the_pid():
-    ours, _ = driven(LQG(), disturbances="regulator_and_operator")
-    pid, _ = driven(PID(), disturbances="regulator_and_operator")
+    ours, _ = driven(LQG(), disturbances="regulator_and_hand_push")
+    pid, _ = driven(PID(), disturbances="regulator_and_hand_push")
     assert np.sqrt(np.mean(ours**2)) < 0.9 * np.sqrt(np.mean(pid**2))
 
 

@@ -124,7 +124,7 @@ def driven(controller, seed=3):
         pressure_kpa=300.0,
         control_rate_hz=50.0,
         action_delay_s=0.02,
-        disturbances="regulator_and_operator",
+        disturbances="regulator_and_hand_push",
     )
     env.reset(seed=seed)
     controller.reset(env.reference, replace(env.station, model=nominal))

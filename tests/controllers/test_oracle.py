@@ -14,7 +14,7 @@ from pma_gym.plant.condition import Condition
 from pma_gym.plant.plant import Plant
 
 LATE = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-DISTURBED = {"disturbances": "regulator_and_operator"}
+DISTURBED = {"disturbances": "regulator_and_hand_push"}
 
 
 def commands_of(task, seed: int = 1, **options):

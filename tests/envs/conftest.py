@@ -165,7 +165,7 @@ SINGLES = [
     {"reward": _squared},
     {"max_episode_steps": 30},
     {"task": "rotation", "randomisation": "varied", "pressure_kpa": "random"},
-    {"disturbances": "regulator_and_operator", "model": "station"},
+    {"disturbances": "regulator_and_hand_push", "model": "station"},
     {"action_delay_s": 0.1, "observation_delay_s": 0.2, "history": 2, "preview": 3},
     {"regulator_action": True, "noise": False, "reward": "smooth"},
     {"task": "isotonic", "model": "station", "pressure_kpa": "random"},

@@ -12,7 +12,7 @@ from pma_gym.plant.model import load_model
 from pma_gym.plant.plant import Plant
 from pma_gym.tasks import TASKS
 
-BOTH = "regulator_and_operator"
+BOTH = "regulator_and_hand_push"
 
 
 def disturbed(env: PMAEnv, seed: int, volts: float) -> tuple[np.ndarray, np.ndarray]:
@@ -44,7 +44,7 @@ def test_events_come_with_the_step_after_their_time(make):
     for begun, lasting, size in zip(first, steps, events.pulse_forces, strict=True):
         expected[int(begun) : int(begun + lasting)] += size
     np.testing.assert_array_equal(force, expected)
-    assert states[:, env.nominal_plant.states.index("memory_operator")].tolist() == force.tolist()
+    assert states[:, env.nominal_plant.states.index("memory_hand_push")].tolist() == force.tolist()
     # The regulator answers within its lag of 0.1 s.
     for when, size in zip(events.step_times, np.cumsum(events.step_sizes), strict=True):
         settled = pressure[(begins > when + 0.9) & (begins < when + 1.0)]
@@ -79,7 +79,7 @@ def test_sizes_and_times_are_as_promised(task):
 def test_a_hand_moves_the_slide_by_its_force_over_the_stiffness():
     """At rest under a held load a force of 50 N moves the muscle by what its stiffness allows."""
     stiff = {"coulomb_friction.static_n": 0.0, "coulomb_friction.dynamic_n": 0.0}
-    env = PMAEnv(model=load_model("serres2008").replace(stiff), disturbances="operator",
+    env = PMAEnv(model=load_model("serres2008").replace(stiff), disturbances="hand_push",
                  pressure_kpa=400.0, noise=False)  # fmt: skip
     for seed in range(20):
         env.reset(seed=seed)
@@ -103,7 +103,7 @@ def test_without_disturbances_nothing_is_there(make):
     env = make()
     env.reset(seed=0)
     assert env.disturbance == (0, 0.0) and env.events.step_times.size == 0
-    assert "memory_operator" not in env.nominal_plant.states
+    assert "memory_hand_push" not in env.nominal_plant.states
     only = make(disturbances="regulator")
     only.reset(seed=0)
     assert only.nominal_plant.model == only.station.model
@@ -111,7 +111,7 @@ def test_without_disturbances_nothing_is_there(make):
 
 
 def test_an_episode_before_its_first_event_is_undisturbed(make):
-    """The operator's memory costs the station nothing but rounding while nobody pulls."""
+    """The hand's memory costs the station nothing but rounding while nobody pulls."""
     quiet, loud = make(noise=False), make(noise=False, disturbances=BOTH)
     seed = next(s for s in range(50) if _first_event(loud, s) > 0.6)
     quiet.reset(seed=seed)
@@ -134,11 +134,11 @@ def test_the_regulator_hears_no_more_than_10_volts(make):
     assert max(highest) == 10.0 and env.ended_by == ""
 
 
-def test_controllers_are_told_the_station_without_the_operator(make):
+def test_controllers_are_told_the_station_without_the_hand(make):
     env = make(disturbances=BOTH, randomisation="varied")
     env.reset(seed=1)
-    assert "operator" not in env.station.model.parameters
-    assert env.plant.model.parameters["operator"].share == 1.0
+    assert "hand_push" not in env.station.model.parameters
+    assert env.plant.model.parameters["hand_push"].share == 1.0
     assert env.station.model == load_model("serres2008")
 
 
@@ -152,12 +152,12 @@ def test_the_plant_goes_on_from_the_condition_as_the_environment_does(make):
     env.step(env.action(2.0))
     plant.step(condition, 2.0, env.regulator_voltage, 0.01)
     np.testing.assert_allclose(condition.state, env.condition.state, rtol=1e-7, atol=1e-9)
-    assert condition.state[plant.states.index("memory_operator")] == env.disturbance[1]
+    assert condition.state[plant.states.index("memory_hand_push")] == env.disturbance[1]
 
 
 @pytest.mark.parametrize("rate", [10.0, 100.0, 384.0])
 def test_a_pulse_lasts_as_long_at_every_rate(make, rate):
-    env = make(disturbances="operator", control_rate_hz=rate)
+    env = make(disturbances="hand_push", control_rate_hz=rate)
     rows, _ = disturbed(env, 2, 3.0)
     assert np.count_nonzero(rows[:, 1]) == np.ceil(env.events.pulse_lengths * rate).sum()
 
@@ -185,7 +185,7 @@ def test_threads_have_the_bits_of_the_processor():
             own.actions[:7] = actions
             own.step()
             seen, rewards, *_ = other.step(actions)
-            forces = own.numbers("memory_operator"), other.numbers("memory_operator")
+            forces = own.numbers("memory_hand_push"), other.numbers("memory_hand_push")
             assert np.array_equal(*forces)
             if precision == "double":
                 assert np.array_equal(own.observations, seen)
@@ -194,25 +194,25 @@ def test_threads_have_the_bits_of_the_processor():
 
 @pytest.mark.parametrize("tool", ["settle", "linearize", "simulate"])
 def test_a_memory_without_a_rate_is_no_obstacle(tool):
-    with_hand = Plant(load_model("station").with_effects({"operator": {"share": 1.0}}))
+    with_hand = Plant(load_model("station").with_effects({"hand_push": {"share": 1.0}}))
     bare = Plant("station")
     if tool == "settle":
         with_memory, expected = (p.settle(3.0, pressure=300e3) for p in (with_hand, bare))
         kept = [with_hand.states.index(name) for name in bare.states]
         np.testing.assert_allclose(with_memory.state[kept], expected.state, rtol=1e-12, atol=1e-15)
-        assert with_memory.state[with_hand.states.index("memory_operator")] == 0.0
+        assert with_memory.state[with_hand.states.index("memory_hand_push")] == 0.0
     elif tool == "linearize":
         with_memory, expected = (p.linearize(300e3, 0.03) for p in (with_hand, bare))
         np.testing.assert_allclose(with_memory.A, expected.A, rtol=1e-9, atol=1e-12)
         assert with_memory.state_labels == expected.state_labels
     else:
         condition = with_hand.settle(3.0, pressure=300e3)
-        condition.state[with_hand.states.index("memory_operator")] = -50.0
+        condition.state[with_hand.states.index("memory_hand_push")] = -50.0
         regulator = with_hand.regulator_voltage(300e3)
         before = with_hand.observe(condition.state[None], condition.zero_contraction)
         with_hand.step(condition, 3.0, regulator, 0.5)
         after = with_hand.observe(condition.state[None], condition.zero_contraction)
-        assert condition.state[with_hand.states.index("memory_operator")] == -50.0
+        assert condition.state[with_hand.states.index("memory_hand_push")] == -50.0
         assert after["contraction"][0] < before["contraction"][0] - 1e-3
 
 
@@ -220,7 +220,7 @@ def test_a_memory_without_a_rate_is_no_obstacle(tool):
     ("options", "words"),
     [
         ({"disturbances": "wind"}, ["disturbances must be one of none, regulator", "got 'wind'"]),
-        ({"disturbances": "operater"}, ["did you mean 'operator'?"]),
+        ({"disturbances": "hand_pusch"}, ["did you mean 'hand_push'?"]),
         ({"disturbances": BOTH, "model": "cascade"}, ["disturbances=", "station", "cascade"]),
     ],
 )

@@ -45,9 +45,11 @@ def held(env: PMAEnv, seconds: float = 100.0) -> list[dict]:
 
 @pytest.mark.parametrize("name", EXERCISES)
 @pytest.mark.parametrize("model", ["station", "serres2008"])
-def test_nothing_moves_before_the_operator_hears_the_cue(name, model):
+def test_nothing_moves_before_the_operator_reacts_to_the_cue(name, model):
     # A unit step of the pressure would move the joint; a balance does not.
-    env = PMAEnv(name, model=model, noise=False, human=EXACT._replace(reaction=1.0, stiffness=20.0))
+    env = PMAEnv(
+        name, model=model, noise=False, operator=EXACT._replace(reaction=1.0, stiffness=20.0)
+    )
     _, info = env.reset(seed=3)
     start = env.task.exercise.start_moment
     assert info["moment_nm"] == pytest.approx(start, abs=1e-9) == info["operator_nm"]
@@ -61,7 +63,7 @@ def test_nothing_moves_before_the_operator_hears_the_cue(name, model):
 
 @pytest.mark.parametrize("pressure_kpa", [275.0, 575.0])
 def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure_kpa):
-    env = PMAEnv("isokinetic_exercise", noise=False, human=EXACT, pressure_kpa=pressure_kpa)
+    env = PMAEnv("isokinetic_exercise", noise=False, operator=EXACT, pressure_kpa=pressure_kpa)
     env.reset(seed=0)
     infos = held(env)
     # At rest near 90 deg: 17 N of hysteresis, once at its start on the branch of filling and once
@@ -89,7 +91,7 @@ def test_who_gives_what_the_device_takes_turns_the_joint_as_he_means_to(pressure
 def test_half_the_effort_gives_half_the_moment():
     moments = []
     for effort in (0.5, 1.0):
-        env = PMAEnv("isokinetic_exercise", noise=False, human=EXACT._replace(effort=effort))
+        env = PMAEnv("isokinetic_exercise", noise=False, operator=EXACT._replace(effort=effort))
         env.reset(seed=0, options={"pressure_kpa": 300})
         moments.append([info["operator_nm"] for info in held(env, 9.0)])
     np.testing.assert_allclose(moments[0], 0.5 * np.array(moments[1]), rtol=1e-12)
@@ -99,7 +101,7 @@ def test_half_the_effort_gives_half_the_moment():
 def test_the_compiled_operator_is_the_plain_one(name):
     env = PMAEnv(name, control_rate_hz=125.0)
     env.reset(seed=8)
-    human, exercise = env.human, env.task.exercise
+    operator, exercise = env.operator, env.task.exercise
     plan = exercise.prescription
     if plan is None:
         angles = np.radians(np.arange(0.0, 91.0, 15.0))
@@ -111,31 +113,31 @@ def test_the_compiled_operator_is_the_plain_one(name):
     zero = np.zeros(1, np.uint64)
     for k in range(400):
         time, angle = k * env.options.period, env.truth["rotation"]
-        intended = float(PACE.reference(max(0.0, time - human.reaction)))
+        intended = float(PACE.reference(max(0.0, time - operator.reaction)))
         expected = plan.at(intended) if plan else float(np.interp(intended, angles, given))
         normal = float(
             normals(philox((zero + np.uint64(k), zero, zero + np.uint64(1), zero), words))[0][0]
         )
         speed = env._number("spin")
         moment, mind = operator_step(
-            human,
+            operator,
             mind,
-            human.effort * expected,
+            operator.effort * expected,
             intended - angle,
             angle + FORESIGHT_S * speed,
             time,
             normal,
             env.options.period,
-            -math.expm1(-env.options.period / human.rise),
+            -math.expm1(-env.options.period / operator.rise),
         )
         *_, info = env.step(env.action(5.0 + 3.0 * math.sin(time)))
         assert info["operator_nm"] == pytest.approx(moment, rel=1e-9, abs=1e-9)
-        able = mind.freshness * human.strength * knee_share(angle + FORESIGHT_S * speed)
+        able = mind.freshness * operator.strength * knee_share(angle + FORESIGHT_S * speed)
         assert 0.0 <= info["operator_nm"] <= able * (1.0 + 1e-3)
 
 
 def test_nobody_pushes_the_leg_beyond_straight():
-    env = PMAEnv("isokinetic_exercise", safety=False, human=EXACT._replace(effort=5.0))
+    env = PMAEnv("isokinetic_exercise", safety=False, operator=EXACT._replace(effort=5.0))
     env.reset(seed=0, options={"pressure_kpa": 275})
     angles = []
     for _ in range(700):
@@ -147,7 +149,7 @@ def test_nobody_pushes_the_leg_beyond_straight():
 
 
 def test_the_weak_do_not_come_up():
-    env = PMAEnv("isokinetic_exercise", human=EXACT._replace(strength=60.0), noise=False)
+    env = PMAEnv("isokinetic_exercise", operator=EXACT._replace(strength=60.0), noise=False)
     env.reset(seed=0, options={"pressure_kpa": 450})
     assert held(env, 9.0)[-1]["rotation_deg"] < 85.0
 
@@ -155,7 +157,7 @@ def test_the_weak_do_not_come_up():
 def test_who_tires_gives_less_where_it_is_all_that_he_can():
     fresh, tired = (
         PMAEnv(
-            "isokinetic_exercise", human=EXACT._replace(strength=80.0, fatigue=rate), noise=False
+            "isokinetic_exercise", operator=EXACT._replace(strength=80.0, fatigue=rate), noise=False
         )
         for rate in (0.0, 2.0 / 60.0)
     )
@@ -267,18 +269,18 @@ def test_people_are_drawn_within_their_ranges_and_by_the_seed():
     for seed in range(30):
         for env in envs:
             env.reset(seed=seed)
-        assert envs[0].human == envs[1].human
-        seen.append(envs[0].human)
+        assert envs[0].operator == envs[1].operator
+        seen.append(envs[0].operator)
         envs[1].reset()
-        assert envs[1].human != envs[0].human
+        assert envs[1].operator != envs[0].operator
     drawn = np.array(seen)
     assert np.all(drawn >= PACING.low) and np.all(drawn <= PACING.high)
     spread = np.array(PACING.high) - np.array(PACING.low)
     assert np.all(np.ptp(drawn, axis=0)[spread > 0.0] > 0.6 * spread[spread > 0.0])
-    env = PMAEnv("isotonic_exercise", human="typical")
+    env = PMAEnv("isotonic_exercise", operator="typical")
     env.reset(seed=1)
-    assert env.human == PACING.typical
-    assert PMAEnv("displacement").human is None
+    assert env.operator == PACING.typical
+    assert PMAEnv("displacement").operator is None
 
 
 def wild(env: PMAEnv, seed: int) -> dict:
@@ -305,7 +307,9 @@ def test_the_safety_layer_keeps_wild_commands_from_harm(name):
 
 
 def test_what_is_not_safe_ends_an_episode():
-    env = PMAEnv("isotonic_exercise", safety=False, human=PACING.typical._replace(stiffness=60.0))
+    env = PMAEnv(
+        "isotonic_exercise", safety=False, operator=PACING.typical._replace(stiffness=60.0)
+    )
     env.reset(seed=0)
     for _ in range(1501):
         _, reward, terminated, _, info = env.step(env.action(env.regulator_voltage))
@@ -320,7 +324,7 @@ def test_what_is_not_safe_ends_an_episode():
 
 
 def test_the_observation_of_a_prescription_is_of_the_moment():
-    env = PMAEnv("profile_exercise", noise=False, human="typical")
+    env = PMAEnv("profile_exercise", noise=False, operator="typical")
     env.reset(seed=4)
     assert "prescribed moment at the measured angle" in env.table.describe()
     volts = env.regulator_voltage
@@ -347,22 +351,22 @@ def test_the_observation_of_a_prescription_is_of_the_moment():
         ("isokinetic_exercise", {"model": "cascade"}, "needs the model of a station"),
         (
             "isokinetic_exercise",
-            {"human": "strong"},
-            r"human must be one of random, typical or a pma_gym.tasks.Operator",
+            {"operator": "strong"},
+            r"operator must be one of random, typical or a pma_gym.tasks.Operator",
         ),
         ("isokinetic_exercise", {"safety": 1}, "safety must be true or false, got 1"),
         (
             "rotation",
-            {"human": "typical"},
-            "human is of the operator of an exercise, and task rot",
+            {"operator": "typical"},
+            "operator is an option of exercises, and task rot",
         ),
-        ("rotation", {"safety": False}, "safety is of the operator of an exercise, and task rot"),
+        ("rotation", {"safety": False}, "safety is an option of exercises, and task rot"),
         ("isokinetic_exercise", {"pressure_kpa": 150}, "must lie in .* reaches 90 deg, got 150"),
         ("isokinetic_exercise", {"regulator_action": True}, "is the regulator's already"),
         (
             "isokinetic_exercise",
-            {"human": EXACT._replace(strength=2000.0)},
-            r"human.strength must be a number in 1-600 N m, got 2000.0",
+            {"operator": EXACT._replace(strength=2000.0)},
+            r"operator.strength must be a number in 1-600 N m, got 2000.0",
         ),
     ],
 )
@@ -408,7 +412,7 @@ def test_slips_in_a_task_of_ones_own_are_told(angles, moments, pressures, messag
 def test_a_task_of_ones_own_takes_arrays():
     mine = moment_exercise(np.radians([0, 90]), np.array([5, 8]), (450e3, 550e3))
     env = PMAEnv(mine)
-    assert env.human is None
+    assert env.operator is None
     env.reset(seed=1)
     assert env.task.exercise.prescription.at(math.radians(45.0)) == pytest.approx(6.5)
     with pytest.raises(AttributeError, match="collect info"):
@@ -419,4 +423,4 @@ def test_an_id_makes_it():
     env = gym.make("pma_gym/ResistiveExercise-v0", task="isotonic_exercise", pressure_kpa=550)
     _, info = env.reset(seed=1)
     assert info["moment_nm"] == pytest.approx(8.0, abs=1e-9)
-    assert isinstance(env.unwrapped.human, Operator)
+    assert isinstance(env.unwrapped.operator, Operator)

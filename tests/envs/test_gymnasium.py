@@ -44,7 +44,7 @@ def test_check_env_finds_nothing_to_say(name, options):
     ],
 )
 def test_check_env_finds_nothing_to_say_of_other_tasks_and_disturbances(name, task):
-    env = gym.make(name, task=task, disturbances="regulator_and_operator").unwrapped
+    env = gym.make(name, task=task, disturbances="regulator_and_hand_push").unwrapped
     assert env.task.name == task
     check_env(env)
 
@@ -62,7 +62,7 @@ def test_spec_survives_json():
         "model": "serres2008", "pressure_kpa": [200, 300.5], "control_rate_hz": 50.0, "preview": 2,
         "noise": False, "action_delay_s": 0.02, "observation_delay_s": 0.04, "history": 1,
         "reward": "smooth", "randomisation": "varied", "regulator_action": True,
-        "disturbances": "regulator_and_operator",
+        "disturbances": "regulator_and_hand_push",
     }  # fmt: skip
     env = gym.make("pma_gym/IsokineticRotation-v0", **given)
     assert env.spec is not None

@@ -146,7 +146,7 @@ def test_the_triangles_are_the_dissertations_trials():
 
 OPTIONS = [
     {"randomisation": "varied", "action_delay_s": 0.1, "history": 2, "preview": 1},
-    {"disturbances": "regulator_and_operator", "reward": "smooth"},
+    {"disturbances": "regulator_and_hand_push", "reward": "smooth"},
 ]
 
 

@@ -12,8 +12,8 @@ from pma_gym.envs import PMAEnv, PMAVectorEnv
 
 MADE = {"model": "serres2008", "pressure_kpa": 300, "render_mode": "rgb_array"}
 READ = (
-    "time truth position error measurement pressure ended_by extrapolated disturbance events human "
-    "motor_voltage regulator_voltage motor_voltages voltages"
+    "time truth position error measurement pressure ended_by extrapolated disturbance events "
+    "operator motor_voltage regulator_voltage motor_voltages voltages"
 ).split()
 
 

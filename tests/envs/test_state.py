@@ -207,8 +207,8 @@ def test_a_state_of_another_environment_is_refused_by_what_differs(change, words
 
 def test_operators_and_batches_differ_too():
     made = {"model": "station", "pressure_kpa": 400.0}
-    one = PMAEnv("isokinetic_exercise", human="typical", **made)
-    with pytest.raises(StateError, match="human is typical there and random here"):
+    one = PMAEnv("isokinetic_exercise", operator="typical", **made)
+    with pytest.raises(StateError, match="operator is typical there and random here"):
         PMAEnv("isokinetic_exercise", **made).set_state(one.get_state())
     envs = PMAVectorEnv(2, autoreset_mode="SameStep")
     with pytest.raises(StateError, match=r"num_envs is 2 there and 3 here, autoreset_mode is Same"):
@@ -301,7 +301,7 @@ def test_text_that_is_no_state_is_refused(single):
 @pytest.mark.parametrize("kind", ["single", "batch"])
 def test_states_with_any_bytes_changed_are_refused_or_run(kind, single):
     """A state from a stranger is data: whatever its numbers, no step leaves its arrays."""
-    options = {"disturbances": "regulator_and_operator", "control_rate_hz": 10.0}
+    options = {"disturbances": "regulator_and_hand_push", "control_rate_hz": 10.0}
     env = single(options) if kind == "single" else PMAVectorEnv(3, **options)
     env.reset(seed=1)
     for _ in range(5):
@@ -352,7 +352,7 @@ def test_a_planner_finds_what_a_search_by_hand_finds(single):
 
 def test_a_state_that_an_earlier_version_saved_goes_on():
     """It names `Human`, `Plan` and `Guard`; it was taken after five steps."""
-    options = {"human": "typical", "disturbances": "regulator_and_operator"}
+    options = {"operator": "typical", "disturbances": "regulator_and_hand_push"}
     # A shipped model whose numbers are printed ones, so that they stay.
     options |= {"control_rate_hz": 50.0, "pressure_kpa": 550.0, "model": "serres2008"}
     env, other = PMAEnv("isotonic_exercise", **options), PMAEnv("isotonic_exercise", **options)

@@ -18,7 +18,7 @@ def test_names_add_what_is_there_and_does_nothing():
 
 
 def test_the_order_given_does_not_matter():
-    names = ["operator", "hysteresis", "regulator_asymmetry"]
+    names = ["hand_push", "hysteresis", "regulator_asymmetry"]
     assert dump_model(BARE.with_effects(names)) == dump_model(BARE.with_effects(names[::-1]))
 
 

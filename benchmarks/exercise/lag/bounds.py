@@ -112,12 +112,12 @@ def foreknown_bounds(
     factors: Sequence[float],
     safeties: Sequence[bool],
     model: Model,
-    human: str | Operator = "random",
+    operator: str | Operator = "random",
 ) -> Iterator[Foreknown]:
     """What is left to who knows the operator's course, operator by operator; as `lag_bounds`."""
     for seed in seeds:
         for pressure in pressures_kpa:
-            exertion = Exertion(task, seed, model, pressure, human)
+            exertion = Exertion(task, seed, model, pressure, operator)
             paced = EVERY_TASK[task].protocol.followed.is_angle
             floor = own_floor(exertion) if paced else 0.0
             lags = [lag_of(model, factor) for factor in factors]

@@ -80,7 +80,7 @@ def causal_bounds(
     model: Model,
     factors: Sequence[float] = FACTORS,
     delays: Sequence[int] = (1,),
-    human: Operator | None = None,
+    operator: Operator | None = None,
 ) -> tuple[Causal, ...]:
     """The least standard deviations at every point of an exercise.
 
@@ -89,11 +89,11 @@ def causal_bounds(
         model: the station, with the lag that it has.
         factors: lags as shares of the model's, 0 for hardly any.
         delays: control steps from a reading to its voltage.
-        human: the operator; None for the population's typical one.
+        operator: the operator; None for the population's typical one.
     """
     exercise, own = EVERY_TASK[task].exercise, model.parameters["regulator_lag"].time_constant
     assert exercise is not None
-    who, rows = human or exercise.population.typical, []
+    who, rows = operator or exercise.population.typical, []
     for point in points(task, model):
         for lag in (factor * own or NO_LAG for factor in factors):
             near = rates(point, model.replace({LAG: lag}))
@@ -106,7 +106,7 @@ def causal_bounds(
 
 
 def causal_bound(
-    point: Point, near: Rates, lag: float, delay: int, sensed: bool, human: Operator
+    point: Point, near: Rates, lag: float, delay: int, sensed: bool, operator: Operator
 ) -> Causal:
     """The least standard deviation near one point.
 
@@ -116,9 +116,9 @@ def causal_bound(
         lag: time constant of its regulator (s).
         delay: control steps from a reading to its voltage.
         sensed: whether the controller knows what the sensors say, not everything.
-        human: the operator.
+        operator: the operator.
     """
-    loop = Loop.of(point, near, delay, human)
+    loop = Loop.of(point, near, delay, operator)
     gain = loop.gain(loop.cheapest_within(point.room / DEVIATIONS, sensed))
     uncontrolled = loop.deviations(np.zeros_like(gain), False)[0]
     return Causal(point, lag, delay, sensed, uncontrolled, *loop.deviations(gain, sensed))
@@ -145,13 +145,13 @@ class Loop:
     noise: NDArray[np.float64]
 
     @classmethod
-    def of(cls, point: Point, near: Rates, delay: int, human: Operator) -> "Loop":
+    def of(cls, point: Point, near: Rates, delay: int, operator: Operator) -> "Loop":
         """By the module's equations; z holds x, d, w and the voltages on their way."""
         n = len(near.a)
         held, by_moment, by_voltage = _held(near)
-        stiffness = human.stiffness * SI_FACTORS["deg"]
-        kept, share = math.exp(-PERIOD / WANDER_S), -math.expm1(-PERIOD / human.rise)
-        size, fresh = share * human.unsteadiness * point.moment, math.sqrt(1.0 - kept**2)
+        stiffness = operator.stiffness * SI_FACTORS["deg"]
+        kept, share = math.exp(-PERIOD / WANDER_S), -math.expm1(-PERIOD / operator.rise)
+        size, fresh = share * operator.unsteadiness * point.moment, math.sqrt(1.0 - kept**2)
         own = held - stiffness * np.outer(by_moment, near.angle)
         a = np.asarray(block_diag(own, 1.0 - share, kept))
         moved = np.append(by_moment, 1.0)

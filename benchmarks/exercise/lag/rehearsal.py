@@ -38,7 +38,7 @@ class Exertion:
         seed: of the environment, and so of operator and unsteadiness.
         model: the station.
         pressure_kpa: gauge pressure that it begins at (kPa), or "random" for one by the seed.
-        human: the operator, as the environment's option.
+        operator: the operator, as the environment's option.
         safety: whether the safety layer stands between.
     """
 
@@ -46,7 +46,7 @@ class Exertion:
     seed: int
     model: Model
     pressure_kpa: Pressure = "random"
-    human: str | Operator = "random"
+    operator: str | Operator = "random"
     safety: bool = False
 
 
@@ -117,7 +117,7 @@ class Rehearsals:
             exertion.task,
             model=exertion.model,
             pressure_kpa=exertion.pressure_kpa,
-            human=exertion.human,
+            operator=exertion.operator,
             safety=exertion.safety,
             noise=False,
             control_rate_hz=RATE_HZ,
@@ -184,7 +184,7 @@ def own_floor(exertion: Exertion) -> float:
         exertion.task,
         model=exertion.model.replace({LAG: NO_LAG}),
         pressure_kpa=exertion.pressure_kpa,
-        human=exertion.human,
+        operator=exertion.operator,
         safety=False,
         noise=False,
     )

@@ -53,7 +53,7 @@ CONDITIONS = (
     Condition("commands 20 ms late", {"action_delay_s": 0.02}),
     Condition("readings 10 ms old", {"observation_delay_s": 0.01}),
     Condition("three times the sensors' noise", noise=3.0),
-    Condition("regulator jumps, somebody pulls", {"disturbances": "regulator_and_operator"}),
+    Condition("regulator jumps, somebody pulls", {"disturbances": "regulator_and_hand_push"}),
     Condition("200 Hz", {"control_rate_hz": 200.0}),
 )
 

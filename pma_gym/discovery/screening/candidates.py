@@ -178,7 +178,7 @@ def _scaled(quantity: Quantity, scale: float) -> float:
 def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
     """Numbers that the model has at their neutral value."""
     for name, effect in model.effects.items():
-        if name in sensors.SENSORS or name in ("limits", "validity", "operator"):
+        if name in sensors.SENSORS or name in ("limits", "validity", "hand_push"):
             continue
         doors = {stem: door for door, stem in effect.names_at_the_door().items()}
         for stem, quantity in effect.quantities.items():

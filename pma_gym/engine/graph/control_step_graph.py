@@ -15,7 +15,7 @@ from pma_gym.engine.graph.exercise_step import ExerciseStep, held_volts
 from pma_gym.engine.graph.scoring import position_of
 from pma_gym.engine.graph.step_inputs import StepInputs
 from pma_gym.engine.observation import BOUND, ObservationTable, Prescribed, measured_position
-from pma_gym.engine.state_layout import NOISE, OPERATOR, PARTS, TRUTH
+from pma_gym.engine.state_layout import HAND_PUSH, NOISE, PARTS, TRUTH
 from pma_gym.integrator.step_attempt import first_size
 from pma_gym.integrator.system import step_start_values
 from pma_gym.plant import sensors
@@ -24,7 +24,7 @@ from pma_gym.tasks import REWARDS, broken, missed_reward
 from pma_gym.units import SI_FACTORS
 
 FORCE_OF_A_VOLT = 100.0
-"""Jump of the operator's force (N) after which steps begin as small as after one of 1 V: about what
+"""Jump of the hand's force (N) after which steps begin as small as after one of 1 V: about what
 the motor pulls with."""
 
 PRESSURE_TOLERANCE = 1.0
@@ -82,8 +82,8 @@ class ControlStepGraph(StepInputs):
         other = abs(new["regulator_voltage"] - self.slot("regulator_voltage"))
         jump = where(other > jump, other, jump)
         if any(name.startswith("pulse_") for name in self.state_layout.events):
-            new[OPERATOR] = self._pulse()
-            pulled = abs(new[OPERATOR] - self.slot(OPERATOR)) * (1.0 / FORCE_OF_A_VOLT)
+            new[HAND_PUSH] = self._pulse()
+            pulled = abs(new[HAND_PUSH] - self.slot(HAND_PUSH)) * (1.0 / FORCE_OF_A_VOLT)
             jump = where(pulled > jump, pulled, jump)
         new["size"] = first_size(self.slot("size"), jump)
         return new
@@ -100,7 +100,7 @@ class ControlStepGraph(StepInputs):
         return held_volts(volts)
 
     def _pulse(self) -> Value:
-        """Force of the operator in the step that begins (N)."""
+        """Force of the hand in the step that begins (N)."""
         now, force = to_real(self.slot("count")), self.graph.constant(0.0)
         for name in self.state_layout.events:
             if name.startswith("pulse_step_"):

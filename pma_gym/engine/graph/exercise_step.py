@@ -37,9 +37,9 @@ class ExerciseStep:
     # -- what the rig's computer knows -------------------------------------------------------------
 
     @property
-    def human(self) -> Operator:
+    def operator(self) -> Operator:
         """The operator's numbers, as inputs."""
-        return Operator(*(self.inputs.slot(f"human_{name}") for name in Operator._fields))  # type: ignore[arg-type]
+        return Operator(*(self.inputs.slot(f"operator_{name}") for name in Operator._fields))  # type: ignore[arg-type]
 
     @property
     def plan(self) -> MomentProfile:
@@ -51,34 +51,34 @@ class ExerciseStep:
         """What a measured moment is compared with; None where the speed is prescribed."""
         if self.exercise.prescription is None:
             return None
-        return Prescribed(self.inputs.slot("told_radius"), self.plan)
+        return Prescribed(self.inputs.slot("nominal_radius"), self.plan)
 
     # -- operator ----------------------------------------------------------------------------------
 
     def operate(self) -> dict[str, Value]:
         """What the operator does in the step that begins: motor voltage, and how he comes out."""
-        slot, human = self.inputs.slot, self.human
+        slot, operator = self.inputs.slot, self.operator
         count = slot("count")
         time = to_real(count) * self.period
-        intended = self._intended(time - human.reaction)
+        intended = self._intended(time - operator.reaction)
         angle = slot("true_rotation")
         zero = self.inputs.graph.constant(0, "integer")
         key = slot("key_0"), slot("key_1")
         normal = unsteady(count, slot("episode") * 4 + NOISE, key, zero)
-        moment, mind = operator_step(
-            human,
-            OperatorState(*(slot(f"mind_{name}") for name in OperatorState._fields)),
-            human.effort * self.plan.at(intended),
+        moment, operator_state = operator_step(
+            operator,
+            OperatorState(*(slot(f"operator_state_{name}") for name in OperatorState._fields)),
+            operator.effort * self.plan.at(intended),
             intended - angle,
             angle + FORESIGHT_S * slot("spin"),
             time,
             normal,
             self.period,
-            slot("human_share"),
+            slot("operator_share"),
         )
-        load = moment / slot("told_radius")
-        volts = (load - slot("told_drive_offset")) / slot("told_drive_gain")
-        new = {f"mind_{name}": value for name, value in mind._asdict().items()}
+        load = moment / slot("nominal_radius")
+        volts = (load - slot("nominal_drive_offset")) / slot("nominal_drive_gain")
+        new = {f"operator_state_{name}": value for name, value in operator_state._asdict().items()}
         return new | {"motor_voltage": held_volts(volts), "operator_moment": moment}
 
     def _intended(self, time: Value) -> Value:
@@ -100,13 +100,13 @@ class ExerciseStep:
         # It stands at the rig: delays lie between the agent and it.
         slot = self.inputs.slot
         extension = slot("extension_0")
-        radius = slot("told_radius")
-        rate = (extension - slot("guard_extension")) / (self.period * radius)
-        speed = self._filtered("guard_speed", rate, SPEED_FILTER_S)
+        radius = slot("nominal_radius")
+        rate = (extension - slot("safety_extension")) / (self.period * radius)
+        speed = self._filtered("safety_speed", rate, SPEED_FILTER_S)
         moment = radius * slot("load_0")
-        slow = self._filtered("guard_moment", moment, MOMENT_FILTER_S)
-        gain, offset = slot("told_line_gain"), slot("told_line_offset")
-        before = slot("guard_pressure")
+        slow = self._filtered("safety_moment", moment, MOMENT_FILTER_S)
+        gain, offset = slot("nominal_line_gain"), slot("nominal_line_offset")
+        before = slot("safety_pressure")
         pressure = filtered_pressure(
             gain * volts + offset,
             before,
@@ -118,7 +118,7 @@ class ExerciseStep:
             self.exercise.safe_speed,
             self.exercise.safety_filter,
         )
-        there = before + slot("told_lag_share") * (pressure - before)
+        there = before + slot("nominal_lag_share") * (pressure - before)
         new = (there, extension, speed, slow)
         filter_state: dict[str, Value] = dict(zip(FILTER_STATE, new, strict=True))
         return held_volts((pressure - offset) / gain), filter_state

@@ -142,9 +142,9 @@ def operators(
     exercise = task.exercise
     assert exercise is not None
     people = _people(exercise, options, keys, episodes)
-    numbers = {f"human_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
-    rise = numbers["human_rise"]
-    numbers["human_share"] = -np.expm1(-options.period / rise)
+    numbers = {f"operator_{name}": people[:, i] for i, name in enumerate(Operator._fields)}
+    rise = numbers["operator_rise"]
+    numbers["operator_share"] = -np.expm1(-options.period / rise)
     known = plans(exercise, model, pressures)
     numbers["plan_first"] = np.array([plan.first for plan in known])
     for what in ("angles", "slopes"):
@@ -152,30 +152,30 @@ def operators(
         numbers |= {f"plan_{what[:-1]}_{i}": rows[:, i] for i in range(rows.shape[1])}
     drive, line, lag = (model.parameters[n] for n in ("drive", "regulator_line", "regulator_lag"))
     common = {
-        "told_radius": model.parameters["rotor"].radius,
-        "told_drive_gain": drive.gain,
-        "told_drive_offset": drive.offset,
-        "told_line_gain": line.gain,
-        "told_line_offset": line.offset,
-        "told_lag_share": -math.expm1(-options.period / lag.time_constant),
-        "mind_drive": exercise.start_moment,
-        "mind_freshness": 1.0,
+        "nominal_radius": model.parameters["rotor"].radius,
+        "nominal_drive_gain": drive.gain,
+        "nominal_drive_offset": drive.offset,
+        "nominal_line_gain": line.gain,
+        "nominal_line_offset": line.offset,
+        "nominal_lag_share": -math.expm1(-options.period / lag.time_constant),
+        "operator_state_drive": exercise.start_moment,
+        "operator_state_freshness": 1.0,
         "operator_moment": exercise.start_moment,
     }
     numbers |= {name: np.full(len(known), value) for name, value in common.items()}
     if options.safety:
-        numbers["guard_moment"] = np.full(len(known), exercise.start_moment)
-        numbers["guard_pressure"] = line.gain * regulator + line.offset
+        numbers["safety_moment"] = np.full(len(known), exercise.start_moment)
+        numbers["safety_pressure"] = line.gain * regulator + line.offset
     return numbers
 
 
 def _people(
     exercise: Exercise, options: Options, keys: NDArray[np.int64], episodes: NDArray[np.int64]
 ) -> NDArray[np.float64]:
-    if options.human == "random":
+    if options.operator == "random":
         return exercise.population.draw(keys, episodes * 4 + DRAW)
     typical = exercise.population.typical
-    one = options.human if isinstance(options.human, Operator) else typical
+    one = options.operator if isinstance(options.operator, Operator) else typical
     return np.tile(np.array(one), (len(keys), 1))
 
 

@@ -32,7 +32,7 @@ PORTS: dict[str, Port] = {
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "operator": "nobody settles a slide that nothing holds; take plant = 'station'",
+    "hand_push": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }
 """Effects that would fit a port and mean nothing there, and why."""

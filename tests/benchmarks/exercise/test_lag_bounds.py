@@ -22,8 +22,8 @@ TYPICAL = PACED.typical
 EXACT = TYPICAL._replace(unsteadiness=0.0, tremor=0.0, effort=1.0, reaction=0.15)
 
 
-def exertion(lag, human=EXACT, task="isokinetic_exercise", **more):
-    return Exertion(task, 3, STATION.replace({LAG: lag}), human=human, **more)
+def exertion(lag, operator=EXACT, task="isokinetic_exercise", **more):
+    return Exertion(task, 3, STATION.replace({LAG: lag}), operator=operator, **more)
 
 
 @pytest.fixture(scope="module")
@@ -137,7 +137,7 @@ def test_the_station_wanders_as_the_linear_plant_less_what_friction_holds():
     steady, count = EXACT._replace(unsteadiness=TYPICAL.unsteadiness, fatigue=0.0), 64
     task = "isokinetic_exercise"
     environments = PMAVectorEnv(
-        count, task, pressure_kpa=450.0, human=steady, safety=False, noise=False
+        count, task, pressure_kpa=450.0, operator=steady, safety=False, noise=False
     )
     environments.reset(seed=1)
     volts = float(environments.engine.numbers("rest_regulator")[0])

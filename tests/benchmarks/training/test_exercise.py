@@ -146,7 +146,7 @@ def test_drawn_stations_carry_the_leg_that_controllers_are_told_of():
 def test_operators_differ_from_seed_to_seed():
     envs = PMAVectorEnv(4, "isokinetic_exercise", pressure_kpa=400.0)
     envs.reset(seed=4_000_000)
-    efforts = envs.engine.numbers("human_effort")
+    efforts = envs.engine.numbers("operator_effort")
     assert len(set(efforts.tolist())) == 4
     envs.close()
 

@@ -23,7 +23,7 @@ CASES = {
     "residual, late, disturbed": (
         ObservationSpec("tracking", 1, 2),
         ActionMapping("residual", 0.3, "feedforward_pid"),
-        LATE | {"disturbances": "regulator_and_operator", "pressure_kpa": [200.0, 400.0]},
+        LATE | {"disturbances": "regulator_and_hand_push", "pressure_kpa": [200.0, 400.0]},
     ),
     "another model": (
         ObservationSpec("tracking", 1, 1),

@@ -45,7 +45,7 @@ def test_rotation_is_followed_to_half_a_degree(pressure):
 
 def test_the_late_loop_has_policies_of_its_own():
     late = {"control_rate_hz": 50.0, "action_delay_s": 0.02}
-    disturbed = late | {"disturbances": "regulator_and_operator"}
+    disturbed = late | {"disturbances": "regulator_and_hand_push"}
     assert driven(PMAEnv("displacement", pressure_kpa=300.0, **late), PPOPolicy())["rmse_mm"] < 0.4
     info = driven(PMAEnv("rotation", pressure_kpa=400.0, **disturbed), PPOPolicy())
     assert info["rmse_deg"] < 2.0

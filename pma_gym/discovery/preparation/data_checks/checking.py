@@ -54,7 +54,9 @@ def check_dataset(dataset: Dataset, model: Model, stop: bool = True) -> Dataset:
         named = _started(named, Plant(model), wholes, words)
     named, said = averaged(named)
     words += said
-    return replace(dataset, trials=tuple(named), checked=tuple(words))
+    # What the lab states of a sensor is no longer true of averages of its readings.
+    sensors = {} if said else dataset.sensors
+    return replace(dataset, trials=tuple(named), checked=tuple(words), sensors=sensors)
 
 
 def _refuse(proposals: Sequence[str], stop: bool, words: list[str]) -> None:

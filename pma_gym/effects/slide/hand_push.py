@@ -6,8 +6,8 @@ from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
 
-class Operator(NamedTuple):
-    """Parameters of `operator_force`."""
+class HandPush(NamedTuple):
+    """Parameters of `hand_push_force`."""
 
     share: Annotated[
         float,
@@ -17,7 +17,7 @@ class Operator(NamedTuple):
     ]
 
 
-def operator_force(memory, p):
+def hand_push_force(memory, p):
     """Force of a hand on the slide.
 
         F = share * f
@@ -27,7 +27,7 @@ def operator_force(memory, p):
 
     Args:
         memory: the hand's force f (N), written from outside as a command is.
-        p: Operator: share.
+        p: HandPush: share.
     Returns:
         Force (N); positive shortens the muscle.
     Source:
@@ -36,26 +36,26 @@ def operator_force(memory, p):
     return p.share * memory
 
 
-def operator_rate(memory, p):
+def hand_push_rate(memory, p):
     """Rate of the hand's force: none, it stays as it was written.
 
     Args:
         memory: the hand's force (N).
-        p: Operator.
+        p: HandPush.
     Returns:
         (source, decay) of 0.
     """
     return 0.0 * memory, 0.0 * memory
 
 
-OPERATOR = Effect(
-    name="operator",
+HAND_PUSH = Effect(
+    name="hand_push",
     replaces="person",
     port="slide_force",
-    parameters=Operator,
+    parameters=HandPush,
     held=("share",),
-    law=operator_force,
-    rate=operator_rate,
+    law=hand_push_force,
+    rate=hand_push_rate,
     signature="pulses of force that no command explains",
     memory_scale=50.0,
 )
