@@ -7,32 +7,32 @@ from pma_gym.units import Quantity
 
 
 class Spring(NamedTuple):
-    """Parameters of `spring_force` along a line."""
+    """Parameters of `linear_spring` along a line."""
 
     stiffness: Annotated[float, Quantity("N/mm", 0, 1e6, "assumption: 1", 0.0, usual=1)]
     rest: Annotated[float, Quantity("mm", -1e5, 1e5, "where it is relaxed: 0", usual=0.0)]
 
 
 class JointSpring(NamedTuple):
-    """Parameters of `spring_force` about an axis."""
+    """Parameters of `linear_spring` about an axis."""
 
     stiffness: Annotated[float, Quantity("N m/rad", 0, 1e6, "assumption: 0.5", 0.0, usual=0.5)]
     rest: Annotated[float, Quantity("deg", -1e4, 1e4, "where it is relaxed: 0", usual=0.0)]
 
 
 class HardeningSpring(NamedTuple):
-    """Parameters of `hardening_force` along a line."""
+    """Parameters of `cubic_spring` along a line."""
 
     cubic: Annotated[float, Quantity("N/mm^3", 0, 1e6, "assumption: 1e-4", 0.0, usual=1e-4)]
 
 
 class JointHardeningSpring(NamedTuple):
-    """Parameters of `hardening_force` about an axis."""
+    """Parameters of `cubic_spring` about an axis."""
 
     cubic: Annotated[float, Quantity("N m/rad^3", 0, 1e6, "assumption: 0.5", 0.0, usual=0.5)]
 
 
-def spring_force(position, p):
+def linear_spring(position, p):
     """Force of a linear spring.
 
         F = -stiffness (x - rest)
@@ -48,7 +48,7 @@ def spring_force(position, p):
     return -p.stiffness * (position - p.rest)
 
 
-def hardening_force(position, p):
+def cubic_spring(position, p):
     """Force of a spring without a linear part.
 
         F = -cubic x^3
@@ -71,27 +71,27 @@ SPRING = Effect(
     name="spring",
     port="contact_force",
     parameters=Spring,
-    law=spring_force,
+    law=linear_spring,
     signature=_LINEAR,
 )
 JOINT_SPRING = Effect(
     name="joint_spring",
     port="joint_torque",
     parameters=JointSpring,
-    law=spring_force,
+    law=linear_spring,
     signature="torque in proportion to the angle",
 )
 HARDENING_SPRING = Effect(
     name="hardening_spring",
     port="contact_force",
     parameters=HardeningSpring,
-    law=hardening_force,
+    law=cubic_spring,
     signature=_CUBIC,
 )
 JOINT_HARDENING_SPRING = Effect(
     name="joint_hardening_spring",
     port="joint_torque",
     parameters=JointHardeningSpring,
-    law=hardening_force,
+    law=cubic_spring,
     signature=_CUBIC,
 )
