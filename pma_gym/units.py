@@ -20,6 +20,7 @@ SI_FACTORS: dict[str, float] = {
     "mm": 1e-3,
     "um": 1e-6,
     "in": 0.0254,
+    "mm^2": 1e-6,
     "deg": math.pi / 180.0,
     "rad": 1.0,
     "N": 1.0,

@@ -15,6 +15,7 @@ from pma_gym.effects.contact.load_dependent_friction import (
     JOINT_LOAD_FRICTION,
     LOAD_DEPENDENT_FRICTION,
 )
+from pma_gym.effects.contact.piston_force import PISTON_FORCE
 from pma_gym.effects.contact.pressure_friction import PRESSURE_FRICTION
 from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
 from pma_gym.effects.contact.spring import (
@@ -170,6 +171,7 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_START,
         *JOINT_SENSORS,
         IMPOSED_MOTION,
+        PISTON_FORCE,
         CONSTANT_FORCE,
         PRESSURE_FRICTION,
         COGGING,

@@ -13,7 +13,8 @@ from pma_gym.codegen.machine.builtin import builtin
 from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
-from pma_gym.engine.options import Options, Pressure
+from pma_gym.engine.option_checks import Pressure
+from pma_gym.engine.options import Options
 from pma_gym.engine.reset.episodes import FIRST, LAST, SETTLES, Episodes
 from pma_gym.engine.snapshot import Snapshot, put, take
 from pma_gym.tasks import Task

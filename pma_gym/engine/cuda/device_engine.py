@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.cuda.kernel import THREADS, CudaKernel, Name
 from pma_gym.engine.engine import Engine
+from pma_gym.engine.nominal_rig import rig_model
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import Options, rig_model
+from pma_gym.engine.options import Options
 from pma_gym.engine.reset.reset_state import hangs_slack
 from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.compiled_model import regulator_voltage

@@ -69,7 +69,11 @@ def write_equations(equations: PlantEquations) -> None:
     at_once = corner * eq["pressure_command"], corner
     force = eq.total("muscle_force") + eq.total("slide_force") + eq.total("contact_force")
     resistance = eq.total("muscle_damping") * eq.product("damping_factor")
-    eq.outputs = {"force": force - resistance * eq["velocity"], "pressure": eq["pressure"]}
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "force": force - resistance * eq["velocity"],
+        "pressure": eq["pressure"],
+    }
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state("velocity", acceleration, SCALES["velocity"])
     source = eq.one("regulator_lag") if lag else at_once
@@ -95,7 +99,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 
 IMPOSED = Rig(
     name="imposed",
-    signals=signals("force", "pressure"),
+    signals=signals("contraction", "force", "pressure"),
     ports=PORTS,
     parts=(),
     position_tolerances={"contraction": 0.001, "velocity": 0.01},
@@ -110,5 +114,12 @@ IMPOSED = Rig(
     has_muscle=False,
     is_diagnosable=True,
     imposes_motion=True,
+    needed_ports={
+        "muscle_force": "muscle_force",
+        **dict.fromkeys(
+            ("regulator_delay", "regulator_lag", "regulator_pace", "chamber"), "regulator_line"
+        ),
+    },
+    shown_shapes=("presliding",),
     direct_commands={"imposed_motion": "contraction_command"},
 )
