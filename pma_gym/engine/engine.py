@@ -29,7 +29,7 @@ LEAST_BEGUN = 32
 BEGUN_PARTS = 8
 """Parts of a thread's share of these."""
 
-_BEGINNING = 1
+_RESET = 1
 """The pool's second work; the first is a step."""
 
 
@@ -145,7 +145,7 @@ class Engine(Episodes):
         parts = self._beginnings
         edges = np.arange(len(parts) + 1) * count // len(parts)
         parts[:, FIRST], parts[:, LAST], parts[:, SETTLES] = edges[:-1], edges[1:], settles
-        self._threads.run(_BEGINNING)
+        self._threads.run(_RESET)
 
     def close(self) -> None:
         """End the threads."""

@@ -71,9 +71,9 @@ class SimulatedTrials:
         self.plant, self.threads = Plant(model, tolerance), threads
         self.interpolation: Interpolation = interpolation
         self.free = free_parameters(self.plant.model, free)
-        places = [parameter.place for parameter in self.free]
+        indices = [parameter.place for parameter in self.free]
         self.factors = np.array([parameter.quantity.factor for parameter in self.free])
-        self.start: Array = self.plant.vector[places] / self.factors
+        self.start: Array = self.plant.vector[indices] / self.factors
         self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
         self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
         self.deviations: Array = sensors.deviations(self.plant.model)
@@ -91,10 +91,10 @@ class SimulatedTrials:
             paths = dict(
                 zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
             )
-            self._begun = self._places({path: list(row) for path, row in paths.items()})
+            self._begun = self._indices({path: list(row) for path, row in paths.items()})
         guesses = memory_start.first_guesses(trials)
         nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
-        self._memories = self._places({path: list(guesses) for path in nuisances})
+        self._memories = self._indices({path: list(guesses) for path in nuisances})
         self._reaches = [memory_start.reach(trial) for trial in trials]
 
     def _each(
@@ -126,8 +126,8 @@ class SimulatedTrials:
         moved = self._moved_starts()
         count, number = len(tried) + len(moved), len(self.plant.states)
         every = self._every(np.concatenate([vectors, *([vectors[:1]] * len(moved))]))
-        for further, places in enumerate(moved, len(tried)):
-            for place, move in places:
+        for further, indices in enumerate(moved, len(tried)):
+            for place, move in indices:
                 every[further::count, place] += move
         tables = self._tables(every, count)
         first = np.array([logged.first for logged in self._trials])
@@ -220,7 +220,7 @@ class SimulatedTrials:
         parts = np.split(every, len(self._trials))
         return [[table(program, vector) for vector in part] for part in parts]
 
-    def _places(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
+    def _indices(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
         """Where values (SI) go that a parameter has in each trial, by its path."""
         free = free_parameters(self.plant.model, list(own))
         return [(each.place, np.asarray(own[each.path], float)) for each in free]

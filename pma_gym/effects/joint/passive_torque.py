@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 from pma_gym.effects.arithmetic import cosine
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.slide.coulomb_friction import (
-    friction_bend,
+    friction_breakpoint,
     friction_force,
     friction_path,
-    stribeck_bend,
+    stribeck_breakpoint,
 )
 from pma_gym.units import Quantity
 
@@ -96,7 +96,7 @@ JOINT_FRICTION = Effect(
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,
-    path_breakpoint=friction_bend,
-    breakpoint=stribeck_bend,
+    path_breakpoint=friction_breakpoint,
+    breakpoint=stribeck_breakpoint,
     signature="odd step of torque at zero speed; the joint sticks under small changes of torque",
 )

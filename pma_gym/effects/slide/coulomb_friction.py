@@ -77,7 +77,7 @@ def friction_path(memory, travel, direction, p):
     return direction * (elastic + slipping * slip * (1.0 - 0.25 * slip))
 
 
-def friction_bend(memory, direction, p):
+def friction_breakpoint(memory, direction, p):
     """Way to where the deflection begins to bend over, or, from there, to where all bristles slip.
 
     Args:
@@ -115,7 +115,7 @@ def release_path(memory, direction, p):
     return p.presliding * positive(-direction * memory)
 
 
-def stribeck_bend(velocity, p):
+def stribeck_breakpoint(velocity, p):
     """Speed beyond that at which nine tenths of what static exceeds dynamic are gone.
 
     Args:
@@ -137,9 +137,9 @@ COULOMB_FRICTION = Effect(
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,
-    path_breakpoint=friction_bend,
+    path_breakpoint=friction_breakpoint,
     release_path=release_path,
-    breakpoint=stribeck_bend,
+    breakpoint=stribeck_breakpoint,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "
         "under small changes of load. Stribeck: static over dynamic, the step is higher within "

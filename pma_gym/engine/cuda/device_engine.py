@@ -107,8 +107,10 @@ class DeviceEngine:
         self._own_tables = options.randomisation != "none"
         pressures = self._pressures()
         # What comes beside pressure and rest is drawn by the processor.
-        alone = not self._own_tables and not self.state_layout.events and task.actuator == "motor"
-        self._draws = alone and self._hangs_slack(pressures)
+        undisturbed = (
+            not self._own_tables and not self.state_layout.events and task.actuator == "motor"
+        )
+        self._draws = undisturbed and self._hangs_slack(pressures)
         self.kernel = CudaKernel(
             self.nominal.program,
             self.state_layout,
