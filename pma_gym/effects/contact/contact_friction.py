@@ -67,7 +67,7 @@ def pressure_friction(pressure, memory, p):
 
 CONTACT_FRICTION = Effect(
     name="contact_friction",
-    port="contact_force",
+    port="rod_force",
     parameters=ContactFriction,
     law=contact_friction,
     rate_independent_law=friction_path,
@@ -76,7 +76,7 @@ CONTACT_FRICTION = Effect(
 )
 PRESSURE_FRICTION = Effect(
     name="pressure_friction",
-    port="contact_force",
+    port="rod_force",
     parameters=PressureFriction,
     law=pressure_friction,
     rate_independent_law=friction_path,

@@ -25,6 +25,7 @@ PORTS: dict[str, Port] = {
     "contact_force": Port(
         "force on what moves (N), added; positive in the direction of contraction"
     ),
+    "rod_force": Port("force of piston, seal and guide (N), added; positive likewise"),
     "lost_motion": Port("way that is lost before what rubs (m)", most=1),
     **{name: STATION_PORTS[name] for name in ("muscle_damping", "damping_factor", "chamber")},
     "regulator_line": Port("pressure that the regulator settles at (Pa)", most=1),
@@ -55,6 +56,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.travelled = (eq["contraction"], eq["velocity"])
     # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
     eq.let("command", eq["motor_voltage"])
+    eq.let("position", eq["contraction"])
     acceleration = eq.one("imposed_motion")
     regulated = bool(eq.at("regulator_line"))
     eq.let("pressure_asked", eq.one("regulator_line") if regulated else eq["regulator_voltage"])
@@ -64,7 +66,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("regulator_time_constant", lag.time_constant if lag else 1.0 / corner)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     at_once = corner * eq["pressure_command"], corner
-    force = eq.total("muscle_force") + eq.total("contact_force")
+    force = eq.total("muscle_force") + eq.total("contact_force") + eq.total("rod_force")
     resistance = eq.total("muscle_damping") * eq.product("damping_factor")
     eq.outputs = {
         "contraction": eq["contraction"],
