@@ -12,6 +12,7 @@ from benchmarks.commands import (
     settings,
     simulator,
     suites,
+    targets,
     training,
 )
 from pma_gym.cli.options import StrictTyper
@@ -30,6 +31,7 @@ app = StrictTyper(
 # In the order in which --help lists the commands.
 reproduction.register(app)
 suites.register(app)
+targets.register(app)
 dissertation.register(app)
 settings.register(app)
 remake.register(app)

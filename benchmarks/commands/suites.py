@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from benchmarks.commands.options import (
     INTERRUPTED,
@@ -27,8 +26,6 @@ def register(app: typer.Typer) -> None:
         epilog="Example: python -m benchmarks run --suite robust --controllers pid,mine.py:Mine"
     )(run)
     app.command(epilog="Example: python -m benchmarks report robust")(report)
-    # For those who work on the project: a user sees results, not what was aimed at.
-    app.command(hidden=True, epilog="Example: python -m benchmarks targets robust")(targets)
     app.command(epilog="Example: python -m benchmarks add mine.py:Mine --suite hard")(add)
     app.command(epilog="Example: python -m benchmarks remove Mine --suite hard")(remove)
     app.command(epilog="Example: python -m benchmarks suites")(suites)
@@ -100,39 +97,6 @@ def report(
         print(f"Report: {page}")
     except SuiteError as error:
         refuse(error)
-
-
-def targets(
-    suite: Annotated[str, typer.Argument(help="Name, see `suites`, or path of a TOML file.")],
-    results: Annotated[
-        Path | None, typer.Option(help="Folder of the run; results/SUITE if not given.")
-    ] = None,
-    as_json: JsonOption = False,
-) -> None:
-    """Check a run against what its suite asks for; exit code 1 if a target is missed."""
-    from benchmarks.bounds.cache import Bounds
-    from benchmarks.report.leaderboard import read_leaderboard
-    from benchmarks.report.tables import verdict_table
-    from benchmarks.suites.frozen import frozen_suite
-    from benchmarks.suites.reproduction import SuiteError
-    from pma_gym.terminal import table_console
-
-    try:
-        frozen = frozen_suite(suite)
-        folder = results or RESULTS / frozen.name
-        with Bounds(frozen.model, folder) as bounds:
-            checks = read_leaderboard(frozen, folder, bounds).verdicts
-    except SuiteError as error:
-        refuse(error)
-    if as_json:
-        print_json([check.document() for check in checks])
-    else:
-        table = verdict_table(checks)
-        shown = Table(*table.header, title=table.title)
-        for row in table.rows:
-            shown.add_row(*row)
-        table_console().print(shown)
-    raise typer.Exit(1 if any(check.word == "missed" for check in checks) else 0)
 
 
 def add(

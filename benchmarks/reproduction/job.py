@@ -13,6 +13,7 @@ from benchmarks.reproduction.pictured import pictured_trials
 from benchmarks.reproduction.report import write_report
 from benchmarks.reproduction.results import Results, Score, scores_of
 from benchmarks.reproduction.summary import print_summary
+from benchmarks.reproduction.targets import Check, check_targets
 from benchmarks.runner.execution import pending_cases
 from benchmarks.runner.provenance import check_run, read_run
 from benchmarks.runner.run import FAILED, INTERRUPTED, SuiteRun, run_missing, say_interrupted
@@ -63,6 +64,34 @@ def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Ex
     Raises:
         SuiteError: not all of the suite is there.
     """
+    run = _finished_run(suite, folder)
+    out.mkdir(parents=True, exist_ok=True)
+    write_report(_results(suite, run, folder, executor), out)
+    return out / "report.html"
+
+
+def targets_again(suite: ReproductionSuite, folder: Path, executor: Executor) -> list[Check]:
+    """Check a run that is in a folder against the suite's targets; nothing is scored.
+
+    Args:
+        suite: what was run.
+        folder: of the run.
+        executor: where bounds that the folder lacks are computed.
+    Returns:
+        The targets, with what the run got.
+    Raises:
+        SuiteError: not all of the suite is there.
+    """
+    run = _finished_run(suite, folder)
+    return check_targets(_results(suite, run, folder, executor, pictures=False))
+
+
+def _finished_run(suite: ReproductionSuite, folder: Path) -> SuiteRun:
+    """The whole run in a folder.
+
+    Raises:
+        SuiteError: not all of the suite is there.
+    """
     todo, info = pending_cases(suite, suite.entries, folder), read_run(folder)
     if todo.missing or not info.get("complete"):
         raise SuiteError(
@@ -70,10 +99,7 @@ def report_again(suite: ReproductionSuite, folder: Path, out: Path, executor: Ex
             f"run them: python -m benchmarks run --suite {suite.source} --out {folder}"
         )
     check_run(folder, info, suite.source)
-    out.mkdir(parents=True, exist_ok=True)
-    run = SuiteRun(todo, list(todo.known.values()), info, 0.0, complete=True)
-    write_report(_results(suite, run, folder, executor), out)
-    return out / "report.html"
+    return SuiteRun(todo, list(todo.known.values()), info, 0.0, complete=True)
 
 
 def _reported(
@@ -91,15 +117,21 @@ def _reported(
     return results
 
 
-def _results(suite: ReproductionSuite, run: SuiteRun, folder: Path, executor: Executor) -> Results:
-    """What the report is made of: scores, bounds, and the trials that it draws.
+def _results(
+    suite: ReproductionSuite,
+    run: SuiteRun,
+    folder: Path,
+    executor: Executor,
+    pictures: bool = True,
+) -> Results:
+    """What the report is made of: scores, bounds, and, if wanted, the trials that it draws.
 
     Raises:
         KeyboardInterrupt: Ctrl-C; bounds that are done stay in the folder.
     """
     scores = scores_of(suite, run.rows)
     failed = {score.case.name for score in scores if score.failure}
-    pictured = pictured_trials(suite, run.todo, failed, executor)
+    pictured = pictured_trials(suite, run.todo, failed, executor) if pictures else {}
     pressures = suite.pressures_kpa.get("rotation", ())
     with Bounds(suite.models[0], folder) as bounds:
         failures, complete = bounds.compute([("rotation", p) for p in pressures], executor)

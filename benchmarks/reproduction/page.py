@@ -3,13 +3,13 @@
 from collections.abc import Mapping
 from typing import Any
 
+from benchmarks.reproduction.interactive import rmse_figure, tracking_figure
 from benchmarks.reproduction.plots import actual_against_ideal_plot, tracking_plot
 from benchmarks.reproduction.replay import all_replay_errors
 from benchmarks.reproduction.replay_page import replay_blocks
 from benchmarks.reproduction.results import Results
 from benchmarks.reproduction.summary_plots import replay_plot, rmse_plot
-from benchmarks.reproduction.tables import regression_table, rmse_table, target_table
-from benchmarks.reproduction.targets import Check
+from benchmarks.reproduction.tables import regression_table, rmse_table, summary_table
 from benchmarks.runner.phase_score import PHASES
 from pma_gym.pages.document import Block, Heading, Paragraph, Picture, TextTable
 from pma_gym.plant.model import load_model
@@ -23,11 +23,11 @@ _KNOWLEDGE = (
 )
 
 
-def report_blocks(results: Results, checks: list[Check]) -> list[Block]:
+def report_blocks(results: Results) -> list[Block]:
     """The whole report."""
     suite = results.suite
     main = suite.models[0]
-    blocks: list[Block] = [*_opening(results), Heading("Targets"), target_table(checks, main)]
+    blocks: list[Block] = [*_opening(results), summary_table(results)]
     for task in suite.pressures_kpa:
         blocks += _task_blocks(results, task, main)
     blocks += replay_blocks(results)
@@ -83,12 +83,15 @@ def _task_blocks(results: Results, task: str, model: str) -> list[Block]:
             f"rmse_{task}",
             "RMSE by pressure, on a logarithmic scale; grey is what the dissertation measured "
             "with its feed-forward.",
+            printed=True,
         ),
+        rmse_figure(results, task),
         Picture(
             f"tracking_{task}",
             f"Response, error and motor voltage at {named} kPa (response: as figure {over_time} of "
             "the dissertation). Of the measured trials only the regression lines are printed.",
         ),
+        *([tracking_figure(results, task)] if pictured else []),
         Picture(
             f"actual_against_ideal_{task}",
             f"Actual against ideal {task} at {named} kPa, as figure {against_ideal} of the "

@@ -20,12 +20,13 @@ from pma_gym.units import SI_FACTORS
 _ENLARGED = {"displacement": 0.4, "rotation": 1.6}
 """Half the height of the enlarged error (mm, deg): four times what feedback is to reach."""
 
-_LABELS = {"displacement": "extension", "rotation": "rotation"}
+LABELS = {"displacement": "extension", "rotation": "rotation"}
+"""What the position of a task is called."""
 
 
 def tracking_plot(results: Results, task: str) -> bytes:
     """Response, error and motor voltage over time at a low, a middle and a high pressure."""
-    pressures = _pictured(results, task)
+    pressures = pictured_pressures(results, task)
     styles = controller_styles(results.suite)
     unit = UNITS[task]
     with picture(11.0, 10.5) as figure:
@@ -37,7 +38,7 @@ def tracking_plot(results: Results, task: str) -> bytes:
             for name, trial in results.trials(task, pressure).items():
                 _draw_trial(panels, trial, PROTOCOLS[task], styles[name])
             panels[-1].set_xlabel("time (s)")
-        axes[0, 0].set_ylabel(f"{_LABELS[task]} ({unit})")
+        axes[0, 0].set_ylabel(f"{LABELS[task]} ({unit})")
         axes[1, 0].set_ylabel(f"actual − ideal ({unit})")
         axes[2, 0].set_ylabel(f"actual − ideal ({unit}),\nenlarged")
         axes[2, 0].set_ylim(-_ENLARGED[task], _ENLARGED[task])
@@ -50,7 +51,7 @@ def tracking_plot(results: Results, task: str) -> bytes:
 
 def actual_against_ideal_plot(results: Results, task: str) -> bytes:
     """Actual position over the ideal one, as figures 32 and 36 have it."""
-    pressures = _pictured(results, task)
+    pressures = pictured_pressures(results, task)
     styles = controller_styles(results.suite)
     unit = UNITS[task]
     protocol = PROTOCOLS[task]
@@ -60,19 +61,19 @@ def actual_against_ideal_plot(results: Results, task: str) -> bytes:
         for axis, pressure in zip(axes[0], pressures, strict=True):
             axis.set_title(f"{pressure:g} kPa")
             axis.plot([0.0, span], [0.0, span], zorder=4, **REFERENCE)
-            for time, line in _measured_lines(task, pressure):
+            for time, line in measured_lines(task, pressure):
                 axis.plot(protocol.reference(time) / SI_FACTORS[unit], line, zorder=1, **MEASURED)
             for name, trial in results.trials(task, pressure).items():
                 position = trial.truth[protocol.quantity] / SI_FACTORS[unit]
                 ideal = protocol.reference(trial.time) / SI_FACTORS[unit]
                 axis.plot(ideal, position, color=styles[name].color, zorder=2)
-            axis.set_xlabel(f"ideal {_LABELS[task]} ({unit})")
-        axes[0, 0].set_ylabel(f"actual {_LABELS[task]} ({unit})")
+            axis.set_xlabel(f"ideal {LABELS[task]} ({unit})")
+        axes[0, 0].set_ylabel(f"actual {LABELS[task]} ({unit})")
         legend_below(figure, _handles(styles), 3)
         return png(figure)
 
 
-def _pictured(results: Results, task: str) -> list[float]:
+def pictured_pressures(results: Results, task: str) -> list[float]:
     """The pressures that are drawn and have a trial."""
     return [p for p in results.suite.pictured_kpa[task] if results.trials(task, p)]
 
@@ -95,12 +96,12 @@ def _draw_measured(panels: Sequence[Axes], task: str, pressure: float) -> None:
     panels[0].plot(grid, protocol.reference(grid) / unit, zorder=4, **REFERENCE)
     for panel in panels[1:3]:
         panel.axhline(0.0, zorder=4, **REFERENCE)
-    for time, line in _measured_lines(task, pressure):
+    for time, line in measured_lines(task, pressure):
         panels[0].plot(time, line, zorder=1, **MEASURED)
         panels[1].plot(time, line - protocol.reference(time) / unit, zorder=1, **MEASURED)
 
 
-def _measured_lines(
+def measured_lines(
     task: str, pressure: float
 ) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Times (s) and positions (unit) of the regression line of each phase."""

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from statistics import fmean
 
+from benchmarks.reproduction.interactive import replay_figure
 from benchmarks.reproduction.reading_page import reading_blocks
 from benchmarks.reproduction.replay import ReplayError, all_replay_errors, summarise, table_angle
 from benchmarks.reproduction.results import Results
@@ -28,7 +29,8 @@ def replay_blocks(results: Results) -> list[Block]:
             f"The dissertation's printed voltages drive `{model}`; what comes out is compared "
             f"with what the real station did. Errors are simulated less measured. {_origin(model)}"
         ),
-        Picture("replay_errors", "Errors of the replay, trial by trial."),
+        Picture("replay_errors", "Errors of the replay, trial by trial.", printed=True),
+        replay_figure(results),
     ]
     displacement = errors.get(("displacement", "displacement"))
     if displacement:

@@ -24,7 +24,7 @@ def write_report(results: Results, out: Path) -> None:
     """
     pictures = report_pictures(results)
     checks = check_targets(results)
-    blocks = report_blocks(results, checks)
+    blocks = report_blocks(results)
     errors = all_replay_errors(results, results.suite.models[0])
     texts = {
         "report.md": to_markdown(blocks, pictures, PLOTS),

@@ -13,7 +13,7 @@ from benchmarks.runner.phase_score import PHASES, UNITS, measured_score
 from pma_gym.pages.figures import legend_below, picture, png
 
 _GREY = "#666666"
-_QUANTITY_LABELS = {
+QUANTITY_LABELS = {
     "slope": "slope ({unit}/s)",
     "intercept": "intercept ({unit})",
     "mean": "mean position ({unit})",
@@ -21,6 +21,7 @@ _QUANTITY_LABELS = {
     "line_error": "line part ({unit})",
     "scatter": "scatter ({unit})",
 }
+"""What the errors of a replay are called; `unit` is mm or deg."""
 
 
 def rmse_plot(results: Results, task: str) -> bytes:
@@ -75,7 +76,7 @@ def replay_plot(results: Results) -> bytes:
                 axis.bar(places, [getattr(t, quantity) for t in trials], 0.7, color=color)
                 axis.axhline(0.0, color="black", linewidth=0.9)
                 axis.axhline(means[quantity], color=_GREY, linewidth=1.2, linestyle=(0, (4, 2)))
-                axis.set_ylabel(_QUANTITY_LABELS[quantity].format(unit=UNITS[task]))
+                axis.set_ylabel(QUANTITY_LABELS[quantity].format(unit=UNITS[task]))
                 axis.grid(visible=False, axis="x")
             labels = [f"{trial.pressure_kpa:g}" for trial in trials]
             axes[-1, column].set_xticks(places, labels, rotation=90)

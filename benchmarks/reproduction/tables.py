@@ -5,8 +5,7 @@ from statistics import fmean
 
 from benchmarks.reproduction.replay import QUANTITIES, ReplayError, summarise
 from benchmarks.reproduction.results import Results
-from benchmarks.reproduction.targets import Check
-from benchmarks.runner.phase_score import UNITS, PhaseScore, measured_score
+from benchmarks.runner.phase_score import PHASES, UNITS, PhaseScore, measured_score
 from benchmarks.suites.reproduction import MEASURED
 from pma_gym.pages.document import TextTable
 
@@ -31,6 +30,23 @@ def columns(results: Results, model: str, task: str, phase: str) -> dict[str, Fi
         name = controller.name
         by_title[controller.label] = lambda p, name=name: results.phase(model, name, task, p, phase)
     return by_title
+
+
+def summary_table(results: Results) -> TextTable:
+    """RMSE over the pressures of each phase on the first model, mean and largest, for everybody."""
+    main = results.suite.models[0]
+    header, rows = ["Controller"], dict[str, list[str]]()
+    for task, pressures in results.suite.pressures_kpa.items():
+        for phase in PHASES[task]:
+            name = "Displacement" if task == phase else f"Rotation {phase}"
+            header.append(f"{name} ({UNITS[task]})")
+            for who, figures in columns(results, main, task, phase).items():
+                known = [score.rmse for p in pressures if (score := figures(p))]
+                failed = len(known) < len(pressures)
+                cell = MISSING if failed else f"{fmean(known):.3g} ({max(known):.3g})"
+                rows.setdefault(who, []).append(cell)
+    title = f"RMSE on {main}: mean (largest) over the pressures"
+    return TextTable(title, header, [[who, *cells] for who, cells in rows.items()])
 
 
 def rmse_table(results: Results, model: str, task: str, phase: str) -> TextTable:
@@ -90,20 +106,6 @@ def replay_table(errors: Sequence[ReplayError]) -> TextTable:
     part = "Displacement" if phase == "displacement" else f"Rotation, phase {phase}"
     title = f"{part}: simulated less measured"
     return TextTable(title, header, [*rows, RULE, signed, absolute])
-
-
-def target_table(checks: Iterable[Check], model: str) -> TextTable:
-    """Targets, what was got on a model, met or missed."""
-    rows = [
-        [
-            check.what,
-            f"{'<' if check.strict else '≤'} {check.limit:g} {check.unit}",
-            "—" if check.got is None else f"{check.got:.3g} {check.unit}",
-            check.verdict,
-        ]
-        for check in checks
-    ]
-    return TextTable(f"On `{model}`", ["What", "Target", "This run", "Verdict"], rows)
 
 
 def _rmse_cells(score: PhaseScore | None) -> tuple[str, str]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from benchmarks.reproduction.replay import replay_errors, summarise
 from benchmarks.reproduction.results import Results
 from benchmarks.runner.controller_spec import ControllerSpec
+from pma_gym.pages.document import TextTable
 
 _SIMPLE = {"slope": "mm/s", "intercept": "mm", "rmse": "mm"}
 _NAMES = {"slope": "slope", "intercept": "intercept", "rmse": "RMSE"}
@@ -41,6 +42,11 @@ class Check:
         """`met`, `missed` or `no figure`."""
         return {True: "met", False: "missed", None: "no figure"}[self.met]
 
+    def document(self) -> dict[str, object]:
+        """The target for programs."""
+        got = {"target": self.what, "limit": self.limit, "got": self.got}
+        return got | {"unit": self.unit, "verdict": self.verdict}
+
 
 def check_targets(results: Results) -> list[Check]:
     """Every target of the suite, on its first model."""
@@ -59,6 +65,21 @@ def check_targets(results: Results) -> list[Check]:
         ),
         Check("whole job", goals.wall_time_s, wall if whole else None, "s", strict=True),
     ]
+
+
+def target_table(checks: Iterable[Check], model: str) -> TextTable:
+    """Targets, what was got on a model, met or missed."""
+    rows = [
+        [
+            check.what,
+            f"{'<' if check.strict else '≤'} {check.limit:g} {check.unit}",
+            "—" if check.got is None else f"{check.got:.3g} {check.unit}",
+            check.verdict,
+        ]
+        for check in checks
+    ]
+    header = ["What", "Target", "This run", "Verdict"]
+    return TextTable(f"What the suite asks for, on {model}", header, rows)
 
 
 def _replay_checks(results: Results) -> list[Check]:

@@ -22,7 +22,7 @@ from pma_gym.discovery.preparation.learnt_noise import learnt_noise
 from pma_gym.discovery.preparation.mains_lines import with_lines
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.preparation.prepared_trials import prepared
-from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.preparation.quantisation import is_coarse
 from pma_gym.discovery.preparation.splits import fold_of_rows
 from pma_gym.discovery.screening.candidates import candidate_effects
 from pma_gym.discovery.screening.residuals import reestimated_noise, simulated_less_measured
@@ -127,13 +127,13 @@ class _Work:
     seconds: dict[str, float] = field(default_factory=dict)
 
     def run(self, search: bool) -> Diagnosis:
-        named, given, said = self._input()
-        named, words = prepared(named, given)
-        words = (*said, *words)
+        dataset, given = self._input()
+        named, words = prepared(dataset.trials, given)
+        words = (*(dataset.checked or ()), *words)
         trials = [each.trial for each in named]
         journal = Journal(self.folder, trials, given, f"diagnosis 3 seed {self.seed}")
         logged = [Logged.of(given, i, trial) for i, trial in enumerate(trials)]
-        floors = self._timed("noise", lambda: initial_floors(given, logged, named))
+        floors = self._timed("noise", lambda: initial_floors(given, logged, named, dataset.sensors))
         own = free_parameters(given)
         _check_size(logged, own.free)
         noise = tuple(white_noise(floor.level) for floor in floors)
@@ -144,7 +144,7 @@ class _Work:
             own,
             noise,
             max(1, self.jobs),
-            bool(coarse_sensors(floors)),
+            any(map(is_coarse, floors)),
             tuple(each.file or each.name for each in named),
         )
         self._tell("refitting parameters", 0, 1)
@@ -183,7 +183,7 @@ class _Work:
         warnings = (*words, *diagnosis.warnings)
         return replace(diagnosis, warnings=warnings, seconds=dict(self.seconds))
 
-    def _input(self) -> tuple[list[NamedTrial], Model, tuple[str, ...]]:
+    def _input(self) -> tuple[Dataset, Model]:
         asked = self.asked
         if not isinstance(asked, Dataset):
             named = [NamedTrial(f"trial {i + 1}", trial) for i, trial in enumerate(asked)]
@@ -200,7 +200,7 @@ class _Work:
         if asked.folder is not None and asked.checked is None:
             # Trials that come from files; what a program made needs no such doubts.
             asked = check_dataset(asked, model, self.checks)
-        return list(asked.trials), model, asked.checked or ()
+        return asked, model
 
     def _refitted(self, problem: FitProblem, journal: Journal) -> Fitted:
         refit = problem.careful_fit(problem.given)

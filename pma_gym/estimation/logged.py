@@ -1,12 +1,11 @@
 """Measured trials as a fit reads them."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.data import calibration
+from pma_gym.data.quality.daq_levels import at_daq_end
 from pma_gym.data.signals import VOLTAGE_RANGE, Signal
 from pma_gym.data.trial import Trial
 from pma_gym.plant import sensors
@@ -57,7 +56,8 @@ class Logged:
         nothing = np.full(len(trial.time), np.nan)
         signals = model.rig.signals
         measured = np.stack([trial.measurements.get(each.name, nothing) for each in signals])
-        absent = np.isnan(measured) | _at_an_end(signals, measured)
+        ends = [at_daq_end(each, row) for each, row in zip(signals, measured, strict=True)]
+        absent = np.isnan(measured) | np.stack(ends)
         if absent.all():
             raise ValueError(f"trial {number} has no measurements to fit a model to")
         return cls(
@@ -98,14 +98,3 @@ class Logged:
     def count(self) -> int:
         """How many readings there are."""
         return self.measured.size - sum(rows.size for rows in self.missing)
-
-
-def _at_an_end(signals: Sequence[Signal], measured: Array) -> NDArray[np.bool_]:
-    """Whether readings (SI), shape (signals, rows), are the first or last that the DAQ has."""
-    volts = np.stack(
-        [
-            np.zeros(len(row)) if each.calibration is None else each.calibration.to_volts(row)
-            for each, row in zip(signals, measured, strict=True)
-        ]
-    )
-    return np.abs(volts) >= calibration.DAQ_LIMIT - 1.5 * calibration.DAQ_STEP

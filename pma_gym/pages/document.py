@@ -52,10 +52,13 @@ class Picture:
     Attributes:
         name: of its file, without suffix.
         caption: below it.
+        printed: whether only print and Markdown have it, since an interactive figure shows the
+            same on a screen.
     """
 
     name: str
     caption: str
+    printed: bool = False
 
 
 @dataclass(frozen=True)
@@ -191,12 +194,13 @@ def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             return f"<ol>{''.join(f'<li>{_inline(item)}</li>' for item in items)}</ol>"
         case TextTable():
             return _html_table(block)
-        case Picture(name, caption) if name in pictures:
+        case Picture(name, caption, printed) if name in pictures:
             data = base64.b64encode(pictures[name]).decode("ascii")
             alt = html.escape(caption)
             width = _shown_width(pictures[name])
             image = f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{data}">'
-            return f"<figure>{image}<figcaption>{_inline(caption)}</figcaption></figure>"
+            shown = ' class="printed"' if printed else ""
+            return f"<figure{shown}>{image}<figcaption>{_inline(caption)}</figcaption></figure>"
         case InteractiveFigure(name, caption):
             plot = f'<div class="plot" id="figure-{html.escape(name)}"></div>'
             words = f"<figcaption>{_inline(caption)}</figcaption>"
@@ -230,7 +234,7 @@ def _html_table(table: TextTable) -> str:
     head = _html_header(table)
     prose = ' class="prose"' if table.words == columns else ""
     return (
-        f'<div class="wide"><table{prose}><caption>{_inline(table.title)}</caption>'
+        f'<div class="wide"><table{prose}><caption><span>{_inline(table.title)}</span></caption>'
         f"<thead>{head}</thead><tbody>{''.join(body)}</tbody></table></div>"
     )
 

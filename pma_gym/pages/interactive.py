@@ -15,6 +15,7 @@ from typing import Any
 from pma_gym.printable import printable
 
 _HERE = Path(__file__).parent
+_MARKED = 30
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class Trace:
         color: `#rrggbb`; empty for the colour of text.
         lines: whether points are joined.
         notes: what hovering shows beside the coordinates, a text a point; none if empty.
+        view: the view of the figure that shows it, which is also the label of its y axis, with
+            unit; empty for a trace that every view shows.
     """
 
     name: str
@@ -36,17 +39,20 @@ class Trace:
     color: str = ""
     lines: bool = True
     notes: Sequence[str] = ()
+    view: str = ""
 
 
 @dataclass(frozen=True)
 class InteractiveFigure:
     """A figure that only the HTML page has; print and Markdown have pictures.
 
+    Traces with different views make the figure one with a menu: the reader picks what it shows.
+
     Attributes:
         name: of the figure on its page.
         caption: below it.
         x_label: of the axis, with unit.
-        y_label: of the axis, with unit.
+        y_label: of the axis, with unit; unused where traces have views.
         traces: what is drawn.
         logarithmic: whether the y axis is.
     """
@@ -84,18 +90,29 @@ def _document(figure: InteractiveFigure) -> dict[str, Any]:
         "x": _safe(figure.x_label),
         "y": _safe(figure.y_label),
         "logarithmic": figure.logarithmic,
+        "views": [
+            _safe(view) for view in dict.fromkeys(each.view for each in figure.traces) if view
+        ],
         "traces": [
             {
                 "name": _safe(trace.name),
                 "x": [_number(value) for value in trace.x],
                 "y": [_number(value) for value in trace.y],
                 "color": trace.color,
-                "mode": "lines" if trace.lines else "markers",
+                "mode": _mode(trace),
+                "view": _safe(trace.view),
                 "notes": [_safe(note) for note in trace.notes],
             }
             for trace in figure.traces
         ],
     }
+
+
+def _mode(trace: Trace) -> str:
+    """What is drawn; a line of few points marks them, to be hovered over."""
+    if not trace.lines:
+        return "markers"
+    return "lines+markers" if len(trace.x) <= _MARKED else "lines"
 
 
 def _safe(text: str) -> str:

@@ -7,6 +7,7 @@ import pytest
 from benchmarks.report.publish import run_report
 from pma_gym.discovery.report.page import report_page
 from tests.benchmarks.report.test_leaderboard import write_run
+from tests.benchmarks.reproduction.test_report import run, suite  # noqa: F401 - fixtures
 from tests.discovery.conftest import *  # noqa: F403 - fixtures
 
 pytestmark = pytest.mark.browser
@@ -14,16 +15,17 @@ MOST_BYTES = 5_000_000
 
 
 @pytest.fixture(scope="module")
-def reports(tmp_path_factory, diagnoses):  # noqa: F811
-    """Files of a leaderboard and of a diagnosis, by name."""
+def reports(tmp_path_factory, diagnoses, run):  # noqa: F811
+    """Files of a leaderboard, of a diagnosis and of a reproduction, by name."""
     tmp_path = tmp_path_factory.mktemp("reports")
-    suite, results = write_run(tmp_path)
+    small, results = write_run(tmp_path)
     page = tmp_path / "diagnosis.html"
     page.write_text(report_page(diagnoses["effect"], "Rig 2", {"Seed": "3"}), encoding="utf-8")
-    return {"leaderboard": run_report(suite, results, tmp_path / "board"), "diagnosis": page}
+    board = run_report(small, results, tmp_path / "board")
+    return {"leaderboard": board, "diagnosis": page, "reproduction": run[1] / "report.html"}
 
 
-@pytest.fixture(params=["leaderboard", "diagnosis"])
+@pytest.fixture(params=["leaderboard", "diagnosis", "reproduction"])
 def report(request, reports):
     return reports[request.param]
 
@@ -67,6 +69,17 @@ def test_a_figure_zooms_hovers_and_filters(report, open_page):
     assert faults == []
 
 
+def test_a_menu_picks_what_a_figure_shows(reports, open_page):
+    page, faults = open_page(reports["reproduction"].as_uri())
+    plot, menu = page.locator("#figure-tracking-displacement"), page.locator(".pick select").first
+    assert menu.input_value() == "error at 350 kPa (mm)"
+    menu.select_option("motor voltage at 350 kPa (V)")
+    assert plot.evaluate("p => p._fullLayout.yaxis.title.text") == "motor voltage at 350 kPa (V)"
+    names = plot.evaluate("p => p._fullData.map(trace => trace.name)")
+    assert "Half" in names and "Ideal" not in names
+    assert faults == []
+
+
 def test_a_page_stays_small_and_loads_nothing(report, open_page):
     assert report.stat().st_size < MOST_BYTES
     page, _ = open_page(report.as_uri())
@@ -79,6 +92,10 @@ def test_print_has_pictures_and_no_interactive_figure(report, open_page):
     page.emulate_media(media="print")
     assert page.locator(".interactive").first.is_hidden()
     assert page.locator("figure img").first.is_visible()
+    if page.locator(".printed").count():
+        page.emulate_media(media="screen")
+        assert page.locator(".printed").first.is_hidden()
+        page.emulate_media(media="print")
     page.set_viewport_size({"width": 718, "height": 1000})  # A4 less margins, at 96 pixels an inch.
     wide = page.evaluate(
         "[...document.querySelectorAll('table, img')].map(e => e.getBoundingClientRect().right)"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from pma_gym.data.datasets.dataset import read_dataset
+from pma_gym.data.datasets.lab_sensors import LabSensor
 from pma_gym.data.files.trial_files import TrialWarning, write_trial
 from pma_gym.data.trial import Trial, TrialError
 
@@ -144,7 +145,7 @@ def test_two_files_of_one_name_are_refused(folder, twin):
     [
         (
             "titel = 'x'",
-            "format, trials, tolerance, standard_error, got 'titel' (did you mean 'title'?)",
+            "trials, tolerance, standard_error, got 'titel' (did you mean 'title'?)",
         ),
         ("title = 3", 'title in dataset.toml must be a text, title = "...", got 3'),
         ("title 3", "dataset.toml is not valid TOML: .*line 1"),
@@ -160,6 +161,11 @@ def test_two_files_of_one_name_are_refused(folder, twin):
         ("[trials.'ramp.csv']\nrepeat_of = 'ramp.csv'", "which is itself a repeat"),
         ("[columns]\n'U' = 'motor_volt'", "dataset.toml: [columns] 'U' must name one of"),
         ("[columns]\n'U' = { name = 'load_n', factor = 0 }", "'U' factor must not be 0"),
+        ("[sensors]\nload = { noise = 1 }", "got 'load' (did you mean 'load_n'?)"),
+        ("[sensors]\nload_n = 1", "load_n in [sensors] of dataset.toml must be a table of resol"),
+        ("[sensors]\nload_n = { nose = 1 }", "must be a table of resolution, noise, range, got"),
+        ("[sensors]\nload_n = { noise = 0 }", "noise of load_n in [sensors] of dataset.toml must"),
+        ("[sensors]\nload_n = { range = [5, 1] }", "must be two numbers in N, the lowest and"),
     ],
 )
 def test_a_description_that_cannot_be_used_is_refused(folder, text, message):
@@ -338,3 +344,13 @@ def test_a_degree_sign_is_a_unit_of_a_look_alike(folder):
     write(folder / "ramp.csv", **{"rotation_deg": None, "Angle (°)": NORMAL["rotation_deg"]})
     with pytest.warns(TrialWarning, match='"Angle .°." = "rotation_deg"$'):
         read_dataset(folder)
+
+
+def test_what_a_lab_states_of_its_sensors_is_read(folder):
+    write(folder / "ramp.csv")
+    describe(folder, "[sensors]\nload_n = { resolution = 0.5, noise = 1.5, range = [0, 50] }\n")
+    with pytest.warns(TrialWarning, match="load_n is at an end of its range, 0 to 50 N, in"):
+        dataset = read_dataset(folder)
+    assert dataset.sensors == {"load": LabSensor(0.5, 1.5, (0.0, 50.0))}
+    load = np.concatenate([each.trial.measurements["load"] for each in dataset.trials])
+    assert np.isnan(load).any() and np.nanmax(load) < 50.0

@@ -9,6 +9,7 @@ from pathlib import Path
 from pma_gym.data.datasets.dataset_checks import check_signals, empty_runs
 from pma_gym.data.datasets.dataset_files import PROPOSED, list_files, read_files
 from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description, read_description
+from pma_gym.data.datasets.lab_sensors import LabSensor, without_ends
 from pma_gym.data.files.trial_files import TrialWarning, trial_of
 from pma_gym.data.files.trial_hints import strange_columns
 from pma_gym.data.quality.wild_readings import wild_readings
@@ -59,6 +60,7 @@ class Dataset:
         checked: what the checks of the data said; None before they ran.
         tolerance: misfit that is good enough, by measurement (SI): `contraction`.
         standard_error: of readings that are rows of a table, by measurement (SI).
+        sensors: what the lab states of its sensors, by measurement.
     """
 
     title: str
@@ -70,6 +72,7 @@ class Dataset:
     checked: tuple[str, ...] | None = None
     tolerance: Mapping[str, float] = field(default_factory=dict)
     standard_error: Mapping[str, float] = field(default_factory=dict)
+    sensors: Mapping[str, LabSensor] = field(default_factory=dict)
 
     def __len__(self) -> int:
         """Number of trials."""
@@ -82,8 +85,8 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
     A file with several sheets, segments, groups or structures holds as many trials, with names like
     `march.xlsx#run2`. `dataset.toml` may give `title`, `model`, `[columns]` (the lab's names to
     ours, with factor and offset), `[format]`, `[trials."ramp.csv"]` with `order`, `repeat_of`,
-    `note` and `memory_at_start` (of the muscle's hysteresis, -1 to 1), `[tolerance]` and
-    `[standard_error]` (by measurement, in its unit). Hidden files and
+    `note` and `memory_at_start` (of the muscle's hysteresis, -1 to 1), `[tolerance]`,
+    `[standard_error]` and `[sensors]` (by measurement, in its unit). Hidden files and
     TOML files are passed over silently, all others with a warning.
 
     Args:
@@ -114,6 +117,7 @@ def read_dataset(folder: str | os.PathLike[str]) -> Dataset:
         description.form,
         tolerance=description.tolerance,
         standard_error=description.standard_error,
+        sensors=description.sensors,
     )
 
 
@@ -140,6 +144,9 @@ def _named(
         (path.name, each)
         for each in (*words, *empty_runs(path, trial, table), *_wild(trial, table))
     ]
+    trial = without_ends(
+        trial, description.sensors, lambda words: doubts.append((path.name, words))
+    )
     about = {**description.trials.get(path.name, {})}
     begun = about.pop("memory_at_start", None)
     return NamedTrial(path.name, replace(trial, memory_at_start=begun), **about)

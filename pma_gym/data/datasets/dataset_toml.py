@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from pma_gym.data.datasets.format_toml import file_format
+from pma_gym.data.datasets.lab_sensors import MOST_SIZE, LabSensor, lab_sensors
 from pma_gym.data.readers.table import PART, FileFormat
 from pma_gym.data.trial_checks import check_memory_at_start
 from pma_gym.data.trial_columns import COLUMNS, ColumnMap, TrialError, sources, suggestion
@@ -15,10 +16,7 @@ from pma_gym.documents import is_file, read_toml
 from pma_gym.units import SI_FACTORS
 
 DESCRIPTION = "dataset.toml"
-_KEYS = ("title", "model", "columns", "format", "trials", "tolerance", "standard_error")
-MOST_SIZE = 1e9
-"""Sizes of signals are smaller, in any unit of the columns."""
-
+_KEYS = ("title", "model", "columns", "format", "sensors", "trials", "tolerance", "standard_error")
 _TRIAL_KEYS = ("order", "repeat_of", "note", "memory_at_start")
 _LINE_FORM = (
     'a line is a table, [columns], or name = value, a text in quotes: "Weg" = "contraction_mm"'
@@ -38,6 +36,7 @@ class Description:
         trials: `order`, `repeat_of`, `note` and `memory_at_start` by file name.
         tolerance: misfit that is good enough, by measurement (SI): `contraction`.
         standard_error: of readings that are rows of a table, by measurement (SI).
+        sensors: what is stated of sensors, by measurement.
     """
 
     title: str = ""
@@ -47,6 +46,7 @@ class Description:
     trials: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     tolerance: Mapping[str, float] = field(default_factory=dict)
     standard_error: Mapping[str, float] = field(default_factory=dict)
+    sensors: Mapping[str, LabSensor] = field(default_factory=dict)
 
 
 def read_description(folder: Path, files: Sequence[str]) -> Description:
@@ -81,6 +81,7 @@ def read_description(folder: Path, files: Sequence[str]) -> Description:
         trials=_trials(_table(document, "trials"), files),
         tolerance=_sizes(document, "tolerance", "contraction_mm = 0.2"),
         standard_error=_sizes(document, "standard_error", "contraction_mm = 0.05"),
+        sensors=lab_sensors(_table(document, "sensors"), f"[sensors] of {DESCRIPTION}"),
     )
 
 

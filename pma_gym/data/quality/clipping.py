@@ -1,8 +1,9 @@
 """Sensors at an end of their range, found by what their readings do.
 
-A reading at an end says only that the truth lies beyond. Ends that are known (the DAQ's, or `range`
-in `[columns]`) are seen when a file is read; this module finds those that nobody wrote down: a
-sensor that stands exactly at its largest or smallest reading for long, while the commands move and
+A reading at an end says only that the truth lies beyond. Ends that are known (of raw volts, or
+`range` in `[columns]` and `[sensors]`) are seen when a file is read; this module finds the others:
+the station's DAQ, where readings keep to its levels; and those that nobody wrote down: a sensor
+that stands exactly at its largest or smallest reading for long, while the commands move and
 although its readings nowhere else stand as long.
 """
 
@@ -12,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.quality.daq_levels import at_daq_end
+from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import MEASUREMENTS, Trial
 from pma_gym.data.trial_columns import BY_QUANTITY
 from pma_gym.units import SI_FACTORS
@@ -78,7 +81,7 @@ def ends(trials: Sequence[Trial]) -> list[End]:
     limits = []
     for quantity in MEASUREMENTS:
         for sign in (1.0, -1.0):
-            end = _end(trials, quantity, sign)
+            end = _daq_end(trials, quantity, sign) or _end(trials, quantity, sign)
             if end is not None:
                 limits.append(end)
     return limits
@@ -93,6 +96,17 @@ def without(trials: Sequence[Trial], clipped: Sequence[End]) -> list[Trial]:
             values = np.where(rows, np.nan, trial.measurements[end.quantity])
             kept[number] = replace(trial, measurements={**trial.measurements, end.quantity: values})
     return kept
+
+
+def _daq_end(trials: Sequence[Trial], quantity: str, sign: float) -> End | None:
+    """One end of the DAQ's range, for readings that keep to its levels."""
+    rows, value = {}, 0.0
+    for number, trial in enumerate(trials):
+        row = trial.measurements.get(quantity, np.empty(0))
+        at = at_daq_end(SIGNALS[quantity], row) & (sign * row > 0.0)
+        if at.any():
+            rows[number], value = at, float(row[at][0])
+    return End(quantity, value, rows) if rows else None
 
 
 def _end(trials: Sequence[Trial], quantity: str, sign: float) -> End | None:

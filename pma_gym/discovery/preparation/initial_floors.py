@@ -1,18 +1,27 @@
-"""Noise floors as a diagnosis knows them before it has fitted anything."""
+"""Noise floors as a diagnosis knows them before it has fitted anything.
 
-from collections.abc import Sequence
+Sensors are the lab's: `[sensors]` of the data set states their noise and step, or rest segments
+and the steps of the readings tell them. What the model says of its sensors, and the station's DAQ
+for readings that keep to its levels, comes after that; last come the differences of neighbouring
+readings, which know nothing of slow noise.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.datasets.lab_sensors import LabSensor
+from pma_gym.data.quality.daq_levels import read_by_daq
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.preparation.acceptance_floors import difference
 from pma_gym.discovery.preparation.noise import (
     at_rest,
     distinct_readings,
     level_at_rest,
+    level_of_neighbours,
     sparse,
     step_between,
 )
@@ -21,6 +30,18 @@ from pma_gym.plant import sensors
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]
+
+STATED, REST, MODEL, NEIGHBOURS = (
+    "the lab's sensor",
+    "rest segments",
+    "the model's sensor",
+    "neighbouring readings",
+)
+"""Where a level comes from, the first that there is; beside `repeats`."""
+
+FINEST = 1e-7
+"""Noise, as a share of a signal's span, that any sensor has: no smaller level makes sense of a
+file's numbers."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +53,8 @@ class Level:
         source: where it is known from.
         by_source: what each source says.
         step: smallest step between readings; 0 if none shows.
-        expected_step: the step that the DAQ should have.
+        expected_step: the step that the sensor should have: the lab's, or of readings that keep to
+            its levels the DAQ's; 0 where nobody knows.
         distinct: how many readings differ from each other.
     """
 
@@ -46,31 +68,76 @@ class Level:
 
 
 def initial_floors(
-    model: Model, logged: Sequence[Logged], named: Sequence[NamedTrial]
+    model: Model,
+    logged: Sequence[Logged],
+    named: Sequence[NamedTrial],
+    stated: Mapping[str, LabSensor] | None = None,
 ) -> list[Level]:
-    """Levels of the rig's signals, in their order."""
-    assumed, steps, floors = sensors.noise_levels(model), sensors.resolutions(model), []
-    channels = zip(model.rig.signals, sensors.deviations(model).tolist(), strict=True)
-    for channel, (signal, unknown) in enumerate(channels):
-        resolution = float(steps[channel])
-        step = step_between(logged, channel)
-        rounding = (step or resolution) / np.sqrt(12.0)
-        sources = {"the model's sensor": float(np.hypot(assumed[channel], rounding))}
-        rest = level_at_rest(at_rest(logged, channel))
-        if rest is not None:
-            sources["rest segments"] = rest
-        repeats = _between_repeats(logged, named, channel)
-        if repeats is not None:
-            sources["repeats"] = repeats
-        source = next(name for name in ("rest segments", "the model's sensor") if name in sources)
-        parts = [_readings(each, channel) for each in logged if each.measures[channel]]
-        if rest is None and sparse(parts) and sources.get("repeats", 0.0) > sources[source]:
-            source = "repeats"
-        # Of what no trial measures and the model has no sensor for, nothing is known.
-        level = max(sources[source], float(rounding)) or unknown
-        distinct = len(distinct_readings(logged, channel))
-        floors.append(Level(signal, level, source, sources, step, resolution, distinct))
-    return floors
+    """Levels of the rig's signals, in their order.
+
+    Args:
+        model: what the trials are compared with.
+        logged: the trials as they are read.
+        named: the same, with what is known of repeats.
+        stated: what the lab states of its sensors, by signal.
+    """
+    assumed = sensors.noise_levels(model)
+    return [
+        _floor(signal, channel, assumed[channel], logged, named, (stated or {}).get(signal.name))
+        for channel, signal in enumerate(model.rig.signals)
+    ]
+
+
+def _floor(
+    signal: Signal,
+    channel: int,
+    assumed: float,
+    logged: Sequence[Logged],
+    named: Sequence[NamedTrial],
+    stated: LabSensor | None,
+) -> Level:
+    parts = [_readings(each, channel) for each in logged if each.measures[channel]]
+    step = step_between(logged, channel)
+    expected = _expected_step(signal, parts, stated)
+    rounding = (step or expected) / np.sqrt(12.0)
+    sources = _sources(parts, assumed, rounding, stated)
+    rest = level_at_rest(at_rest(logged, channel))
+    if rest is not None:
+        sources[REST] = rest
+    repeats = _between_repeats(logged, named, channel)
+    if repeats is not None:
+        sources["repeats"] = repeats
+    source = next(name for name in (STATED, REST, MODEL, NEIGHBOURS) if name in sources)
+    if rest is None and sparse(parts) and sources.get("repeats", 0.0) > sources[source]:
+        source = "repeats"
+    distinct = distinct_readings(logged, channel)
+    finest = FINEST * float(np.ptp(distinct)) if distinct.size else 0.0
+    level = max(sources[source], float(rounding), finest)
+    return Level(signal, level, source, sources, step, expected, len(distinct))
+
+
+def _expected_step(signal: Signal, parts: Sequence[Array], stated: LabSensor | None) -> float:
+    """The step that a sensor should have (SI); 0 where nobody knows."""
+    if stated is not None and stated.resolution is not None:
+        return stated.resolution
+    by_daq = all(read_by_daq(signal, part) for part in parts)
+    return signal.resolution if by_daq else 0.0
+
+
+def _sources(
+    parts: Sequence[Array], assumed: float, rounding: float, stated: LabSensor | None
+) -> dict[str, float]:
+    """Levels (SI) that are known without rest or repeats, by where they come from."""
+    sources = {}
+    if stated is not None and stated.noise is not None:
+        sources[STATED] = stated.noise
+    neighbours = 0.0 if sparse(parts) or assumed > 0.0 else level_of_neighbours(parts)
+    if neighbours:
+        sources[NEIGHBOURS] = neighbours
+    else:
+        # 1 of a sensor of which nothing at all is known, as in any fit.
+        sources[MODEL] = float(np.hypot(assumed, rounding)) or 1.0
+    return sources
 
 
 def _readings(logged: Logged, channel: int) -> Array:

@@ -35,6 +35,13 @@ ENOUGH = 120
 SLOW_S = (0.06, 0.15)
 """Lags (s) over which a residual still resembles itself only where the model is wrong."""
 
+USUAL, USUAL_SQUARE = 0.98, 0.8735
+"""Share of differences that is noise for certain, and mean square of such a share of normal
+numbers, the smallest."""
+
+MOST_STEPS = 4e6
+"""Most steps in a signal's span that are seen: an encoder of 50 nm over 0.2 m."""
+
 MOST_ORDER = 6
 """Highest order of an autoregression."""
 
@@ -120,6 +127,24 @@ def level_at_rest(segments: Sequence[Array]) -> float | None:
     return float(np.sqrt(squares / (count - 2 * len(segments))))
 
 
+def level_of_neighbours(parts: Sequence[Array]) -> float:
+    """Standard deviation of what neighbouring readings do not share (SI); 0 where it shows none.
+
+    Of the third differences of readings, which a smooth motion hardly moves, without the largest:
+    those are jumps of the motion, and outliers. What is slow or coloured in the noise shows less.
+
+    Args:
+        parts: a signal in each trial (SI), NaN where it was not read.
+    """
+    bends = np.concatenate([np.diff(part, 3) for part in parts] or [np.empty(0)])
+    bends = bends[np.isfinite(bends)]
+    if bends.size < ENOUGH:
+        return 0.0
+    squares = np.sort(bends**2)[: int(USUAL * bends.size)]
+    # 1, 3, 3, 1: the sum of squares is 20.
+    return float(np.sqrt(np.mean(squares) / USUAL_SQUARE / 20.0))
+
+
 def autoregression(parts: Sequence[Array], level: float) -> Whitening:
     """An autoregression of a signal's noise by Yule and Walker, its order by Schwarz's criterion.
 
@@ -180,14 +205,17 @@ def step_between(trials: Sequence[Logged], channel: int) -> float:
         return 0.0
     gaps = np.diff(distinct)
     span = float(distinct[-1] - distinct[0])
-    gaps = gaps[gaps > 1e-6 * span]
-    step = float(np.min(gaps))
-    # The smallest gap is off by what a file rounds; over many steps that would add up.
-    step = float(gaps.sum() / np.round(gaps / step).sum())
+    gaps = gaps[gaps > span / MOST_STEPS]
+    step = float(np.min(gaps, initial=span))
+    # The smallest gap is off by what a file rounds, and over many steps that would add up: ever
+    # wider gaps tell the step ever better.
+    for most in np.geomspace(8.0 * step, span, max(2, int(np.log(span / step)))):
+        near = gaps[gaps <= most]
+        step = float(near.sum() / np.round(near / step).sum())
     whole = (distinct - distinct[0]) / step
     miss = np.abs(whole - np.round(whole))
     # Readings in files are rounded to some digits: a hundredth of a step may be lost.
-    return step if len(gaps) and float(np.max(miss)) < 0.05 and span / step < 2e4 else 0.0
+    return step if float(np.max(miss)) < 0.05 else 0.0
 
 
 def slow_part(parts: Sequence[Array], rate_hz: float, level: float = 0.0) -> float:

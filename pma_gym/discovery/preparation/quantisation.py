@@ -1,4 +1,4 @@
-"""Sensors whose readings keep to coarser steps than their DAQ gives: seen in the readings alone."""
+"""Sensors whose readings keep to coarse steps: seen in the readings alone."""
 
 from collections.abc import Sequence
 
@@ -8,7 +8,7 @@ from pma_gym.discovery.preparation.initial_floors import Level
 from pma_gym.units import SI_FACTORS
 
 COARSER = 1.5
-"""How many of the DAQ's steps make a step coarse."""
+"""How many of the steps that a sensor should have make a step coarse."""
 
 NAME = "sensor_quantisation"
 MISS = 0.05
@@ -19,20 +19,39 @@ HIDDEN = 1.0
 """Noise hides a step if its standard deviation, rounding included, is this many steps or more: what
 rounding adds to such readings is noise like any other."""
 
+DITHER = 0.3
+"""Noise before rounding, in steps, that makes an error of rounding noise as well: nobody need know
+which step the sensor should have."""
+
 CHANCE = 0.1
 """Of a reading that lies within a twentieth of a step from a whole one by chance. Two readings make
 the step; every other that differs from them has to keep to it."""
 
 
 def is_coarse(floor: Level) -> bool:
-    """Whether a signal's readings keep to steps that neither the DAQ nor noise explains."""
-    return floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN)
+    """Whether a signal's readings keep to steps that noise does not blur.
+
+    Where the step is known that the sensor should have, only to coarser ones than that.
+    """
+    if floor.expected_step > 0.0:
+        return is_coarser(floor)
+    before = max(floor.level**2 - floor.step**2 / 12.0, 0.0)
+    return before < (DITHER * floor.step) ** 2
+
+
+def is_coarser(floor: Level) -> bool:
+    """Whether a signal's readings keep to steps that neither its sensor nor noise explains.
+
+    What no lab, and no DAQ, states is learnt from the readings: no step is too coarse for it.
+    """
+    known = floor.expected_step > 0.0
+    return known and floor.step > max(COARSER * floor.expected_step, floor.level / HIDDEN)
 
 
 def coarse_sensors(
     floors: Sequence[Level], misfits: Sequence[float] | None = None
 ) -> tuple[NamedEffect, ...]:
-    """One effect with the steps of all coarse sensors; none where there are none.
+    """One effect with the steps of all sensors that are coarser than they should be, if any is.
 
     Args:
         floors: noise of the signals.
@@ -43,7 +62,7 @@ def coarse_sensors(
     steps, others = {}, 0
     for channel, floor in enumerate(floors):
         explains = misfits is None or not misfits[channel] > floor.step
-        if is_coarse(floor) and explains:
+        if is_coarser(floor) and explains:
             column = BY_QUANTITY[floor.signal.name]
             others += max(0, floor.distinct - 2)
             size = floor.step / SI_FACTORS[column.unit]

@@ -38,9 +38,12 @@ CLOSER, AT_ONCE = 24, 64
 """How many probes of a candidate a closer look simulates at most, taken evenly, and how many lie in
 memory together."""
 
-SCANNED, WIDER, BEST_SCANNED = 32, 4.0, 4
-"""Values of a parameter that a scan of its range simulates, how far it goes beyond the probes, and
-how many of the best fits start from."""
+SCANNED, WIDER = 32, 4.0
+"""Values of a parameter that a scan of its range simulates, and how far it goes beyond the
+probes."""
+
+MILD = 0.05
+"""Share of the largest promise over a range that a value must make to be worth a refit."""
 
 LEAST_PART = 1e-6
 """Share of a probe's change that parameters must leave, or it is one of theirs."""
@@ -149,11 +152,17 @@ def screen(
 
 @dataclass(frozen=True)
 class _Probed:
-    """Scores of probes, by pieces: slopes g (n, pieces), strengths h (n,), changes."""
+    """Scores of probes, by pieces: slopes g (n, pieces), strengths h (n,), changes.
+
+    `direct` (n,) is the sum of slopes with nothing projected out: at the best fit chi-square with
+    its prior is flat along the model's own parameters, so this is the slope along a probe when they
+    follow it. Of the readings alone it is not flat where a prior or a bound holds a parameter.
+    """
 
     slopes: Array
     strengths: Array
     changes: Array
+    direct: Array
 
 
 def _probe(
@@ -183,8 +192,9 @@ def _probe(
     strengths = whole - np.sum(across * weights, axis=0)
     seen = (strengths > LEAST_PART * whole) & (whole > LEAST_CHANGE**2 * readings)
     strengths = np.where(seen, strengths, 0.0)
-    slopes = np.concatenate(along, axis=1) - weights.T @ np.concatenate(own, axis=1)
-    return _Probed(slopes, strengths, _changes(baseline, changes, weights))
+    joined = np.concatenate(along, axis=1)
+    slopes = joined - weights.T @ np.concatenate(own, axis=1)
+    return _Probed(slopes, strengths, _changes(baseline, changes, weights), joined.sum(axis=1))
 
 
 def _balanced(whitened: WhitenedResiduals, tried: Array) -> list[Any]:
@@ -344,17 +354,56 @@ def starting_points(
     return [tried[k] for k in np.argsort(-gains, kind="stable")]
 
 
-def scanned_starts(
+@dataclass(frozen=True)
+class ScannedRange:
+    """Values of a candidate all over its range, simulated, the likeliest first.
+
+    Attributes:
+        values: shape (n, parameters).
+        promises: how far each lowers chi-square if the model's own parameters follow it along
+            straight lines, shape (n,).
+        changes: what each changes beyond that, whitened sums of squares, shape (n,).
+    """
+
+    values: Array
+    promises: Array
+    changes: Array
+
+    @property
+    def most(self) -> float:
+        """The largest promise; 0 without any."""
+        return float(self.promises.max(initial=0.0))
+
+    def mildest(self) -> int | None:
+        """Which value changes least of those that promise a share of the most; None: none does."""
+        promising = np.flatnonzero(self.promises >= MILD * self.most)
+        return int(promising[np.argmin(self.changes[promising])]) if self.most > 0.0 else None
+
+
+def scanned_range(
     baseline: Baseline, whitened: WhitenedResiduals, score: ScreeningScore
-) -> list[Array]:
-    """Where to begin fits of a candidate whose chi-square is rugged: the best of its whole range.
+) -> ScannedRange:
+    """Simulate a candidate's whole range.
 
     Every parameter of its size is scanned, in steps of equal ratio, at the shapes of the probes; of
     a candidate without a size each parameter is.
     """
+    values = _range(score)
+    promises, changes = np.empty(len(values)), np.empty(len(values))
+    for k in range(0, len(values), AT_ONCE):
+        part = replace(score.candidate, probes=values[k : k + AT_ONCE])
+        probed = _probe(baseline, whitened, part, len(baseline.columns[0]))
+        promises[k : k + AT_ONCE] = -2.0 * probed.direct - probed.strengths
+        changes[k : k + AT_ONCE] = probed.strengths
+    order = np.argsort(-promises, kind="stable")
+    return ScannedRange(values[order], promises[order], changes[order])
+
+
+def _range(score: ScreeningScore) -> Array:
+    """Values all over a candidate's range, shape (n, parameters)."""
     candidate = score.candidate
     if not len(candidate.probes):
-        return []
+        return np.empty((0, len(candidate.paths)))
     sizes = candidate.amplitudes if candidate.amplitudes.any() else candidate.fitted
     if not sizes.any():
         sizes = np.ones(len(candidate.paths), bool)
@@ -377,13 +426,4 @@ def scanned_starts(
                     values[~sizes] = shape
                     values[place] = step if limit else absent + sign * step
                     tried.append(np.clip(values, lower, upper))
-    if not tried:
-        return []
-    values = np.unique(np.array(tried), axis=0)
-    gains = np.concatenate(
-        [
-            _simulated_gains(baseline, whitened, replace(candidate, probes=values[k : k + AT_ONCE]))
-            for k in range(0, len(values), AT_ONCE)
-        ]
-    )
-    return [values[k] for k in np.argsort(-gains, kind="stable")[:BEST_SCANNED]]
+    return np.unique(np.array(tried), axis=0) if tried else np.empty((0, len(lower)))

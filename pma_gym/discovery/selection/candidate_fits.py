@@ -1,6 +1,7 @@
 """Fit candidates beside the effects selected so far, with restarts from better parameters."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +11,9 @@ from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
 from pma_gym.discovery.screening.score_test import (
     Baseline,
+    ScannedRange,
     ScreeningScore,
-    scanned_starts,
+    scanned_range,
     starting_points,
 )
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
@@ -23,6 +25,9 @@ BEGUN, ALL_BEGUN = 2, 8
 LEAST_KEPT = 0.7
 """Share of the gain that a score promised below which a fit is tried again from a scan of the
 candidate's range."""
+
+BEST_SCANNED = 4
+"""From how many values of that scan fits are begun."""
 
 LEAST_FITTED = 0.35
 """The same, below which a candidate counts as one that could not be fitted."""
@@ -72,7 +77,7 @@ def fitted(
         ):
             break
     if best is None or before.chi_square - best.chi_square < LEAST_KEPT * each.gain:
-        for begun in scanned_starts(baseline, whitened, each):
+        for begun in scanned_range(baseline, whitened, each).values[:BEST_SCANNED]:
             fit = problem.fit(before.model, extra, {each.candidate.name: begun})
             if fit is not None and (best is None or fit.chi_square < best.chi_square):
                 best = fit
@@ -84,22 +89,62 @@ def fitted(
 
 
 def unfitted(
-    before: Fitted, scores: Sequence[ScreeningScore], fits: dict[str, Fitted]
+    problem: FitProblem,
+    baseline: Baseline,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    scores: Sequence[ScreeningScore],
+    fits: dict[str, Fitted],
 ) -> tuple[str, ...]:
-    """Candidates whose fits explain far less than their scores promised, and more than any fit.
+    """Candidates whose fits explain far less than they could, which is more than any fit does.
 
     Args:
-        before: the model that they were tried beside.
+        problem: the trials.
+        baseline: the model that they were tried beside, ready to be looked beside.
+        before: the same.
+        chosen: the effects in it.
         scores: of those that were fitted.
         fits: theirs, by name, as far as there are any.
     """
-    most = max((before.chi_square - fit.chi_square for fit in fits.values()), default=0.0)
     gains = {name: before.chi_square - fit.chi_square for name, fit in fits.items()}
-    return tuple(
-        each.candidate.name
-        for each in scores
-        if each.gain > most and gains.get(each.candidate.name, 0.0) < LEAST_FITTED * each.gain
-    )
+    most = max(gains.values(), default=0.0)
+
+    def falls_short(score: ScreeningScore, promised: float) -> bool:
+        return promised > most and gains.get(score.candidate.name, 0.0) < LEAST_FITTED * promised
+
+    names = []
+    for each in scores:
+        if falls_short(each, each.gain):
+            whitened = problem.probed(stripped(problem, before), each.candidate)
+            scan = scanned_range(baseline, whitened, each)
+            kept = _kept_share(problem, before, chosen, each.candidate, scan)
+            if kept >= LEAST_FITTED and falls_short(each, min(each.gain, scan.most)):
+                names.append(each.candidate.name)
+    return tuple(names)
+
+
+def _kept_share(
+    problem: FitProblem,
+    before: Fitted,
+    chosen: tuple[CandidateEffect, ...],
+    candidate: CandidateEffect,
+    scan: ScannedRange,
+) -> float:
+    """Which share of a promise a refit keeps beside the mildest value of a range.
+
+    A promise lets the model's own parameters follow the candidate along straight lines. Beside a
+    mild value a refit follows it to the end: what that does not keep is no failure of the
+    candidate's fit, but the straight line's mistake. All of it where the refit cannot be simulated.
+    """
+    mildest = scan.mildest()
+    if mildest is None:
+        return 0.0
+    held = replace(candidate, left=candidate.paths)
+    values = dict(zip(candidate.paths, scan.values[mildest].tolist(), strict=True))
+    refitted = problem.fit(held.beside(before.model).replace(values), (*chosen, held))
+    if refitted is None:
+        return 1.0
+    return (before.chi_square - refitted.chi_square) / float(scan.promises[mildest])
 
 
 def restarted(

@@ -82,8 +82,8 @@ class Stage:
         gate: the looks that passed.
         missing: whether the residual says of itself that something is missing.
         scan: pieces of it that opened the gate by themselves.
-        unfitted: candidates that could not be fitted: their scores promise more than any fit
-            brings, and their own fits bring far less.
+        unfitted: candidates that could not be fitted: their range, simulated, promises more than
+            any fit brings, and their own fits bring far less although a refit keeps the promise.
     """
 
     problem: FitProblem
@@ -209,7 +209,7 @@ def _stage(
             if refit is not None:
                 fits[each.candidate.name] = refit
         fits |= restarted(problem, baseline, before, chosen, worth, fits, journal, progress)
-        failed = unfitted(before, worth[:TRIED], fits)
+        failed = unfitted(problem, baseline, before, chosen, worth[:TRIED], fits)
     if scan.excess and all(before.chi_square - fit.chi_square < least for fit in fits.values()):
         gate, fits, scores, scan = (), {}, plainly, NO_EXCESS
     return Stage(problem, before, baseline, tuple(scores), fits, gate, missing, scan, failed)

@@ -1,10 +1,13 @@
 """Noise: levels, autoregressions, rest, steps, and what is slow."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
 
 from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.datasets.lab_sensors import LabSensor
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.initial_floors import Level, initial_floors
@@ -20,8 +23,9 @@ from pma_gym.discovery.preparation.noise import (
     step_between,
     white_noise,
 )
-from pma_gym.discovery.preparation.quantisation import coarse_sensors
+from pma_gym.discovery.preparation.quantisation import coarse_sensors, is_coarse
 from pma_gym.estimation.logged import Logged
+from pma_gym.plant.model import Model
 from tests.discovery.laboratory import LEVELS, STATION, measured
 
 CHANNELS = range(4)
@@ -213,3 +217,42 @@ def test_a_step_that_noise_hides_makes_no_sensor_coarse(level, coarse):
     fine = Level(SIGNALS["load"], 1.0, "rest segments", {}, 0.0, 1.0, 40)
     sensors = coarse_sensors([fine, fine, fine, known])
     assert [each.name for each in sensors] == (["sensor_quantisation"] if coarse else [])
+
+
+@pytest.mark.parametrize(
+    ("step", "amplitude", "digits", "noise"),
+    [(50e-9, 5e-3, 10, 0.3), (0.3e-3, 20e-3, 6, 0.4), (8e-5, 40e-3, 7, 1.0)],
+)
+def test_a_labs_own_encoder_tells_its_step_and_its_noise(step, amplitude, digits, noise):
+    """50 nm or 0.3 mm: no number of the station's LVDT comes in, and no sensor is called coarse."""
+    rng = np.random.default_rng(5)
+    time = np.arange(6000) / 1000.0
+    truth = amplitude * np.sin(2.0 * np.pi * 0.5 * time) + noise * step * rng.normal(size=6000)
+    read = np.round(step * np.round(truth / step), digits)
+    kept = {name: value for name, value in STATION.parameters.items() if name != "lvdt"}
+    bare = Model("bare", "bare", "station", kept)
+    trial = Trial(
+        time,
+        {"motor_voltage": np.sin(time) + 2.0, "regulator_voltage": np.full(6000, 5.0)},
+        {"contraction": read},
+    )
+    rig = [Logged.of(bare, 0, trial)]
+    assert rig[0].count == 6000
+    floor = initial_floors(bare, rig, [NamedTrial("run", trial)])[0]
+    assert floor.step == pytest.approx(step, rel=1e-3)
+    assert floor.expected_step == 0.0
+    assert floor.source == "neighbouring readings"
+    assert floor.level == pytest.approx(step * np.hypot(noise, 1 / np.sqrt(12)), rel=0.25)
+    assert coarse_sensors([floor]) == ()
+
+
+def test_what_a_lab_states_of_its_sensor_counts_before_all_else():
+    logged_ = [Logged.of(STATION, i, each) for i, each in enumerate(measured(STATION, 2))]
+    named = [NamedTrial(f"{i}", each) for i, each in enumerate(measured(STATION, 2))]
+    stated = {"contraction": LabSensor(resolution=1e-5, noise=2e-4)}
+    floor = initial_floors(STATION, logged_, named, stated)[0]
+    assert (floor.level, floor.source) == (2e-4, "the lab's sensor")
+    # The DAQ's step is five times what the lab states.
+    assert floor.expected_step == 1e-5
+    assert not is_coarse(floor)
+    assert is_coarse(replace(floor, level=2e-5))
