@@ -13,7 +13,7 @@ from benchmarks.runner.isolated_controller import Isolated, driver
 from benchmarks.runner.phase_score import score_trial
 from benchmarks.runner.rollout import Rollout, rollout
 from benchmarks.suites.suite import Entry, Episode, FrozenSuite
-from pma_gym.engine.options import nominal_model
+from pma_gym.engine.nominal_rig import nominal_model
 from pma_gym.envs import PMAEnv
 from pma_gym.plant.model import Model
 

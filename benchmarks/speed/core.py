@@ -80,18 +80,18 @@ def core(operation: str) -> Prepared:
 
 
 def _module(operation: str) -> ir.Module:
-    module, lanes = ir.Module(), SimdEmitter(simd_lanes())
+    module, simd = ir.Module(), SimdEmitter(simd_lanes())
     b, (count, numbers) = function(module, "run", [("count", INTEGER), ("numbers", POINTER)])
-    loaded = [lanes.load(b, numbers, i) for i in range(CHAINS + 2)]
-    chains = [memory(b, lanes.real) for _ in range(CHAINS)]
+    loaded = [simd.load(b, numbers, i) for i in range(CHAINS + 2)]
+    chains = [memory(b, simd.real) for _ in range(CHAINS)]
     for number, chain in zip(loaded, chains, strict=False):
         b.store(number, chain)
     with loop(b, count):
         for chain in chains:
-            now = b.load(chain, typ=lanes.real)
+            now = b.load(chain, typ=simd.real)
             b.store(OPERATIONS[operation](b, now, *loaded[CHAINS:]), chain)
     for i, chain in enumerate(chains):
-        lanes.store(b, b.load(chain, typ=lanes.real), numbers, i)
+        simd.store(b, b.load(chain, typ=simd.real), numbers, i)
     b.ret_void()
     return module
 

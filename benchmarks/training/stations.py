@@ -9,7 +9,7 @@ from benchmarks.suites.frozen import frozen_suite
 from benchmarks.suites.recipe import Recipe
 from benchmarks.suites.stations import draw_station
 from benchmarks.suites.suite import SuiteError
-from pma_gym.engine.options import nominal_model
+from pma_gym.engine.nominal_rig import nominal_model
 from pma_gym.plant.model import Model, load_model
 from pma_gym.tasks import EXERCISES
 

@@ -10,7 +10,7 @@ from scipy.optimize import root_scalar
 
 from controllers.models.voltage import nominal_offset
 from pma_gym.data.signals import SIGNALS
-from pma_gym.engine.options import motor_at_rest
+from pma_gym.engine.nominal_rig import motor_at_rest
 from pma_gym.envs import StationInfo
 from pma_gym.plant.condition import Condition
 from pma_gym.plant.forms.linear import linearize_at, operating_point

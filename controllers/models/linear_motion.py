@@ -17,7 +17,7 @@ import numpy as np
 
 from controllers.models.voltage import VOLTAGE_LIMIT
 from pma_gym.data.signals import SIGNALS, is_pressure
-from pma_gym.engine.options import motor_at_rest
+from pma_gym.engine.nominal_rig import motor_at_rest
 from pma_gym.envs import StationInfo
 from pma_gym.plant.forms.linear import FOLLOWING
 from pma_gym.plant.plant import Plant

@@ -22,16 +22,16 @@ in SIMD lanes; `native` compiles those for the processor and keeps the result, `
     ['stretch', 'rate', 'cable.stiffness', 'cable.damping', 'cable.slack']
 
     >>> def build():
-    ...     module, lanes = ir.Module(), SimdEmitter(8)
+    ...     module, simd = ir.Module(), SimdEmitter(8)
     ...     arguments = [("blocks", INTEGER), ("table", POINTER), ("data", POINTER)]
     ...     builder, (blocks, table, data) = function(module, "tension", arguments)
     ...     inputs = live_inputs([force])
-    ...     known = {v.id: lanes.load_spread(builder, table, i) for i, v in enumerate(inputs[2:])}
+    ...     known = {v.id: simd.load_spread(builder, table, i) for i, v in enumerate(inputs[2:])}
     ...     with loop(builder, blocks) as block:
-    ...         row = lanes.address(builder, data, builder.mul(block, INTEGER(3)))
-    ...         known |= {v.id: lanes.load(builder, row, i) for i, v in enumerate(inputs[:2])}
-    ...         found = lanes.emit(builder, [force], known)
-    ...         lanes.store(builder, found[force.id], row, 2)
+    ...         row = simd.address(builder, data, builder.mul(block, INTEGER(3)))
+    ...         known |= {v.id: simd.load(builder, row, i) for i, v in enumerate(inputs[:2])}
+    ...         emitted = simd.emit(builder, [force], known)
+    ...         simd.store(builder, emitted[force.id], row, 2)
     ...     builder.ret_void()
     ...     return module
 

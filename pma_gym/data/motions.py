@@ -85,8 +85,8 @@ class Smooth:
 def _cubic(share: Any, start: Any, end: Any, speed: Any, end_speed: Any) -> Any:  # noqa: ANN401
     """Hermite's cubic at a share of the way between two knots."""
     rise, first, last = end - start, KNOT_S * speed, KNOT_S * end_speed
-    bend = 3.0 * rise - 2.0 * first - last
-    return start + share * (first + share * (bend + share * (first + last - 2.0 * rise)))
+    quadratic = 3.0 * rise - 2.0 * first - last
+    return start + share * (first + share * (quadratic + share * (first + last - 2.0 * rise)))
 
 
 def triangle(stroke: float, period: float, periods: int) -> Pieces:

@@ -91,8 +91,7 @@ def answer(findings: Findings, tell: Progress, propose: bool = True) -> Diagnosi
     unknown = why_unknown(findings, left, laws)
     verdict = verdict_of(findings, unknown, not_detectable, bool(coarse), off)
     records = trial_records(findings)
-    count = 0 if unknown is None else len(unknown.effects)
-    closes = closing(gaps(records), count) if count else None
+    closes = closing(gaps(records), unknown.effects) if unknown and unknown.effects else None
     if closes is not None and closes.named and widest_scatter(findings) <= MOST_SCATTER:
         # An approximate law is a name where a right one would be; else the verdict stays.
         named = verdict_of(findings, None, not_detectable, bool(coarse), off)

@@ -13,7 +13,8 @@ from pma_gym.codegen.machine.builtin import builtin
 from pma_gym.codegen.threads.thread_pool import ThreadPool
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.cpu.python_step import BOUND
-from pma_gym.engine.options import Options, Pressure
+from pma_gym.engine.option_checks import Pressure
+from pma_gym.engine.options import Options
 from pma_gym.engine.reset.episodes import FIRST, LAST, SETTLES, Episodes
 from pma_gym.engine.snapshot import Snapshot, put, take
 from pma_gym.tasks import Task
@@ -28,7 +29,7 @@ LEAST_BEGUN = 32
 BEGUN_PARTS = 8
 """Parts of a thread's share of these."""
 
-_BEGINNING = 1
+_RESET = 1
 """The pool's second work; the first is a step."""
 
 
@@ -144,7 +145,7 @@ class Engine(Episodes):
         parts = self._beginnings
         edges = np.arange(len(parts) + 1) * count // len(parts)
         parts[:, FIRST], parts[:, LAST], parts[:, SETTLES] = edges[:-1], edges[1:], settles
-        self._threads.run(_BEGINNING)
+        self._threads.run(_RESET)
 
     def close(self) -> None:
         """End the threads."""

@@ -1,18 +1,27 @@
-"""The environments' options: checked once, with errors that say how to mend them."""
+"""The environments' options: checked once, with errors that say how to fix them."""
 
 import copy
-import difflib
-import numbers
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, Self, TypedDict, TypeGuard
+from typing import Any, Self, TypedDict
 
 import numpy as np
 
 from pma_gym.data.trial_checks import check_memory_at_start
-from pma_gym.effects import CATALOGUE
-from pma_gym.engine.plain_values import plain_options, plain_sequence
+from pma_gym.engine.option_checks import (
+    Pressure,
+    check_keywords,
+    check_named,
+    check_number,
+    check_operator,
+    check_pressure,
+    check_whole,
+    is_real,
+    is_whole,
+    unknown_name,
+)
+from pma_gym.engine.plain_values import plain_options
 from pma_gym.engine.renamed_options import renamed_options
 from pma_gym.engine.reward_function import RewardFunction, check_reward_function
 from pma_gym.pickling import Packed, packed
@@ -23,7 +32,6 @@ from pma_gym.tasks import (
     DISTURBANCES,
     EVERY_TASK,
     LOWEST_RATE_HZ,
-    OPERATOR_BOUNDS,
     RANDOMISATIONS,
     REWARDS,
     Disturbances,
@@ -32,10 +40,6 @@ from pma_gym.tasks import (
     Task,
     named_task,
 )
-
-LOWEST_PRESSURE_KPA = 150.0
-HIGHEST_PRESSURE_KPA = 575.0
-"""Pressures at which the station was ever shown (kPa): table I3."""
 
 
 class DefaultSteps(int):
@@ -47,9 +51,6 @@ class DefaultSteps(int):
 
 OPERATORS = ("random", "typical")
 """Operators by name."""
-
-Pressure = float | Sequence[float] | str
-"""Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,7 @@ def parse_options(
     check_memory_at_start(options.memory_at_start, "episodes")
     _check_rate_and_delays(options)
     for name in ("preview", "history"):
-        _check_whole(name, getattr(options, name))
+        check_whole(name, getattr(options, name))
     for name in ("noise", "regulator_action", "safety"):
         if not isinstance(getattr(options, name), bool):
             raise ValueError(f"{name} must be true or false, got {getattr(options, name)!r}")
@@ -225,7 +226,7 @@ def parse_options(
         check_reward_function(options.reward)
     else:
         check_named("reward", options.reward, REWARDS)
-    if not _is_real(options.reward_scale) or not 0.0 < options.reward_scale <= 1e9:
+    if not is_real(options.reward_scale) or not 0.0 < options.reward_scale <= 1e9:
         raise ValueError(
             f"reward_scale must be a number above 0 and up to 1e9, got {options.reward_scale!r}"
         )
@@ -255,7 +256,7 @@ def parse_task(given: str | Task, options: Options) -> Task:
     """
     task = named_task(given) if isinstance(given, str) else given
     if not isinstance(task, Task):
-        raise _unknown("task", given, list(EVERY_TASK))
+        raise unknown_name("task", given, list(EVERY_TASK))
     if task.actuator == "regulator" and options.regulator_action:
         raise ValueError(
             f"regulator_action gives the motor's tasks a second action; the only action of task "
@@ -289,184 +290,6 @@ def _check_exercise(task: Task, options: Options) -> None:
         )
 
 
-def rig_model(task: Task, options: Options) -> Model:
-    """The nominal model with all that the options ask for: somebody at the slide, if they do.
-
-    Raises:
-        ModelError: no such model, or one that cannot be used.
-        ValueError: a cascade where there must be a station.
-    """
-    model = options.nominal
-    if not model.rig.has_muscle:
-        raise ValueError(
-            f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
-            "which has no muscle; take station or serres2008"
-        )
-    pushed = options.disturbing.hand_push_force != 0.0
-    if not model.rig.balances_loads and (pushed or task.load or task.exercise):
-        what = f"disturbances={options.disturbances!r}" if pushed else f"task {task.name}"
-        held = "plays an operator" if task.exercise else "holds a load"
-        why = "somebody pulls at its slide" if pushed else f"the motor {held}"
-        raise ValueError(
-            f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
-            "take station or serres2008"
-        )
-    model = nominal_model(task, model)
-    if not pushed or "hand_push" in model.parameters:
-        return model
-    return model.with_effects({"hand_push": {"share": 1.0}})
-
-
-def nominal_model(task: Task, model: Model) -> Model:
-    """The nominal model that controllers receive: with a leg on its lever in an exercise."""
-    if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
-        return model
-    leg = CATALOGUE["leg"]
-    usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}
-    return model.with_effects({"leg": {door: float(value or 0.0) for door, value in usual.items()}})
-
-
-def motor_at_rest(model: Model, task: Task) -> float:
-    """Motor voltage that episodes begin at (V): what a nominal drive needs for the task's load.
-
-    Raises:
-        ValueError: the drive does not hold such a load.
-    """
-    load = rest_load(model, task)
-    if not load:
-        return 0.0
-    drive = model.parameters["drive"]
-    volts = (load - drive.offset) / drive.gain
-    if not 0.0 <= volts <= 10.0:
-        raise ValueError(
-            f"task {task.name}: the load must lie in {max(0.0, drive.offset):.4g} to "
-            f"{10.0 * drive.gain + drive.offset:.4g} N, what the drive of model {model.name} holds "
-            f"with 0-10 V; got {load:g} N"
-        )
-    return volts
-
-
-def rest_load(model: Model, task: Task) -> float:
-    """Load that the motor holds as an episode begins (N), by the nominal pulley."""
-    if task.exercise is None:
-        return task.load
-    return task.exercise.start_moment / model.parameters["rotor"].radius
-
-
-def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
-    """Refuse names that nobody knows.
-
-    Raises:
-        TypeError: the first unknown name, the nearest known one, and all known.
-    """
-    for name in given:
-        if name not in known:
-            raise TypeError(
-                f"unknown {what} {name!r}{_nearest(name, known)}; known: {', '.join(known)}"
-            )
-
-
-def check_keywords(
-    caller: str, given: Iterable[str], known: Sequence[str], others: Sequence[str] = ()
-) -> None:
-    """Refuse keyword arguments that do not exist, in Python's own words.
-
-    Libraries look for these words to see whether an environment takes an argument.
-
-    Args:
-        caller: who takes them.
-        given: names that came.
-        known: names of the options.
-        others: names of further keyword arguments of the caller.
-    Raises:
-        TypeError: the first unknown name, the nearest known one, and all known.
-    """
-    for name in given:
-        if name not in known:
-            raise TypeError(
-                f"{caller} got an unexpected keyword argument {name!r}"
-                f"{_nearest(name, [*known, *others])}; known: {', '.join([*known, *others])}"
-            )
-
-
-def check_named(what: str, value: object, known: Iterable[str]) -> None:
-    """Refuse a value that is none of the known names.
-
-    Raises:
-        ValueError: what it is, the known names, what came and the nearest known name.
-    """
-    names = list(known)
-    if not isinstance(value, str) or value not in names:
-        raise _unknown(what, value, names)
-
-
-def check_operator(operator: Operator) -> None:
-    """Refuse an operator whom nobody could be.
-
-    Raises:
-        ValueError: names the number, its range and unit, and what came.
-    """
-    for name, value in operator._asdict().items():
-        lower, upper, unit = OPERATOR_BOUNDS[name]
-        _check_number(f"operator.{name}", value, lower, upper, unit)
-
-
-def check_pressure(pressure: object) -> None:
-    """Refuse a pressure that the station was never shown at.
-
-    Raises:
-        ValueError: names the range, the unit and what came.
-    """
-    if isinstance(pressure, str) and pressure == "random":
-        return
-    several = pressure if isinstance(pressure, list | tuple) else [pressure]
-    if not several or not all(map(_is_real, several)):
-        raise ValueError(
-            f'pressure_kpa must be a number in kPa, a list of numbers or "random", got {pressure!r}'
-        )
-    for one in several:
-        _check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
-
-
-def parse_pressure(given: object) -> Pressure:
-    """The checked pressure of episodes, as plain Python values.
-
-    Raises:
-        ValueError: names the range, the unit and what came.
-    """
-    pressure = plain_sequence(given)
-    check_pressure(pressure)
-    return pressure
-
-
-def parse_pressures(given: object, count: int) -> list[Pressure]:
-    """The checked pressures of so many environments, one each, as plain Python values.
-
-    Raises:
-        ValueError: names the rule and what came.
-    """
-    pressures = plain_sequence(given)
-    length = f"{len(pressures)}" if isinstance(pressures, list) else "no sequence"
-    if length != f"{count}":
-        raise ValueError(
-            f"pressures_kpa must hold one pressure for each of the {count} environments, got "
-            f"{length}: {given!r}; pressure_kpa is one for all"
-        )
-    for pressure in pressures:
-        check_pressure(pressure)
-    return pressures
-
-
-def check_count(name: str, count: object, most: int) -> None:
-    """Refuse a number of things that is none.
-
-    Raises:
-        ValueError: names it, the rule and what came.
-    """
-    if not _is_whole(count) or not 1 <= count <= most:
-        raise ValueError(f"{name} must be a whole number in 1-{most}, got {count!r}")
-
-
 def _check_model(model: object) -> None:
     if not isinstance(model, str | Path | Model):
         raise ValueError(
@@ -476,10 +299,10 @@ def _check_model(model: object) -> None:
 
 
 def _check_rate_and_delays(options: Options) -> None:
-    _check_number("control_rate_hz", options.control_rate_hz, 1.0, 10000.0, "Hz")
+    check_number("control_rate_hz", options.control_rate_hz, 1.0, 10000.0, "Hz")
     for name in ("action_delay_s", "observation_delay_s"):
         delay = getattr(options, name)
-        _check_number(name, delay, 0.0, 1.0, "s")
+        check_number(name, delay, 0.0, 1.0, "s")
         steps = delay * options.control_rate_hz
         if abs(steps - round(steps)) > 1e-6:
             raise ValueError(
@@ -489,38 +312,8 @@ def _check_rate_and_delays(options: Options) -> None:
 
 
 def _check_max_episode_steps(steps: object) -> None:
-    if not _is_whole(steps) or steps < 1:
+    if not is_whole(steps) or steps < 1:
         raise ValueError(
             f"max_episode_steps must be a whole number of control steps from 1 on, got {steps!r}; "
             "leave it out for the whole task"
         )
-
-
-def _check_whole(name: str, value: object) -> None:
-    if not _is_whole(value) or not 0 <= value <= 1000:
-        raise ValueError(f"{name} must be a whole number of control steps in 0-1000, got {value!r}")
-
-
-def _check_number(name: str, value: object, lower: float, upper: float, unit: str) -> None:
-    # `not <=`: NaN is out of every range.
-    if not _is_real(value) or not lower <= value <= upper:
-        raise ValueError(f"{name} must be a number in {lower:g}-{upper:g} {unit}, got {value!r}")
-
-
-def _is_real(value: object) -> TypeGuard[float]:
-    return isinstance(value, numbers.Real) and not isinstance(value, bool)
-
-
-def _is_whole(value: object) -> TypeGuard[int]:
-    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
-
-
-def _unknown(what: str, value: object, names: Sequence[str]) -> ValueError:
-    return ValueError(
-        f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
-    )
-
-
-def _nearest(name: object, known: Sequence[str]) -> str:
-    close = difflib.get_close_matches(str(name).lower(), known, n=1, cutoff=0.5)
-    return f" (did you mean {close[0]!r}?)" if close else ""

@@ -93,11 +93,11 @@ def put(engine: EngineMemory, state: Snapshot) -> None:
     rewards = _array(state, "rewards", np.float64, n)
     flags = _array(state, "flags", np.uint8, 2 * n).reshape(2, n)
     _check_numbers(engine, numbers)
-    alone = engine.width == 1
-    single = numbers[0, engine.state_layout.offsets["sample"]] if alone else 0
+    is_single = engine.width == 1
+    single = numbers[0, engine.state_layout.offsets["sample"]] if is_single else 0
     trajectory = _array(state, "trajectory", np.float64, int(single))
     steps = numbers.view(np.int64)[:, engine.state_layout.offsets["count"]]
-    voltages = _array(state, "voltages", np.float64, int(steps[0]) if alone else 0)
+    voltages = _array(state, "voltages", np.float64, int(steps[0]) if is_single else 0)
     _check_models(engine, state.models)
     # From here on nothing can fail.
     _put_models(engine, state.models)

@@ -7,7 +7,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.engine.options import Pressure, parse_pressure, parse_pressures
+from pma_gym.engine.option_checks import Pressure, parse_pressure, parse_pressures
 from pma_gym.engine.plain_values import plain_scalar
 
 
@@ -116,3 +116,55 @@ def spread(
             array[places] = values
             info[name], info[f"_{name}"] = array, own
     return info
+
+
+class BatchActions:
+    """Takes the actions of a batch, or says what is wrong with them.
+
+    Args:
+        given: where the engine reads actions, shape (num_envs, entries of an action).
+
+    Attributes:
+        given: as given.
+    """
+
+    def __init__(self, given: NDArray[Any]) -> None:
+        self.given = given
+
+    def take(self, actions: object, waiting: NDArray[np.int64] | None) -> None:
+        """Hand actions over; those of episodes that have ended mean nothing.
+
+        Args:
+            actions: shape (num_envs, entries of an action).
+            waiting: numbers of the environments whose episode has ended, None if none has.
+        Raises:
+            ValueError: actions of another shape or kind; says the rule.
+        """
+        try:
+            array = np.asarray(actions)
+            if array.dtype.kind not in "fiu":
+                raise TypeError
+        except (TypeError, ValueError):
+            raise ValueError(
+                f"{self._rule}; got {type(actions).__name__} of no real numbers"
+            ) from None
+        if array.shape != self.given.shape:
+            raise ValueError(f"{self._rule}; got shape {array.shape}")
+        self.given[:] = array
+        if waiting is not None:
+            self.given[waiting] = 0.0
+
+    def not_finite(self) -> ValueError:
+        """What is wrong with actions that the engine refuses."""
+        row = int(np.flatnonzero(~np.isfinite(self.given).all(axis=1))[0])
+        return ValueError(
+            f"{self._rule}, all of them finite; environment {row} got "
+            f"{self.given[row].tolist()}; look for a division by zero or a diverged policy"
+        )
+
+    @property
+    def _rule(self) -> str:
+        return (
+            f"actions must have shape {self.given.shape}: one row an environment, each entry "
+            "-1 to 1 for 0 to 10 V"
+        )

@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import Options, check_known
-from pma_gym.envs.pma_env import NOT_BEGUN, RESET_OPTIONS, PMAEnv
+from pma_gym.engine.option_checks import check_known
+from pma_gym.engine.options import Options
+from pma_gym.envs.episode import NOT_BEGUN
+from pma_gym.envs.pma_env import RESET_OPTIONS, PMAEnv
+from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.history import History, RecordingEngine
 from pma_gym.envs.summary import step_info
 from pma_gym.plant.plant import Plant
@@ -52,7 +55,7 @@ class Batch(Protocol):
         """Begin an episode in every environment, or in those of `reset_mask`."""
         ...
 
-    def _drawing(self) -> Any: ...  # noqa: ANN401 - a Picture, whose module needs matplotlib
+    _display: Display
 
 
 class BatchMember(PMAEnv):
@@ -207,8 +210,9 @@ class BatchMember(PMAEnv):
             )
         return self._engine.history(self._index)
 
-    def _drawing(self) -> Any:  # noqa: ANN401 - a Picture, whose module needs matplotlib
-        return self._batch._drawing()
+    @property
+    def _display(self) -> Display:  # type: ignore[override]
+        return self._batch._display
 
     def close(self) -> None:
         """Do nothing: the batch has the picture and the threads."""

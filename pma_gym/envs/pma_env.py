@@ -1,10 +1,7 @@
 """The environment: a task on a plant, seen through the plant's sensors."""
 
-import copy
-import math
 from collections.abc import Callable, Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -15,46 +12,31 @@ from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.cpu.python_step import NOT_READ
 from pma_gym.engine.cpu.step_writer import BAD_ACTION
 from pma_gym.engine.engine import Engine
-from pma_gym.engine.options import (
-    EnvironmentOptions,
-    Pressure,
-    check_known,
-    check_named,
-    parse_options,
-    parse_pressure,
-    parse_task,
-)
+from pma_gym.engine.option_checks import Pressure, check_known, check_named, parse_pressure
+from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.snapshot import put, take
-from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
 from pma_gym.envs.batch import parse_seed
 from pma_gym.envs.copies import Copies
+from pma_gym.envs.episode import NOT_BEGUN, Episode
 from pma_gym.envs.function_rewards import FunctionRewards
+from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.history import History
 from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
-from pma_gym.envs.rendering.window import Window
 from pma_gym.envs.seeding import SeededByReset
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
-from pma_gym.envs.summary import episode_summary, last_info, step_info
+from pma_gym.envs.summary import last_info, step_info
 from pma_gym.metrics import SAMPLE_RATE_HZ
-from pma_gym.plant.condition import Condition
-from pma_gym.plant.plant import Plant
-from pma_gym.renamed_names import renamed_attribute
-from pma_gym.tasks import Events, Operator, Task
-
-if TYPE_CHECKING:
-    from pma_gym.envs.rendering.picture import Picture
+from pma_gym.tasks import Task
 
 OWN = ("task", "render_mode", "render_width")
 """Keyword arguments of an environment beside the options."""
 
 RESET_OPTIONS = ("pressure_kpa",)
-NOT_BEGUN = "no episode has begun"
 
 
-class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
+class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArray[np.float32]]):
     """Tracking with a pneumatic muscle that a servo drive pulls through a cable.
 
     In every control step kT the agent commands a voltage, which is held until (k+1)T; a position is
@@ -222,10 +204,6 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 100}
 
-    _window: Window | None = None
-    _index = 0
-    """Its number in the engine."""
-
     def __init__(
         self,
         task: str | Task = "displacement",
@@ -252,7 +230,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
     _ATTACHED = frozenset(
         {"nominal_plant", "table", "plant", "_offsets", "_row", "_measured", "_observed", "_given"}
-        | {"_made", "_datum", "_picture", "_window", "_advance"}
+        | {"_made", "_datum", "_display", "_advance"}
     )
 
     def _attach(self) -> None:
@@ -266,19 +244,11 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._made = self._engine.advance(self._observed.copy, self._given)
         if callable(self.options.reward):
             self._made = self._rewarded(self._made)
-        self._picture: Picture | None = None
-        self._window = None
-        if self.render_mode == "human":
-            self._window = Window(self.task.title)
-            self._made = self._watched(self._made)
+        windowed = self.render_mode == "human"
+        self._display = Display(self.task, self.render_width, windowed)
+        if windowed:
+            self._made = self._display.shown(self._made, self)
         self._wait(self._idle)
-
-    def _find_offsets(self) -> None:
-        self._offsets = self._engine.state_layout.offsets
-        # The record holds a reading's parts side by side.
-        first = self._offsets[f"{PARTS[0]}_{self.options.observation_delay}"]
-        self._measured = slice(first, first + len(PARTS))
-        self._datum = START if START in self._offsets else "zero_contraction"
 
     # -- episode -----------------------------------------------------------------------------------
 
@@ -305,10 +275,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(None)
         self.__dict__.pop("plant", None)
         self._commands.begin(self._number("rest_regulator"))
-        if self._window is not None:
-            self._show(self._window)
-            # Drawing for the first time takes a while.
-            self._window.start()
+        self._display.begin(self)
         return self._observed.copy(), self._info()
 
     def step(
@@ -339,29 +306,10 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
 
         return advance
 
-    def _watched(self, made: Callable[[Any], Any]) -> Callable[[Any], Any]:
-        """A step that the window shows; that of an episode's end `_last` shows."""
-        window = self._window
-        assert window is not None
-
-        def advance(action: object) -> Any:  # noqa: ANN401 - as `Engine.advance` has it
-            result = made(action)
-            if type(result) is tuple and window.wait(self.time):
-                self._show(window)
-            return result
-
-        return advance
-
-    def _show(self, window: Window) -> None:
-        """Draw in the window, once the clock has come to the simulated time."""
-        window.wait(self.time)
-        if not window.closed:
-            window.show(self.picture())
-
     @property
     def window_closed(self) -> bool:
         """Whether the window of `render_mode="human"` was closed, by its user or by `close`."""
-        return self._window is not None and self._window.closed
+        return self._display.window_closed
 
     def _otherwise(
         self, action: NDArray[np.floating], code: int
@@ -386,8 +334,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         self._wait(f"the episode ended at {self.time:g} s")
         info = last_info(self._engine, 0)
         self.ended_by = info["ended_by"]
-        if self._window is not None:
-            self._show(self._window)
+        self._display.show(self)
         return self._observed.copy(), self._number("reward"), terminated, not terminated, info
 
     def _info(self) -> dict[str, Any]:
@@ -407,9 +354,6 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
         if "pressure_kpa" in options:
             return parse_pressure(options["pressure_kpa"])
         return self.options.pressure_kpa
-
-    def _number(self, name: str) -> float:
-        return float(self._row[self._offsets[name]])
 
     # -- states ------------------------------------------------------------------------------------
 
@@ -477,156 +421,7 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
     def spec(self, spec: EnvSpec | None) -> None:  # type: ignore[override]
         self.__dict__["spec"] = completed_spec(spec, self.horizon)
 
-    # -- what the agent, a controller and the reader see -------------------------------------------
-
-    @cached_property
-    def plant(self) -> Plant:
-        """The Plant of this episode; differs from the nominal one with `randomisation`."""
-        return self._episode_plant()
-
-    def _episode_plant(self) -> Plant:
-        model = self._engine.models[self._index]
-        nominal = self.nominal_plant
-        return nominal if model is nominal.model else Plant(model, nominal.tolerance)
-
-    @property
-    def pressure(self) -> float:
-        """Gauge pressure that this episode began at (Pa)."""
-        return float(self._engine.pressures[self._index])
-
-    @property
-    def condition(self) -> Condition:
-        """Where the plant stands; a copy."""
-        state = np.array([self._number(name) for name in self.nominal_plant.states])
-        zero, size = self._number("zero_contraction"), self._number("size")
-        return Condition(state, zero, self.time, size, (self.motor_voltage, self.regulator_voltage))
-
-    @property
-    def _count(self) -> int:
-        """Control steps so far."""
-        return int(self._row.view(np.int64)[self._offsets["count"]])
-
-    @property
-    def time(self) -> float:
-        """Time since the trial began (s)."""
-        return self._count * self.options.period
-
-    @property
-    def measurement(self) -> Measurement:
-        """What the sensors say, `observation_delay_s` ago."""
-        taken = max(self._count - self.options.observation_delay, 0) * self.options.period
-        return Measurement(taken, *self._row[self._measured].tolist())
-
-    reading = renamed_attribute("reading", "measurement")
-    human = renamed_attribute("human", "operator")
-
-    @property
-    def truth(self) -> dict[str, float]:
-        """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa).
-
-        Contraction is from the muscle's resting length, extension from the trial's beginning;
-        rotation from where the cable begins to be wound in with no load, in an exercise from where
-        it begins.
-        """
-        truth = {name: self._number(f"true_{name}") for name in TRUTH}
-        return truth | {"extension": self._number(self._datum) - truth["contraction"]}
-
-    @property
-    def position(self) -> float:
-        """True position that the task asks for (m, rad; N m for a moment's excess)."""
-        truth = self.truth
-        if self.task.protocol.followed.shortens:
-            return truth["contraction"] - self._number(START)
-        if self.task.protocol.followed.is_force:
-            return self._number("excess_nm")
-        return truth[self.task.protocol.quantity]
-
-    @property
-    def operator(self) -> Operator | None:
-        """The operator of this exercise; None without one, or before. Not for controllers."""
-        if self.task.exercise is None or self._idle == NOT_BEGUN:
-            return None
-        return Operator(*(self._number(f"operator_{name}") for name in Operator._fields))
-
-    @property
-    def disturbance(self) -> tuple[float, float]:
-        """What disturbed the last step: the regulator's jump (V) and the hand's force (N)."""
-        jumps = [name for name in self._offsets if name.startswith("jump_step_")]
-        count = self._count - 1
-        volts = [
-            self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
-        ]
-        force = self._number(HAND_PUSH) if HAND_PUSH in self._offsets else 0.0
-        return sum(volts), force
-
-    @property
-    def events(self) -> Events:
-        """What disturbs this episode, and when; not for controllers."""
-        return self._engine.events(self._index)
-
-    @property
-    def station(self) -> StationInfo:
-        """What a controller may know, in copies: what it was designed with, how it is driven."""
-        options = self.options
-        return StationInfo(
-            copy.copy(self._engine.nominal_model),
-            self._detached_task,
-            self.pressure,
-            options.period,
-            options.action_delay * options.period,
-            options.observation_delay * options.period,
-        )
-
-    @property
-    def error(self) -> float:
-        """True position less reference (m or rad)."""
-        return self.position - float(self.table.references[self._count])
-
-    @property
-    def extrapolated(self) -> bool:
-        """Whether the pressure lies outside this task's trials or the model's validity."""
-        return self._number("extrapolated") != 0.0
-
-    @property
-    def motor_voltage(self) -> float:
-        """Motor voltage that the station received in the last step (V)."""
-        return self._number("motor_voltage")
-
-    @property
-    def regulator_voltage(self) -> float:
-        """Regulator voltage that the station received in the last step (V)."""
-        return self._number("regulator_voltage")
-
-    @property
-    def motor_voltages(self) -> NDArray[np.float64]:
-        """Motor voltage that the station received in every step so far (V), shape (steps,).
-
-        Raises:
-            AttributeError: in an exercise, whose operator is not written down step by step.
-        """
-        if self.task.exercise:
-            raise AttributeError(
-                "motor_voltages are not kept in an exercise, where the motor plays the operator; "
-                'collect info["motor_voltage_v"] of every step'
-            )
-        if self.task.actuator == "motor":
-            return self.voltages
-        return np.full(self._count, self.motor_voltage)
-
-    @property
-    def voltages(self) -> NDArray[np.float64]:
-        """Voltage of the task's actuator that the station received in every step so far (V)."""
-        return self._engine.voltages[: self._count].copy()
-
-    @property
-    def reference(self) -> Reference:
-        """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
-        return Reference(self._detached_task.protocol)
-
-    @cached_property
-    def _detached_task(self) -> Task:
-        """What controllers get of the task; made once, so that repeated trials have equal ones."""
-        return detached_task(self.task)
+    # -- actions and pictures ----------------------------------------------------------------------
 
     def action(self, voltage: float, regulator_voltage: float | None = None) -> NDArray[np.float64]:
         """The action that commands these voltages (V), held to 0-10 V.
@@ -639,22 +434,6 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
                 one that holds the pressure of the episode's start.
         """
         return self._commands.action_for(voltage, regulator_voltage)
-
-    def trajectory(self) -> NDArray[np.float64]:
-        """True position (m or rad) at k / 384 s so far, whatever the control rate, shape (k,)."""
-        return self._engine.trace[: math.floor(self._number("sample") + 0.5)].copy()
-
-    def episode_summary(self) -> dict[str, Any]:
-        """RMSE of the true position at 384 Hz so far, as the dissertation defines it.
-
-        Returns:
-            `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
-            each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
-            or the contraction's stroke; `ended_by`: the limit that terminated the episode, in
-            words, or "". An exercise has `exercise_summaries` too, and its RMSE in N m where it
-            prescribes a moment.
-        """
-        return episode_summary(self._engine, self._index)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """A picture of the station and of the trial so far, RGB.
@@ -672,36 +451,26 @@ class PMAEnv(Copies, SeededByReset, gym.Env[NDArray[np.float32], NDArray[np.floa
                 'render_mode="rgb_array"'
             )
             return None
-        if self._window is not None:
-            if self._idle == NOT_BEGUN:
-                raise self._needs_reset("render()")
-            self._show(self._window)
-            return None
-        return self.picture()
+        if not self._display.has_window:
+            return self.picture()
+        if self._idle == NOT_BEGUN:
+            raise self._needs_reset("render()")
+        self._display.show(self)
+        return None
 
     def picture(self) -> NDArray[np.uint8]:
         """The picture that `render` gives, whatever the render mode."""
         if self._idle == NOT_BEGUN:
             raise self._needs_reset("render()")
-        return self._drawing().draw(self, self._history())
+        return self._display.draw(self, self._history())
 
     def _history(self) -> History:
         position = self.trajectory()
         return History(np.arange(len(position)) / SAMPLE_RATE_HZ, position, self.voltages)
 
-    def _drawing(self) -> "Picture":
-        if self._picture is None:
-            # Imported here: an environment without pictures needs no matplotlib.
-            from pma_gym.envs.rendering.picture import Picture
-
-            self._picture = Picture(self.task, self.render_width)
-        return self._picture
-
     def close(self) -> None:
         """Free the picture and close the window."""
-        self._picture = None
-        if self._window is not None:
-            self._window.close()
+        self._display.close()
 
 
 def _no_step(_: object) -> int:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from pma_gym.data.protocol import Protocol
-from pma_gym.engine.options import rest_load
+from pma_gym.engine.nominal_rig import rest_load
 from pma_gym.plant.model import Model
 from pma_gym.renamed_names import renamed_names
 from pma_gym.tasks import Task

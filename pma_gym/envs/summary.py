@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import Engine
 from pma_gym.engine.state_layout import PEAKS, WORK
+from pma_gym.envs.batch import spread
 from pma_gym.metrics import percent_of_range
 from pma_gym.tasks import PACE, Task, limit_in_words
 from pma_gym.units import SI_FACTORS
@@ -22,6 +23,32 @@ def last_info(engine: Engine, index: int) -> dict[str, Any]:
     """The info of the step that ends an environment's episode: all that there is to tell."""
     row = engine.row(index)
     return _step_info(engine, row) | _episode_summary(engine, index, row)
+
+
+def last_infos(
+    engine: Engine, over: NDArray[np.bool_], indices: NDArray[np.int64]
+) -> dict[str, Any]:
+    """Last infos of the episodes of a batch that ended, in Gymnasium's form: arrays with masks.
+
+    Args:
+        engine: of the batch.
+        over: whose episode ended, shape (num_envs,).
+        indices: their numbers.
+    """
+    task = engine.task
+    columns = engine.rows(indices).T
+    numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
+    sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
+    columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
+    columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
+    columns_by_name |= summaries(task, sums, numbers["sample"])
+    if task.exercise:
+        counts = engine.counts()[indices]
+        columns_by_name |= exercise_summaries(numbers, counts, engine.options.period)
+    pairs = zip(indices.tolist(), numbers["ended"].tolist(), strict=True)
+    limits = [limit_in_words(engine.models[i], code, task.exercise) for i, code in pairs]
+    columns_by_name["ended_by"] = np.array(limits, object)
+    return spread(columns_by_name, over, indices)
 
 
 def step_info(engine: Engine, index: int) -> dict[str, Any]:

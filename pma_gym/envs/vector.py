@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import Any, Unpack
 
 import gymnasium as gym
 import numpy as np
@@ -16,35 +16,31 @@ from pma_gym.engine.actions import CommandLine
 from pma_gym.engine.cpu.python_step import TRUTHS
 from pma_gym.engine.engine import ActionError, Engine
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import (
-    EnvironmentOptions,
+from pma_gym.engine.option_checks import (
     Pressure,
     check_count,
     check_known,
     check_named,
-    parse_options,
     parse_pressures,
-    parse_task,
 )
+from pma_gym.engine.options import EnvironmentOptions, parse_options, parse_task
 from pma_gym.engine.plain_values import plain_scalar
 from pma_gym.engine.snapshot import put, take
 from pma_gym.engine.state_layout import PARTS
-from pma_gym.envs.batch import all_seeds, masked, spread, wanted_pressures
+from pma_gym.envs.batch import BatchActions, all_seeds, masked, wanted_pressures
 from pma_gym.envs.copies import Copies
 from pma_gym.envs.function_rewards import FunctionRewards
 from pma_gym.envs.member import BatchMember
+from pma_gym.envs.rendering.display import Display
 from pma_gym.envs.rendering.history import RecordingEngine
 from pma_gym.envs.rendering.picture_size import USUAL_WIDTH, check_render_width
 from pma_gym.envs.seeding import SeededByReset, own_seeds
 from pma_gym.envs.setup import SINGLE, Setup, setup
 from pma_gym.envs.specs import completed_spec
 from pma_gym.envs.state import EnvState, check_state, generator_at, generator_state
-from pma_gym.envs.summary import exercise_summaries, summaries
+from pma_gym.envs.summary import last_infos
 from pma_gym.renamed_names import renamed_attribute
-from pma_gym.tasks import Task, limit_in_words
-
-if TYPE_CHECKING:
-    from pma_gym.envs.rendering.picture import Picture
+from pma_gym.tasks import Task
 
 OWN = (
     *("num_envs", "task", "autoreset_mode", "threads", "precision", "pressures_kpa"),
@@ -143,7 +139,6 @@ class PMAVectorEnv(
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._all = np.arange(num_envs)
-        self._shape = (num_envs, *self.single_action_space.shape)
         self._seeds: tuple[int | None, ...] = (None,) * num_envs
         self._begun = np.zeros(num_envs, np.bool_)
         self._ended = np.zeros(num_envs, np.bool_)
@@ -152,14 +147,14 @@ class PMAVectorEnv(
         self._idle = True
         self._attach()
 
-    _ATTACHED = frozenset({"table", "_given", "_advance", "_rewards", "_picture"})
+    _ATTACHED = frozenset({"table", "_actions", "_advance", "_rewards", "_display"})
 
     def _attach(self) -> None:
         """Point into the engine."""
         self.table: ObservationTable = self.engine.table
-        self._given = self.engine.actions[: self.num_envs]
+        self._actions = BatchActions(self.engine.actions[: self.num_envs])
         self._advance = self._rewarded if callable(self.options.reward) else self.engine.step
-        self._picture: Picture | None = None
+        self._display = Display(self.task, self.render_width)
         if self.closed:
             self.engine.close()
 
@@ -296,12 +291,12 @@ class PMAVectorEnv(
         waiting = self._waiting
         if self._idle or waiting is not None:
             self._require_episodes()
-        self._take(actions, waiting)
+        self._actions.take(actions, waiting)
         engine = self.engine
         try:
             ended = self._advance()
         except ActionError:
-            raise self._not_finite() from None
+            raise self._actions.not_finite() from None
         if waiting is not None:
             ended = self._begin_again(waiting)
         if ended:
@@ -353,7 +348,7 @@ class PMAVectorEnv(
             info = self._final(over, indices)
             engine.reset(indices)
         else:
-            info = self._summaries(over, indices)
+            info = last_infos(engine, over, indices)
             self._ended, self._waiting = over, indices
             # With autoreset they are stepped once more: from somewhere harmless.
             engine.park(np.flatnonzero(terminated))
@@ -367,7 +362,7 @@ class PMAVectorEnv(
         return {
             "final_obs": final,
             "_final_obs": over,
-            "final_info": self._summaries(over, indices),
+            "final_info": last_infos(self.engine, over, indices),
             "_final_info": over.copy(),
         }
 
@@ -383,53 +378,6 @@ class PMAVectorEnv(
         engine.terminated[indices] = engine.truncated[indices] = False
         self._ended[:], self._waiting = False, None
         return int(engine.terminated.any() or engine.truncated.any())
-
-    def _take(self, actions: object, waiting: NDArray[np.int64] | None) -> None:
-        """Hand the actions over; those of episodes that have ended mean nothing."""
-        try:
-            array = np.asarray(actions)
-            if array.dtype.kind not in "fiu":
-                raise TypeError
-        except (TypeError, ValueError):
-            raise ValueError(
-                f"{self._rule()}; got {type(actions).__name__} of no real numbers"
-            ) from None
-        if array.shape != self._shape:
-            raise ValueError(f"{self._rule()}; got shape {array.shape}")
-        self._given[:] = array
-        if waiting is not None:
-            self._given[waiting] = 0.0
-
-    def _not_finite(self) -> ValueError:
-        """What is wrong with actions that the engine refuses."""
-        row = int(np.flatnonzero(~np.isfinite(self._given).all(axis=1))[0])
-        return ValueError(
-            f"{self._rule()}, all of them finite; environment {row} got "
-            f"{self._given[row].tolist()}; look for a division by zero or a diverged policy"
-        )
-
-    def _rule(self) -> str:
-        return (
-            f"actions must have shape {self._shape}: one row an environment, each entry -1 to 1 "
-            "for 0 to 10 V"
-        )
-
-    def _summaries(self, over: NDArray[np.bool_], indices: NDArray[np.int64]) -> dict[str, Any]:
-        """Last infos of the episodes that ended, in Gymnasium's form: arrays with masks."""
-        engine, task = self.engine, self.task
-        columns = engine.rows(indices).T
-        numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
-        sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
-        columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
-        columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
-        columns_by_name |= summaries(task, sums, numbers["sample"])
-        if task.exercise:
-            counts = engine.counts()[indices]
-            columns_by_name |= exercise_summaries(numbers, counts, self.options.period)
-        pairs = zip(indices.tolist(), numbers["ended"].tolist(), strict=True)
-        limits = [limit_in_words(engine.models[i], code, task.exercise) for i, code in pairs]
-        columns_by_name["ended_by"] = np.array(limits, object)
-        return spread(columns_by_name, over, indices)
 
     def station_info(self) -> dict[str, NDArray[Any]]:
         """The numbers of `PMAEnv`'s info in the last step, shape (num_envs,) each."""
@@ -486,19 +434,11 @@ class PMAVectorEnv(
             return None
         return tuple(self.member(i).picture() for i in range(self.num_envs))
 
-    def _drawing(self) -> "Picture":
-        if self._picture is None:
-            # Imported here: environments without pictures need no matplotlib.
-            from pma_gym.envs.rendering.picture import Picture
-
-            self._picture = Picture(self.task, self.render_width)
-        return self._picture
-
     def close_extras(self, **kwargs: Any) -> None:
         """Free the picture and end the threads."""
-        self._picture = None
         # Gymnasium 1.1 closes a batch whose options were refused too.
         if hasattr(self, "engine"):
+            self._display.close()
             self.engine.close()
 
 

@@ -31,11 +31,12 @@ class Fit:
 
     Attributes:
         model: the model with the fitted parameters.
-        values: them by path, in file units.
+        parameters: the fitted parameters in SI, by `effect.parameter`.
+        covariance: of `parameters`, in their order, in SI, scaled as the errors, shape (p, p).
+        values: the parameters in file units, by path, as `Model.replace` takes them.
         errors: their standard errors, by path: from the readings' noise, and where the model leaves
             more than noise unexplained, that much larger. Infinite for one that the trials do not
             determine; nan for one at a bound.
-        covariance: of the parameters, in file units, scaled as the errors, shape (p, p).
         chi_square: sum of squared residuals, in standard deviations of the readings.
         count: number of residuals.
         rounds: how many times the trials were simulated with all moves, few or all.
@@ -46,9 +47,10 @@ class Fit:
     """
 
     model: Model
+    parameters: dict[str, float]
+    covariance: NDArray[np.float64]
     values: dict[str, float]
     errors: dict[str, float]
-    covariance: NDArray[np.float64]
     chi_square: float
     count: int
     rounds: int

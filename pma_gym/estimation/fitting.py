@@ -267,11 +267,13 @@ class LevenbergMarquardt:
         surplus = max(1.0, self.best.chi_square / max(residuals.count - size, 1))
         part = np.ix_(loose, loose)
         covariance[part] = surplus * inverse(self.best.curvature[part])
+        names, factors = [free.name for free in residuals.free], residuals.factors
         return Fit(
             model=residuals.plant.model.replace(values),
+            parameters=dict(zip(names, (factors * self.values).tolist(), strict=True)),
+            covariance=np.outer(factors, factors) * covariance,
             values=values,
             errors=self.named(np.sqrt(np.diag(covariance))),
-            covariance=covariance,
             chi_square=self.best.chi_square,
             count=residuals.count,
             rounds=self.rounds,

@@ -118,25 +118,25 @@ _ADDRESSES = ("signals", "scratch", "out", "simulated", "measured", "weights")
 
 def _multiply(b: Builder, given: dict[str, Operand]) -> None:
     """Write the products of one job; sums stand behind the differences in its scratch memory."""
-    lanes = SimdEmitter(LANES)
+    simd = SimdEmitter(LANES)
     scratch, rows = given["scratch"], given["rows"]
     size = b.add(given["moved"], integer(1))
     pairs = b.sdiv(b.mul(size, b.add(size, integer(1))), integer(2))
     with loop(b, pairs) as pair:
-        lanes.store(b, lanes.constant(0.0), scratch, b.add(size, pair))
+        simd.store(b, simd.constant(0.0), scratch, b.add(size, pair))
     with loop(b, rows, 0, LANES) as first, loop(b, given["channels"]) as channel:
         at = b.mul(channel, integer(len(_SIGNAL)))
         own = _entries(b, offset(b, given["signals"], at, INTEGER), _SIGNAL)
-        _differ(b, lanes, {**given, **own}, first, size)
+        _differ(b, simd, {**given, **own}, first, size)
         with loop(b, size) as i:
-            one, start = lanes.load(b, scratch, i), b.add(size, _before(b, i))
+            one, start = simd.load(b, scratch, i), b.add(size, _before(b, i))
             with loop(b, b.add(i, integer(1))) as j:
                 at = b.add(start, j)
-                other, total = lanes.load(b, scratch, j), lanes.load(b, scratch, at)
-                lanes.store(b, intrinsic(b, "fma", one, other, total), scratch, at)
+                other, total = simd.load(b, scratch, j), simd.load(b, scratch, at)
+                simd.store(b, intrinsic(b, "fma", one, other, total), scratch, at)
     with loop(b, size) as i, loop(b, b.add(i, integer(1))) as j:
-        total = lanes.load(b, scratch, b.add(b.add(size, _before(b, i)), j))
-        parts = [lanes.extract(b, total, k) for k in range(LANES)]
+        total = simd.load(b, scratch, b.add(b.add(size, _before(b, i)), j))
+        parts = [simd.extract(b, total, k) for k in range(LANES)]
         while len(parts) > 1:
             parts = [b.fadd(one, other) for one, other in zip(parts[::2], parts[1::2], strict=True)]
         for row, column in ((i, j), (j, i)):
@@ -149,7 +149,7 @@ def _before(b: Builder, row: Operand) -> Operand:
 
 
 def _differ(
-    b: Builder, lanes: SimdEmitter, given: dict[str, Operand], first: Operand, size: Operand
+    b: Builder, simd: SimdEmitter, given: dict[str, Operand], first: Operand, size: Operand
 ) -> None:
     """Write the differences of some rows into scratch memory, weighted."""
     rows = [b.add(first, integer(k)) for k in range(LANES)]
@@ -157,12 +157,12 @@ def _differ(
     last = b.sub(given["rows"], integer(1))
     rows = [b.select(there, row, last) for row, there in zip(rows, inside, strict=True)]
     steps = [b.mul(row, given["step"]) for row in rows]
-    none, half = real(0.0), lanes.constant(0.5)
+    none, half = real(0.0), simd.constant(0.5)
 
     def gathered(numbers: Sequence[Operand]) -> Operand:
-        vector = lanes.constant(0.0)
+        vector = simd.constant(0.0)
         for k, number in enumerate(numbers):
-            vector = lanes.insert(b, vector, number, k)
+            vector = simd.insert(b, vector, number, k)
         return vector
 
     def column(name: str) -> list[Operand]:
@@ -174,12 +174,12 @@ def _differ(
 
     weighing = zip(column("weights"), inside, strict=True)
     weights = gathered([b.select(there, weight, none) for weight, there in weighing])
-    counts = b.fcmp_ordered("!=", weights, lanes.constant(0.0))
+    counts = b.fcmp_ordered("!=", weights, simd.constant(0.0))
 
     def keep(number: Operand | int, difference: Operand) -> None:
         # What counts for nothing may be no number.
-        weighted = b.select(counts, b.fmul(difference, weights), lanes.constant(0.0))
-        lanes.store(b, weighted, given["scratch"], number)
+        weighted = b.select(counts, b.fmul(difference, weights), simd.constant(0.0))
+        simd.store(b, weighted, given["scratch"], number)
 
     as_it_is = signal(integer(0))
     keep(0, b.fsub(as_it_is, gathered(column("measured"))))

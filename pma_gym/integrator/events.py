@@ -174,16 +174,16 @@ def locate_event(
         # at which the parabola through both ends comes there.
         over = beyond * beyond * (0.5 * length if event.turning else 1.0)
         coming = 2.0 * (at_end - at_start) - speed * length
-        is_passed = (beyond > 0.0) & (over > event.overshoot * abs(coming))
+        is_crossed = (beyond > 0.0) & (over > event.overshoot * abs(coming))
         if event.turning:
             # As good as turned, it may go on as it did for longer than was thought.
             turns_late = sign * at_start < 0.0
             twice = twice | (turns_late & (beyond * length > event.overshoot))
-            is_passed = is_passed & ~turns_late
-        missed = missed | is_passed
-        start = where(is_passed, sign * at_start, start)
-        rate = where(is_passed, sign * speed, rate)
-        end = where(is_passed, sign * at_end, end)
+            is_crossed = is_crossed & ~turns_late
+        missed = missed | is_crossed
+        start = where(is_crossed, sign * at_start, start)
+        rate = where(is_crossed, sign * speed, rate)
+        end = where(is_crossed, sign * at_end, end)
     slope = rate * length
     curvature = end - start - slope
     inside = slope * slope - 4.0 * curvature * start
@@ -244,10 +244,10 @@ def _passed_twice(
 ) -> Value:
     """Whether an event was passed and passed again on the way, such as by turning twice."""
     least = event.overshoot * (10.0 if event.turning else 1.0)
-    passed = []
+    crossed = []
     for states in made.visited:
         given = {state.value.id: value for state, value in zip(leading, states, strict=True)}
         (there,) = substitute([event.value], {**frozen, **given})
         beyond = (-0.25 * sign) * there
-        passed.append((beyond * length if event.turning else beyond) > least)
-    return passed[0] | passed[1]
+        crossed.append((beyond * length if event.turning else beyond) > least)
+    return crossed[0] | crossed[1]

@@ -75,21 +75,21 @@ class Lane:
 
     Args:
         builder: where to write.
-        lanes: width and type.
+        simd: width and type.
         layout: what a lane works on.
         own: further numbers that a lane keeps, by name.
     """
 
     def __init__(
-        self, builder: Builder, lanes: SimdEmitter, layout: Layout, own: Sequence[str] = ()
+        self, builder: Builder, simd: SimdEmitter, layout: Layout, own: Sequence[str] = ()
     ) -> None:
-        self.builder, self.lanes, self.layout = builder, lanes, layout
+        self.builder, self.simd, self.layout = builder, simd, layout
         self.at = {value.id: i for i, value in enumerate(layout.slots)}
         self.own = {name: len(self.at) + i for i, name in enumerate(own)}
         size = len(self.at) + len(own)
-        self.memory = memory(builder, ir.ArrayType(lanes.real, size))
-        self.jobs = memory(builder, ir.ArrayType(INTEGER, lanes.width))
-        self.one = SimdEmitter(1, {8: "double", 4: "float"}[lanes.size], FUSED)
+        self.memory = memory(builder, ir.ArrayType(simd.real, size))
+        self.jobs = memory(builder, ir.ArrayType(INTEGER, simd.width))
+        self.one = SimdEmitter(1, {8: "double", 4: "float"}[simd.size], FUSED)
 
     def slot(self, what: Value | str) -> int:
         """Place of a value or of a number by name."""
@@ -97,37 +97,37 @@ class Lane:
 
     def cell(self, what: Value | str, lane: Operand | int) -> Operand:
         """Address of a lane's number."""
-        first = integer(self.slot(what) * self.lanes.places)
+        first = integer(self.slot(what) * self.simd.elements)
         where = self.builder.add(first, integer(lane))
-        return offset(self.builder, self.memory, where, self.lanes.element)
+        return offset(self.builder, self.memory, where, self.simd.element)
 
     def put(self, what: Value | str, lane: Operand | int, number: Operand) -> None:
         """Write a lane's number."""
-        if self.lanes.width == 1:
-            self.put_vector(what, self.lanes.spread(self.builder, number))
+        if self.simd.width == 1:
+            self.put_vector(what, self.simd.spread(self.builder, number))
         else:
             self.builder.store(number, self.cell(what, lane))
 
     def get(self, what: Value | str, lane: Operand | int) -> Operand:
         """Read a lane's number."""
-        return self.builder.load(self.cell(what, lane), typ=self.lanes.element)
+        return self.builder.load(self.cell(what, lane), typ=self.simd.element)
 
     def vector(self, what: Value | str) -> Operand:
         """All lanes' numbers."""
-        return self.lanes.load(self.builder, self.memory, self.slot(what))
+        return self.simd.load(self.builder, self.memory, self.slot(what))
 
     def put_vector(self, what: Value | str, numbers: Operand) -> None:
         """Write all lanes' numbers."""
-        self.lanes.store(self.builder, numbers, self.memory, self.slot(what))
+        self.simd.store(self.builder, numbers, self.memory, self.slot(what))
 
     def narrow(self, number: Operand) -> Operand:
         """A number in double precision as the lanes have it."""
-        single = self.lanes.element is not DOUBLE
-        return self.builder.fptrunc(number, self.lanes.element) if single else number
+        single = self.simd.element is not DOUBLE
+        return self.builder.fptrunc(number, self.simd.element) if single else number
 
     def widen(self, number: Operand) -> Operand:
         """A lane's number in double precision."""
-        single = self.lanes.element is not DOUBLE
+        single = self.simd.element is not DOUBLE
         return self.builder.fpext(number, DOUBLE) if single else number
 
     def job(self, lane: Operand | int) -> Operand:
@@ -142,9 +142,9 @@ class Lane:
             table: address of the model's table, numbers in double precision.
             spacing: how many numbers lie from one of the table to the next.
         """
-        places = {value.id: i for i, value in enumerate(self.layout.table)}
+        offsets = {value.id: i for i, value in enumerate(self.layout.table)}
         for value in self.layout.fixed:
-            where = offset(self.builder, table, places[value.id] * spacing)
+            where = offset(self.builder, table, offsets[value.id] * spacing)
             self.put(value, lane, self.narrow(self.builder.load(where, typ=DOUBLE)))
 
     def hold(self, lane: Operand, given: dict[int, Operand]) -> None:
@@ -188,17 +188,17 @@ def integrate_lanes(
     Returns:
         Address of how many attempts were made, all lanes at once.
     """
-    b, lanes, layout = lane.builder, lane.lanes, lane.layout
+    b, simd, layout = lane.builder, lane.simd, lane.layout
     active = memory(b, INTEGER)
     attempts = memory(b, INTEGER)
     b.store(integer(0), active)
     b.store(integer(0), attempts)
-    zero = ir.Constant(lanes.element, 0.0)
-    with loop(b, lanes.width) as k:
+    zero = ir.Constant(simd.element, 0.0)
+    with loop(b, simd.width) as k:
         # Numbers that an idle lane can be computed with, whatever they mean.
         for i in range(len(lane.at) + len(lane.own)):
-            where = b.add(integer(i * lanes.places), k)
-            b.store(zero, offset(b, lane.memory, where, lanes.element))
+            where = b.add(integer(i * simd.elements), k)
+            b.store(zero, offset(b, lane.memory, where, simd.element))
         has_work = take(k)
         b.store(b.select(has_work, b.load(lane.job(k), typ=INTEGER), integer(-1)), lane.job(k))
         b.store(b.add(b.load(active, typ=INTEGER), b.zext(has_work, INTEGER)), active)
@@ -206,15 +206,15 @@ def integrate_lanes(
         leave_if(b.icmp_signed("<=", b.load(active, typ=INTEGER), integer(0)))
         b.store(b.add(b.load(attempts, typ=INTEGER), integer(1)), attempts)
         known = {value.id: lane.vector(value) for value in layout.slots}
-        emitted = lanes.emit(b, [*layout.outputs, *extra], known)
+        emitted = simd.emit(b, [*layout.outputs, *extra], known)
         if watch is not None:
             watch(emitted)
         for value, new in zip(layout.changing, layout.outputs, strict=True):
             lane.put_vector(value, emitted[new.id])
         left = emitted[attempt.next_left.id]
-        finished = b.fcmp_ordered("<=", left, lanes.constant(0.0))
-        with b.if_then(lanes.any(b, finished)):
-            with loop(b, lanes.width) as k:
+        finished = b.fcmp_ordered("<=", left, simd.constant(0.0))
+        with b.if_then(simd.any(b, finished)):
+            with loop(b, simd.width) as k:
                 there = b.icmp_signed(">=", b.load(lane.job(k), typ=INTEGER), integer(0))
                 ended = b.fcmp_ordered("<=", lane.get(attempt.left, k), zero)
                 with b.if_then(b.and_(there, ended)):

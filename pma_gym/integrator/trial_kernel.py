@@ -44,8 +44,8 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
         f"simulate_{width}",
         [("count", INTEGER), ("jobs", POINTER), ("taken", POINTER), ("attempts", POINTER)],
     )
-    lanes = SimdEmitter(width, fused=FUSED, paired=pairs(width))
-    lane = Lane(b, lanes, system.layout)
+    simd = SimdEmitter(width, fused=FUSED, paired=pairs(width))
+    lane = Lane(b, simd, system.layout)
     rows = memory(b, ir.ArrayType(INTEGER, width))
     n = len(eq.remembered)
 
@@ -63,15 +63,15 @@ def write_simulate(module: ir.Module, system: System, width: int) -> None:
     begun = first_size(made.size, jump)
 
     def begin_row(k: Operand, job: Operand, row: Operand) -> None:
-        ahead = b.add(row, integer(1))
-        duration = b.fsub(at(job, "time", ahead), at(job, "time", row))
+        next_row = b.add(row, integer(1))
+        duration = b.fsub(at(job, "time", next_row), at(job, "time", row))
         lane.put(made.left, k, duration)
         linear = b.icmp_signed("!=", entry(job, "first_order_hold"), integer(0))
         start = address(job, "start")
         known = {eq[ZERO].id: b.load(offset(b, start, n + 1), typ=DOUBLE)}
         moved: Operand = ir.Constant(DOUBLE, 0.0)
         for name, column in zip(COMMANDS, ("motor", "regulator"), strict=True):
-            first, last = at(job, column, row), at(job, column, ahead)
+            first, last = at(job, column, row), at(job, column, next_row)
             slope = b.fdiv(b.fsub(last, first), duration)
             known[eq.graph.input(f"{name}_slope", 1).id] = b.select(
                 linear, slope, ir.Constant(DOUBLE, 0.0)

@@ -72,13 +72,13 @@ class Program:
         model: the model it was made for.
         states: names of states and memories, in the order of the state vector.
         outputs: names of the true outputs.
-        places: where a model's vector has which number; the tolerance comes first.
+        offsets: where a model's vector has which number; the tolerance comes first.
     """
 
     def __init__(self, model: Model) -> None:
         self.model = model
         names = ["tolerance", *parameter_names(model)]
-        self.places: Mapping[str, int] = {name: i for i, name in enumerate(names)}
+        self.offsets: Mapping[str, int] = {name: i for i, name in enumerate(names)}
         # Briefly: a candidate of a diagnosis is compiled for a second or two of simulation.
         key = ["plant", *self.key()]
         self.library = compiled(key, self._build, f"plant {model.name}", brief=True)
@@ -161,7 +161,7 @@ class Program:
         The vector begins with the tolerance.
         """
         return {
-            value.id: builder.load(offset(builder, vector, self.places[value.data]), typ=DOUBLE)
+            value.id: builder.load(offset(builder, vector, self.offsets[value.data]), typ=DOUBLE)
             for value in live_inputs(values)
             if value.level == FIXED
         }
@@ -238,7 +238,7 @@ class Program:
             + [("vectors", POINTER), ("stride", INTEGER), ("out", POINTER)],
         )
         stretch, contraction = (
-            self.places[f"limits.{name}"] for name in ("stretch", "contraction")
+            self.offsets[f"limits.{name}"] for name in ("stretch", "contraction")
         )
         with loop(b, count) as row:
             vector = offset(b, vectors, b.mul(row, stride))

@@ -293,18 +293,18 @@ class _Group:
         self._scaled = scaled(layers)
 
     def passed(self, seen: Tensor) -> Sequence[Tensor]:
-        *self._hidden, y = passed(seen, self._scaled, self._places(len(seen))[0])
+        *self._hidden, y = passed(seen, self._scaled, self._buffers(len(seen))[0])
         return self._each(y)
 
     def backward(self, grad_output: Sequence[Tensor], seen: Tensor) -> None:
         together = grad_output[0] if self.count == 1 else torch.stack(list(grad_output))
-        out = Derivatives(self._gradients, self._places(len(seen))[1])
+        out = Derivatives(self._gradients, self._buffers(len(seen))[1])
         derivatives(together, seen, self._weights, self._hidden, out)
 
     def _each(self, together: Tensor) -> Sequence[Tensor]:
         return [together] if self.count == 1 else list(together)
 
-    def _places(self, rows: int) -> list[list[Tensor]]:
+    def _buffers(self, rows: int) -> list[list[Tensor]]:
         """Memory for what hidden layers pass on, and for derivatives by it."""
         if rows not in self._memory:
             hidden = [weight[..., 0] for weight in self._weights[:-1]]

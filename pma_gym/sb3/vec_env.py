@@ -13,7 +13,7 @@ from stable_baselines3.common.monitor import Monitor
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvObs, VecEnvStepReturn
 
-from pma_gym.engine.options import check_known
+from pma_gym.engine.option_checks import check_known
 from pma_gym.envs.member import TOGETHER, BatchMember, refusal
 from pma_gym.envs.registered import is_id, registered
 from pma_gym.envs.summary import last_info

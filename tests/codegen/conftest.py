@@ -128,18 +128,18 @@ def run_columns():
     return run
 
 
-def columns_module(outputs, inputs, lanes):
+def columns_module(outputs, inputs, simd):
     """A module whose function `run` works on blocks of rows [slot, lane]."""
     module = ir.Module()
     arguments = [("blocks", INTEGER), ("given", POINTER), ("computed", POINTER)]
     builder, (blocks, given, into) = function(module, "run", arguments)
     with loop(builder, blocks) as block:
-        row = lanes.address(builder, given, builder.mul(block, integer(len(inputs))))
-        known = {v.id: lanes.load(builder, row, i, v.kind) for i, v in enumerate(inputs)}
-        operands = lanes.emit(builder, outputs, known)
-        row = lanes.address(builder, into, builder.mul(block, integer(len(outputs))))
+        row = simd.address(builder, given, builder.mul(block, integer(len(inputs))))
+        known = {v.id: simd.load(builder, row, i, v.kind) for i, v in enumerate(inputs)}
+        operands = simd.emit(builder, outputs, known)
+        row = simd.address(builder, into, builder.mul(block, integer(len(outputs))))
         for i, value in enumerate(outputs):
-            lanes.store(builder, operands[value.id], row, i, value.kind)
+            simd.store(builder, operands[value.id], row, i, value.kind)
     builder.ret_void()
     return module
 
@@ -147,16 +147,16 @@ def columns_module(outputs, inputs, lanes):
 def run(outputs, given, width=1, real="double", fused=False, paired=False):
     """Compiled outputs for arrays by name, of a length that the width divides."""
     inputs = live_inputs(outputs)
-    lanes = SimdEmitter(width, real, fused, paired)
-    library = Library(columns_module(outputs, inputs, lanes))
+    simd = SimdEmitter(width, real, fused, paired)
+    library = Library(columns_module(outputs, inputs, simd))
     call = library.function("run", [ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p])
     type_ = {"double": np.float64, "float": np.float32}[real]
     columns = [np.asarray(given[value.data]) for value in inputs]
     columns = [c.view(type_) if c.dtype == np.uint64 else c.astype(type_) for c in columns]
     blocks = len(columns[0]) // width
     packed = np.stack([c.reshape(blocks, width) for c in columns], axis=1)
-    packed = np.repeat(packed, lanes.places // width, axis=2)
-    computed = np.zeros((blocks, len(outputs), lanes.places), type_)
+    packed = np.repeat(packed, simd.elements // width, axis=2)
+    computed = np.zeros((blocks, len(outputs), simd.elements), type_)
     call(blocks, packed.ctypes.data, computed.ctypes.data)
     results = [computed[:, i, :width].ravel() for i in range(len(outputs))]
     kinds = [value.kind for value in outputs]

@@ -15,7 +15,7 @@ from pma_gym.codegen.trace import live_inputs, operation_counts, trace
 from pma_gym.effects.slide.coulomb_friction import COULOMB_FRICTION, friction_force
 
 
-def text_of(outputs, lanes):
+def text_of(outputs, simd):
     """A kernel of one thread a lane, on rows [slot, lane]."""
     inputs, module = live_inputs(outputs), ir.Module()
     arguments = [("count", INTEGER), ("given", POINTER), ("computed", POINTER)]
@@ -26,10 +26,10 @@ def text_of(outputs, lanes):
         def at(slot):
             return builder.add(builder.mul(count, integer(slot)), lane)
 
-        known = {v.id: lanes.load(builder, given, at(i), v.kind) for i, v in enumerate(inputs)}
-        operands = lanes.emit(builder, outputs, known)
+        known = {v.id: simd.load(builder, given, at(i), v.kind) for i, v in enumerate(inputs)}
+        operands = simd.emit(builder, outputs, known)
         for i, value in enumerate(outputs):
-            lanes.store(builder, operands[value.id], into, at(i), value.kind)
+            simd.store(builder, operands[value.id], into, at(i), value.kind)
     builder.ret_void()
     return ptx(module)
 
@@ -61,8 +61,8 @@ def test_strict_text_rounds_every_operation(friction):
 
 def test_fused_and_single_text(friction):
     fused, single = (
-        instructions(text_of(friction, lanes))
-        for lanes in (SimdEmitter(fused=True), SimdEmitter(real="float"))
+        instructions(text_of(friction, simd))
+        for simd in (SimdEmitter(fused=True), SimdEmitter(real="float"))
     )
     assert fused["fma.rn.f64"] > 0
     assert single["div.rn.f32"] > 0 and single["fma.rn.f32"] == 0

@@ -84,16 +84,16 @@ def test_variables_made_in_a_loop_are_set_aside_once():
 
 @pytest.mark.parametrize("width", WIDTHS)
 def test_lanes_are_loaded_spread_and_stored(width):
-    lanes = SimdEmitter(width)
+    simd = SimdEmitter(width)
 
     def write(builder, given, into):
-        lanes.store(builder, lanes.load(builder, given, 1), into, 0)
-        lanes.store(builder, lanes.load_spread(builder, given, 1), into, 1)
-        lanes.store(builder, lanes.constant(0.1), into, 2)
-        last = lanes.extract(builder, lanes.load(builder, given, integer(2)), width - 1)
-        lanes.store(builder, lanes.spread(builder, last), into, 3)
-        row = lanes.load(builder, given, 0)
-        lanes.store(builder, lanes.insert(builder, row, last, integer(0)), into, integer(4))
+        simd.store(builder, simd.load(builder, given, 1), into, 0)
+        simd.store(builder, simd.load_spread(builder, given, 1), into, 1)
+        simd.store(builder, simd.constant(0.1), into, 2)
+        last = simd.extract(builder, simd.load(builder, given, integer(2)), width - 1)
+        simd.store(builder, simd.spread(builder, last), into, 3)
+        row = simd.load(builder, given, 0)
+        simd.store(builder, simd.insert(builder, row, last, integer(0)), into, integer(4))
 
     given = np.arange(3.0 * width).reshape(3, width) + 0.5
     into = np.zeros((5, width))
@@ -108,11 +108,11 @@ def test_lanes_are_loaded_spread_and_stored(width):
 @pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("truths", ["none", "first", "last", "all"])
 def test_any_and_all(width, truths):
-    lanes = SimdEmitter(width)
+    simd = SimdEmitter(width)
 
     def write(builder, given):
-        mask = lanes.load(builder, given, kind="truth")
-        some, every = lanes.any(builder, mask), lanes.all(builder, mask)
+        mask = simd.load(builder, given, kind="truth")
+        some, every = simd.any(builder, mask), simd.all(builder, mask)
         return builder.add(
             builder.zext(some, INTEGER), builder.mul(builder.zext(every, INTEGER), integer(2))
         )

@@ -126,7 +126,7 @@ def driven_slide(friction=0.0, lanes=4, seconds=4.0, rate=250):
             share = (k + 0.5) / substeps
             load = loads[row] + share * (loads[row + 1] - loads[row])
             position = position + 0.5 * step * velocity
-            dry = friction * bristles.bend(velocity, step)
+            dry = friction * bristles.deflect(velocity, step)
             force = -load - dry - SLIDE["viscous"] * velocity
             velocity = velocity + step * force / SLIDE["mass"]
             position = position + 0.5 * step * velocity

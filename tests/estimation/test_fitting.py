@@ -8,7 +8,7 @@ from threadpoolctl import threadpool_info, threadpool_limits
 
 from pma_gym.data import calibration
 from pma_gym.data.trial import Trial
-from pma_gym.estimation import fitting, residuals
+from pma_gym.estimation import fitting, simulated_trials
 from pma_gym.estimation.fitting import fit
 from pma_gym.estimation.least_squares import inverse, least
 from pma_gym.estimation.residuals import Residuals
@@ -32,6 +32,12 @@ TRUE = {
     if f"{effect}.{door}" in FREE
 }
 TRUE = {path: TRUE[path] for path in FREE}
+TRUE_SI = {
+    "sarosi_force.slope": STATION.parameters["sarosi_force"].slope,
+    "symmetric_damping.slope": STATION.parameters["symmetric_damping"].slope,
+    "hysteresis.force": STATION.parameters["hysteresis"].force,
+    "regulator_lag.time_constant": STATION.parameters["regulator_lag"].time_constant,
+}
 OFF = STATION.replace(
     {path: share * TRUE[path] for path, share in zip(FREE, (1.2, 0.75, 1.3, 0.8), strict=True)}
 )
@@ -69,11 +75,24 @@ def test_a_fit_recovers_the_parameters_within_their_standard_errors(fitted, meas
     off = np.array([fitted.values[path] - TRUE[path] for path in FREE])
     assert np.all(np.abs(off) < 3.0 * np.array([fitted.errors[path] for path in FREE]))
     # All together: chi-square of four.
+    off = np.array([value - TRUE_SI[name] for name, value in fitted.parameters.items()])
     assert off @ np.linalg.solve(fitted.covariance, off) < 15.0
     for path, share in zip(FREE, (1e-3, 2e-2, 5e-2, 1e-2), strict=True):
         assert 0.0 < fitted.errors[path] < share * TRUE[path]
     again = Residuals(fitted.model, measured, FREE).each(np.array(list(fitted.values.values())))
     assert sum(np.sum(each**2) for each in again) == pytest.approx(fitted.chi_square, rel=1e-12)
+
+
+def test_parameters_and_their_covariance_are_in_si_in_one_order(fitted):
+    assert list(fitted.parameters) == list(TRUE_SI)
+    for name, value in fitted.parameters.items():
+        effect, _, parameter = name.partition(".")
+        assert value == pytest.approx(
+            getattr(fitted.model.parameters[effect], parameter), rel=1e-12
+        )
+    factors = np.array([1e-5, 1.0, 1.0, 1.0])  # SI of N/bar, N s/mm/kPa, N, s
+    errors = factors * np.array([fitted.errors[path] for path in FREE])
+    np.testing.assert_allclose(np.sqrt(np.diag(fitted.covariance)), errors, rtol=1e-12)
 
 
 def test_errors_cover_what_noise_does_to_the_parameters():
@@ -120,7 +139,7 @@ def test_bits_depend_neither_on_threads_nor_on_blocks(fitted, measured, monkeypa
     estimate = fit(OFF, measured, FREE, threads=3)
     assert estimate.values == fitted.values and estimate.chi_square == fitted.chi_square
     np.testing.assert_array_equal(estimate.covariance, fitted.covariance)
-    monkeypatch.setattr(residuals, "MOST_BYTES", 1 << 20)
+    monkeypatch.setattr(simulated_trials, "MOST_BYTES", 1 << 20)
     assert fit(OFF, measured, FREE, threads=2).values == fitted.values
 
 

@@ -199,9 +199,9 @@ def ramped_attempts(plant, state, zero, motor, slope, size, most):
     for _ in range(most):
         with np.errstate(all="ignore"):
             attempt = module["attempt"](*(np.float64(known[one.data]) for one in inputs))
-        *after, known["size"], known["left"], taken, length = attempt
+        *after, known["size"], known["left"], accepted, length = attempt
         known |= dict(zip(names, after, strict=True))
-        yield bool(taken), float(length), float(known["size"])
+        yield bool(accepted), float(length), float(known["size"])
         if known["left"] <= 0.0:
             return
     pytest.fail(f"no end of the row after {most} attempts")
@@ -224,8 +224,8 @@ def test_a_slide_that_all_but_stands_breaks_away_in_few_attempts(power):
             state[plant.states.index("angle")] += force / cable.stiffness / radius
             motor = 8.0 + force / drive.gain
             tries = ramped_attempts(plant, state, rest.zero_contraction, motor, slope, 1.0, 60)
-            for taken, length, size in tries:
-                assert taken or size < length
+            for accepted, length, size in tries:
+                assert accepted or size < length
 
 
 def test_a_long_hold_takes_hardly_more_than_an_attempt_a_row():

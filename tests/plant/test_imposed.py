@@ -56,10 +56,10 @@ def test_a_records_amplitude_is_halved_at_the_bandwidth(share, passed):
 
 def test_a_steady_motion_passes_uneven_times_as_it_is():
     time = np.cumsum(np.random.default_rng(0).uniform(0.001, 0.02, 500))
-    motion, rate, bend = smoothed(time, 0.3 + 0.02 * time, 2.0)
+    motion, rate, curvature = smoothed(time, 0.3 + 0.02 * time, 2.0)
     np.testing.assert_allclose(motion, 0.3 + 0.02 * time, atol=1e-12)
     np.testing.assert_allclose(rate, 0.02, atol=1e-10)
-    np.testing.assert_allclose(bend, 0.0, atol=1e-8)
+    np.testing.assert_allclose(curvature, 0.0, atol=1e-8)
 
 
 def test_damping_feels_the_velocity_of_the_motion():

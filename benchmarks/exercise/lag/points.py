@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.options import nominal_model
+from pma_gym.engine.nominal_rig import nominal_model
 from pma_gym.plant.exercise_device.device import own_device, resistive_moment
 from pma_gym.plant.exercise_device.prescription import follow_from
 from pma_gym.plant.forms.linear import linearize

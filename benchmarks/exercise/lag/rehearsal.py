@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
-from pma_gym.engine.options import Pressure
+from pma_gym.engine.option_checks import Pressure
 from pma_gym.envs import PMAEnv, PMAVectorEnv
 from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.plant.model import Model

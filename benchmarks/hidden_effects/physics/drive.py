@@ -109,7 +109,7 @@ class BearingFriction(Hidden):
         if not self.bristles.ready:
             return 0.0 * self.sliding
         speed = moment.rig["radius"] * moment.spin
-        return -self.sliding * self.bristles.bend(speed, moment.step)
+        return -self.sliding * self.bristles.deflect(speed, moment.step)
 
 
 class Slack(Hidden):

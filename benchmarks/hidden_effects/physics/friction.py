@@ -18,7 +18,7 @@ class Bristles:
         """No bristle is bent."""
         self.bent, self.ready = np.zeros(lanes), True
 
-    def bend(self, speed: Array, step: float) -> Array:
+    def deflect(self, speed: Array, step: float) -> Array:
         """Friction over sliding friction, after a step (s) at a speed (m/s)."""
         most = 1.0 + (self.breakaway - 1.0) * np.exp(-((speed / self.stribeck) ** 2))
         end = np.copysign(most, speed)
@@ -44,7 +44,7 @@ class SlideFriction(Hidden):
     def force(self, moment: Moment) -> Array:
         """Friction against the slide's motion."""
         grown = (moment.pressure / 350e3) ** self.by_pressure if self.by_pressure else 1.0
-        return -self.sliding * grown * self.bristles.bend(moment.velocity, moment.step)
+        return -self.sliding * grown * self.bristles.deflect(moment.velocity, moment.step)
 
 
 class MaxwellSlip(Hidden):

@@ -204,7 +204,7 @@ class Function:
             "cuLaunchKernel",
             *(self._handle, ctypes.c_uint(blocks), one, one),
             *(ctypes.c_uint(self.threads), one, one, ctypes.c_uint(0)),
-            *(ctypes.c_void_p(stream), arguments.places, None),
+            *(ctypes.c_void_p(stream), arguments.pointers, None),
         )
 
 
@@ -216,13 +216,13 @@ class Arguments:
         others: the numbers behind them, as ctypes has them.
 
     Attributes:
-        places: where they are, as the driver wants it.
+        pointers: where they are, as the driver wants it.
     """
 
     def __init__(self, whole: int, others: Sequence[Any] = ()) -> None:
         self._whole = [ctypes.c_int64() for _ in range(whole)]
         self._all = [*self._whole, *others]
-        self.places = (ctypes.c_void_p * len(self._all))(*map(ctypes.addressof, self._all))
+        self.pointers = (ctypes.c_void_p * len(self._all))(*map(ctypes.addressof, self._all))
 
     def set(self, whole: Iterable[int]) -> None:
         """Give the integers and addresses values."""

@@ -55,7 +55,7 @@ class SimdEmitter:
 
     Attributes:
         width: lanes.
-        places: how many numbers of memory a value takes: one a lane, or two of a pair.
+        elements: how many numbers of memory a value takes: one a lane, or two of a pair.
         real: type of a real in LLVM; `integer` and `truth` those of the other kinds.
         element: type of one real in memory.
         size: bytes of one real in memory.
@@ -65,7 +65,7 @@ class SimdEmitter:
         self, width: int = 1, real: str = "double", fused: bool = False, paired: bool = False
     ) -> None:
         self.width = width
-        self.places = 2 if paired else width
+        self.elements = 2 if paired else width
         self.fused = fused
         self.element = {"double": DOUBLE, "float": FLOAT}[real]
         self.size = {"double": 8, "float": 4}[real]
@@ -74,7 +74,7 @@ class SimdEmitter:
         self.truth = self._wide(TRUTH)
 
     def _wide(self, element: ir.Type) -> ir.Type:
-        return element if self.places == 1 else ir.VectorType(element, self.places)
+        return element if self.elements == 1 else ir.VectorType(element, self.elements)
 
     def type(self, kind: Kind) -> ir.Type:
         """LLVM type of a kind of value."""
@@ -83,7 +83,7 @@ class SimdEmitter:
     def constant(self, number: Number, kind: Kind = "real") -> Operand:
         """A number in every lane."""
         wide = self.type(kind)
-        return ir.Constant(wide, number if self.places == 1 else [number] * self.places)
+        return ir.Constant(wide, number if self.elements == 1 else [number] * self.elements)
 
     def emit(
         self,
@@ -226,8 +226,8 @@ class SimdEmitter:
     def address(self, builder: Builder, pointer: Operand, slot: Operand | int) -> Operand:
         """Address of the vector `slot` vectors behind a pointer."""
         if isinstance(slot, int):
-            return offset(builder, pointer, slot * self.places, self.element)
-        return offset(builder, pointer, builder.mul(slot, integer(self.places)), self.element)
+            return offset(builder, pointer, slot * self.elements, self.element)
+        return offset(builder, pointer, builder.mul(slot, integer(self.elements)), self.element)
 
     def load_spread(
         self,
@@ -246,23 +246,23 @@ class SimdEmitter:
 
     def spread(self, builder: Builder, scalar: Operand) -> Operand:
         """A scalar in every lane."""
-        if self.places == 1:
+        if self.elements == 1:
             return scalar
-        wide = ir.VectorType(scalar.type, self.places)
+        wide = ir.VectorType(scalar.type, self.elements)
         undefined = ir.Constant(wide, ir.Undefined)
         first = builder.insert_element(undefined, scalar, ir.Constant(INDEX, 0))
-        zeros = ir.Constant(ir.VectorType(INDEX, self.places), [0] * self.places)
+        zeros = ir.Constant(ir.VectorType(INDEX, self.elements), [0] * self.elements)
         return builder.shuffle_vector(first, undefined, zeros)
 
     @property
     def numbers(self) -> Operand:
         """Each lane's own number, from 0."""
-        own = list(range(self.places)) if self.width > 1 else [0] * self.places
-        return ir.Constant(self.integer, own if self.places > 1 else 0)
+        own = list(range(self.elements)) if self.width > 1 else [0] * self.elements
+        return ir.Constant(self.integer, own if self.elements > 1 else 0)
 
     def extract(self, builder: Builder, vector: Operand, lane: Operand | int) -> Operand:
         """The scalar in one lane."""
-        return vector if self.places == 1 else builder.extract_element(vector, integer(lane))
+        return vector if self.elements == 1 else builder.extract_element(vector, integer(lane))
 
     def insert(
         self, builder: Builder, vector: Operand, scalar: Operand, lane: Operand | int
@@ -274,14 +274,14 @@ class SimdEmitter:
 
     def any(self, builder: Builder, truths: Operand) -> Operand:
         """Whether a truth holds in some lane."""
-        return truths if self.places == 1 else self._mask(builder, "!=", truths, 0)
+        return truths if self.elements == 1 else self._mask(builder, "!=", truths, 0)
 
     def all(self, builder: Builder, truths: Operand) -> Operand:
         """Whether a truth holds in every lane."""
-        return truths if self.places == 1 else self._mask(builder, "==", truths, -1)
+        return truths if self.elements == 1 else self._mask(builder, "==", truths, -1)
 
     def _mask(self, builder: Builder, sign: str, truths: Operand, bits: int) -> Operand:
-        mask = ir.IntType(self.places)
+        mask = ir.IntType(self.elements)
         return builder.icmp_unsigned(sign, builder.bitcast(truths, mask), ir.Constant(mask, bits))
 
 

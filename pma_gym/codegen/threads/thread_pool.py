@@ -212,9 +212,9 @@ def _write_take(module: ir.Module) -> None:
     shares, threads, own = (
         b.load(offset(b, pool, place, INTEGER), typ=INTEGER) for place in (SHARES, THREADS, OWN)
     )
-    part, ahead = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
+    part, asked = variable(b, INTEGER, integer(0)), variable(b, INTEGER, integer(0))
     with repeat(b) as leave_if:
-        number = b.load(ahead, typ=INTEGER)
+        number = b.load(asked, typ=INTEGER)
         leave_if(b.icmp_signed(">=", number, threads))
         whose = b.srem(b.add(own, number), threads)
         share = _share(b, b.inttoptr(shares, POINTER), whose)
@@ -228,7 +228,7 @@ def _write_take(module: ir.Module) -> None:
                     b.store(_arguments(b, share, b.sub(taken, end)), part)
                     b.store(b.ptrtoint(share, INTEGER), offset(b, pool, FROM, INTEGER))
             with none:
-                b.store(b.add(number, integer(1)), ahead)
+                b.store(b.add(number, integer(1)), asked)
         leave_if(b.icmp_signed("!=", b.load(part, typ=INTEGER), integer(0)))
     b.ret(b.load(part, typ=INTEGER))
     # The part in whose midst it is taken is not done before both are.

@@ -118,8 +118,9 @@ def library(models: Sequence[Model], seed: int = 0) -> Iterator[Excitation]:
         models: those that may be true; the first one's lines give the volts.
         seed: of the phases of multisines.
     """
-    if models[0].rig.is_free:
-        # A slide that nothing holds runs away from commands that nobody corrects.
+    if not models[0].rig.balances_loads:
+        # A rig that nothing holds runs away from commands that nobody corrects, and where a motion
+        # is imposed the safe motions are the drive's.
         return
     plants = [Plant(model) for model in models]
     for recipe in _recipes(models[0], seed):

@@ -105,7 +105,7 @@ class WhitenedResiduals(Residuals):
         wider = np.array([(reach or {}).get(path, 1.0) for path in free])
         # Beyond lies no rig like this one, and an integrator's hell: a slide of a gram, say.
         self.lower, self.upper = assumed_range(self.centre, self.prior, *self._possible, wider)
-        self._own = self._places(own or {})
+        self._own = self._indices(own or {})
         self._projections: dict[tuple[int, int], Projection] = {}
 
     @property

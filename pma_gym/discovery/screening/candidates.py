@@ -36,8 +36,12 @@ FAR = 20.0
 DELAYS = (0.15, 0.4, 1.0, 2.5)
 """How many times its usual value a time is probed at, of an effect that has no other size."""
 
-PERIODS = tuple(range(3, 61, 3))
-"""Periods a turn at which a ripple is looked for: a trial of a quarter turn tells no finer."""
+PERIODS = tuple(range(1, 21))
+"""How many eighths of its usual number of periods a ripple is looked for at: a trial of a quarter
+turn tells no finer."""
+
+RELEASED = (6.0, 36.0, 216.0)
+"""How many times its usual value a shape is looked for at as well that the rig does not hold."""
 
 SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
@@ -71,11 +75,14 @@ def _lacking(
         return None
     if effect.port.startswith("sensor:") and not _has_sensor(model, effect.port):
         return None
+    needed = model.rig.needed_ports.get(effect.port)
+    if needed and all(each.port != needed for each in model.effects.values()):
+        return None
     doors = {stem: door for door, stem in effect.names_at_the_door().items()}
     shown = {
         stem: quantity
         for stem, quantity in effect.quantities.items()
-        if (stem not in effect.held or quantity.neutral is not None)
+        if (not model.rig.holds(effect, stem) or quantity.neutral is not None)
         and stem not in effect.rows
         # Free in every trial already, as `estimation.residuals` has it.
         and stem not in ("repeat", effect.memory_start)
@@ -111,7 +118,7 @@ def _candidate(
     absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
     probes, signs = [], []
     for sizes in _sizes(amplitudes, switches, shown):
-        for shape in _shapes(shapes, bool(switches), shown):
+        for shape in _shapes(shapes, bool(switches), shown, effect.held):
             row = dict(zip(stems, absent, strict=True))
             row.update(sizes)
             row.update(shape)
@@ -139,16 +146,21 @@ def _candidate(
 
 
 def _shapes(
-    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity]
+    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity], held: Sequence[str]
 ) -> Iterator[dict[str, float]]:
-    """Shapes at which an effect is looked for: the first in some steps, the others as usual."""
+    """Shapes at which an effect is looked for: the first in some steps, the others as usual.
+
+    What other rigs hold may be of any size on one that shows it.
+    """
     usual = {stem: _usual(shown[stem]) for stem in shapes}
     if "phase" in shapes:
         for periods, phase in product(PERIODS, (0.0, 90.0)):
-            yield usual | {"periods": float(periods), "phase": phase}
+            yield usual | {"periods": usual["periods"] * periods / 8.0, "phase": phase}
         return
     for factor in (DELAYS if timed else SHAPES) if shapes else (1.0,):
         yield usual | {stem: factor * usual[stem] for stem in shapes[:1]}
+    for stem, factor in product([stem for stem in shapes if stem in held], RELEASED):
+        yield usual | {stem: factor * usual[stem]}
 
 
 def _sizes(
@@ -187,7 +199,7 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
                 quantity.neutral is None
                 or quantity.usual is None
                 or stem in effect.rows
-                or stem in effect.held
+                or model.rig.holds(effect, stem)
                 or here != quantity.to_si(quantity.neutral)
             ):
                 continue

@@ -3,13 +3,15 @@
 An effect of the catalogue that closes most of the misfit beyond noise, on readings that its fit had
 not seen, is missing in the model even where its law leaves structure: a dead zone with a smooth
 edge is a dead zone. It is named with its size and with what its law leaves. Several effects
-together close most of any misfit, so it must be one.
+together close most of any misfit, so it must be one; terms of one law, such as a dry friction and
+its growth with pressure, count as one.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from pma_gym.discovery.diagnosis import Gap
+from pma_gym.effects import CATALOGUE
 
 MOST_LEFT = 0.15
 """Most of the misfit beyond noise (mean square) that an approximate law may leave, as a share."""
@@ -34,12 +36,12 @@ class Closing:
         left: share of the mean square beyond noise that they leave, summed over signals in units
             of their noise.
         held_out: whether it is that of readings which the fits had not seen.
-        effects: how many effects close it.
+        laws: how many laws close it; effects whose memory follows one law are one.
     """
 
     left: float
     held_out: bool
-    effects: int
+    laws: int
 
     @property
     def closed(self) -> float:
@@ -49,7 +51,7 @@ class Closing:
     @property
     def named(self) -> bool:
         """Whether the effect is named although its law is only approximate."""
-        return self.held_out and self.effects == 1 and self.left <= MOST_LEFT
+        return self.held_out and self.laws == 1 and self.left <= MOST_LEFT
 
     @property
     def worth_saying(self) -> bool:
@@ -57,12 +59,12 @@ class Closing:
         return self.left <= WORTH_SAYING
 
 
-def closing(gaps: Mapping[str, Gap], effects: int) -> Closing | None:
+def closing(gaps: Mapping[str, Gap], effects: Sequence[str]) -> Closing | None:
     """How much of the misfit that refitted parameters leave is closed by the proposed model.
 
     Args:
         gaps: by signal.
-        effects: how many effects the proposed model has more.
+        effects: names of those that the proposed model has more.
     Returns:
         It; None where the parameters leave too little beyond noise.
     """
@@ -70,7 +72,18 @@ def closing(gaps: Mapping[str, Gap], effects: int) -> Closing | None:
     after = sum(_beyond(gap.after, gap.floor) for gap in gaps.values())
     if before < LEAST_MISFIT:
         return None
-    return Closing(after / before, all(gap.held_out for gap in gaps.values()), effects)
+    return Closing(after / before, all(gap.held_out for gap in gaps.values()), _laws(effects))
+
+
+def _laws(names: Sequence[str]) -> int:
+    """How many laws effects have."""
+    known = [CATALOGUE.get(name) for name in names]
+    return len(
+        {
+            effect.rate_independent_law if effect and effect.rate_independent_law else name
+            for effect, name in zip(known, names, strict=True)
+        }
+    )
 
 
 def _beyond(misfit: float, floor: float) -> float:

@@ -1,4 +1,4 @@
-"""Torques at a joint that need no command: weight, a spring, viscous damping, dry friction."""
+"""Torques at a joint that need no command: weight, viscous damping, dry friction."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -6,10 +6,10 @@ from typing import Annotated, NamedTuple
 from pma_gym.effects.arithmetic import cosine
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.slide.coulomb_friction import (
-    friction_bend,
+    friction_breakpoint,
     friction_force,
     friction_path,
-    stribeck_bend,
+    stribeck_breakpoint,
 )
 from pma_gym.units import Quantity
 
@@ -41,27 +41,6 @@ def weight_torque(angle, p):
         Statics of a rigid body about a fixed axis.
     """
     return -p.moment * cosine(angle + p.offset - _QUARTER)
-
-
-class JointSpring(NamedTuple):
-    """Parameters of `spring_torque`."""
-
-    stiffness: Annotated[float, Quantity("N m/rad", 0, 1e6, "assumption: 0.5", 0.0, usual=0.5)]
-    rest: Annotated[float, Quantity("deg", -1e4, 1e4, "where it is relaxed: 0", usual=0.0)]
-
-
-def spring_torque(angle, p):
-    """Torque of a linear spring: T = -stiffness (q - rest).
-
-    Args:
-        angle: of the joint q (rad).
-        p: JointSpring: stiffness (N m/rad), rest (rad).
-    Returns:
-        Torque (N m), towards where the spring is relaxed.
-    Source:
-        Hooke's law.
-    """
-    return -p.stiffness * (angle - p.rest)
 
 
 class JointDamping(NamedTuple):
@@ -102,13 +81,6 @@ JOINT_WEIGHT = Effect(
     law=weight_torque,
     signature="torque that depends on the angle, as its sine",
 )
-JOINT_SPRING = Effect(
-    name="joint_spring",
-    port="joint_torque",
-    parameters=JointSpring,
-    law=spring_torque,
-    signature="torque in proportion to the angle",
-)
 JOINT_DAMPING = Effect(
     name="joint_damping",
     port="joint_torque",
@@ -124,7 +96,7 @@ JOINT_FRICTION = Effect(
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,
-    path_breakpoint=friction_bend,
-    breakpoint=stribeck_bend,
+    path_breakpoint=friction_breakpoint,
+    breakpoint=stribeck_breakpoint,
     signature="odd step of torque at zero speed; the joint sticks under small changes of torque",
 )

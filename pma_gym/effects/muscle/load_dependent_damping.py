@@ -6,7 +6,7 @@ from pma_gym.effects.arithmetic import clip, positive, where
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
 
-BEND = 0.1
+ROUNDING = 0.1
 """Half of the range of loads in which their share bends over to 1: our choice."""
 
 _PEAK = "Serres 2008, table I2 at 250 kPa, 1.3 to 5.2 N s/mm at middle load"
@@ -44,12 +44,12 @@ def load_factor(pressure, cable_tension, p):
         Our parabola; Serres 2008, table I2 has damping peak at middle load.
     """
     share = cable_tension / (p.force_slope * pressure + p.force_intercept)
-    over = clip((share - (1.0 - BEND)) * (0.5 / BEND), 0.0, 1.0)
-    share = clip(share, 0.0, 1.0 + BEND) - BEND * over * over
+    over = clip((share - (1.0 - ROUNDING)) * (0.5 / ROUNDING), 0.0, 1.0)
+    share = clip(share, 0.0, 1.0 + ROUNDING) - ROUNDING * over * over
     return positive(1.0 + share * (p.linear + p.quadratic * share))
 
 
-def load_bend(pressure, cable_tension, p):
+def load_breakpoint(pressure, cable_tension, p):
     """How far the share of the muscle's force is from where it bends over to 1.
 
     Args:
@@ -59,7 +59,7 @@ def load_bend(pressure, cable_tension, p):
     Returns:
         Share, negative while it bends over; 1 where the effect is absent.
     """
-    away = abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - BEND
+    away = abs(cable_tension / (p.force_slope * pressure + p.force_intercept) - 1.0) - ROUNDING
     there = where(abs(p.linear) + abs(p.quadratic) > 0.0, 1.0, 0.0)
     return there * away + (1.0 - there)
 
@@ -73,6 +73,6 @@ LOAD_DEPENDENT_DAMPING = Effect(
         "force_intercept",
     ),
     law=load_factor,
-    breakpoint=load_bend,
+    breakpoint=load_breakpoint,
     signature="force proportional to speed, by a factor that depends on the load",
 )

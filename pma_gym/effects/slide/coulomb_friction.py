@@ -77,7 +77,7 @@ def friction_path(memory, travel, direction, p):
     return direction * (elastic + slipping * slip * (1.0 - 0.25 * slip))
 
 
-def friction_bend(memory, direction, p):
+def friction_breakpoint(memory, direction, p):
     """Way to where the deflection begins to bend over, or, from there, to where all bristles slip.
 
     Args:
@@ -87,10 +87,19 @@ def friction_bend(memory, direction, p):
     Returns:
         Way (m), 0 where all slip or nothing rubs.
     """
+    return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * elastic_way(memory, direction)
+
+
+def elastic_way(memory, direction):
+    """Way, in preslidings, to where the deflection bends over or, from there, to where all slip.
+
+    Args:
+        memory: z where the travel begins.
+        direction: 1 where the motion is forwards, else -1.
+    """
     start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
     rest = positive(1.0 - start) * (1.0 / slipping)
-    left = where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
-    return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * left
+    return where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
 
 
 def release_path(memory, direction, p):
@@ -106,7 +115,7 @@ def release_path(memory, direction, p):
     return p.presliding * positive(-direction * memory)
 
 
-def stribeck_bend(velocity, p):
+def stribeck_breakpoint(velocity, p):
     """Speed beyond that at which nine tenths of what static exceeds dynamic are gone.
 
     Args:
@@ -128,9 +137,9 @@ COULOMB_FRICTION = Effect(
     ties=(("static", "dynamic", "stribeck_speed"),),
     law=friction_force,
     rate_independent_law=friction_path,
-    path_breakpoint=friction_bend,
+    path_breakpoint=friction_breakpoint,
     release_path=release_path,
-    breakpoint=stribeck_bend,
+    breakpoint=stribeck_breakpoint,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "
         "under small changes of load. Stribeck: static over dynamic, the step is higher within "

@@ -114,13 +114,13 @@ class BlockMemory:
         """The emitter for what is not the integration."""
         return SimdEmitter(width, fused=FUSED)
 
-    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
-        return lanes.load(b, where, 0, kind)
+    def _load(self, b: Builder, simd: SimdEmitter, where: Operand, kind: Kind) -> Operand:
+        return simd.load(b, where, 0, kind)
 
     def _keep(
-        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+        self, b: Builder, simd: SimdEmitter, number: Operand, where: Operand, kind: Kind
     ) -> None:
-        lanes.store(b, number, where, 0, kind)
+        simd.store(b, number, where, 0, kind)
 
     def _count(self, b: Builder, where: Operand) -> Operand:
         """An integer of one environment."""
@@ -133,21 +133,21 @@ class BlockMemory:
         return {}
 
     def _fixed(
-        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
+        self, b: Builder, simd: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         """The table of a block, or of one lane of it."""
         known = {}
-        alone = lanes.width == 1
+        scalar = simd.width == 1
         for i, value in enumerate(self.fixed):
             at = integer(i * self.width)
-            where = offset(b, tables, b.add(at, integer(lane)) if alone else at)
-            known[value.id] = lanes.load(b, where)
+            where = offset(b, tables, b.add(at, integer(lane)) if scalar else at)
+            known[value.id] = simd.load(b, where)
         return known
 
     def _known(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         values: Sequence[Value],
         records: Operand,
         tables: Operand,
@@ -156,32 +156,32 @@ class BlockMemory:
         """Inputs and table of a block (or, in scalar code, of one lane of it), as far as used."""
         known: dict[int, Operand] = {}
         names = {self.step_graph.slot(name).id: name for name in self.offsets}
-        alone = lanes.width == 1
+        scalar = simd.width == 1
         for value in live_inputs(values):
             if value.id in names:
                 at = self._row(b, names[value.id])
-                index = b.add(at, integer(lane)) if alone else at
+                index = b.add(at, integer(lane)) if scalar else at
                 where = offset(b, records, index, self.element)
-                known[value.id] = self._load(b, lanes, where, value.kind)
-        return known | self._fixed(b, lanes, tables, lane)
+                known[value.id] = self._load(b, simd, where, value.kind)
+        return known | self._fixed(b, simd, tables, lane)
 
     def _store(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         emitted: dict[int, Operand],
         values: dict[str, Value],
         records: Operand,
         lane: Operand | int,
     ) -> None:
-        alone = lanes.width == 1
+        scalar = simd.width == 1
         for name, value in values.items():
             if name not in self.offsets:
                 continue
             at = self._row(b, name)
-            index = b.add(at, integer(lane)) if alone else at
+            index = b.add(at, integer(lane)) if scalar else at
             where = offset(b, records, index, self.element)
-            self._keep(b, lanes, emitted[value.id], where, self.state_layout.kind(name))
+            self._keep(b, simd, emitted[value.id], where, self.state_layout.kind(name))
 
     def _block(self, b: Builder, given: dict[str, Operand], block: Operand) -> tuple[Operand, ...]:
         """Addresses of a block's records and tables."""
@@ -190,48 +190,48 @@ class BlockMemory:
         )
         return records, offset(b, given["tables"], b.mul(block, given["table_stride"]))
 
-    def _gathered(self, b: Builder, lanes: SimdEmitter, numbers: Sequence[Operand]) -> Operand:
-        if lanes.width == 1:
-            return lanes.spread(b, numbers[0])
-        vector = ir.Constant(lanes.real, ir.Undefined)
+    def _gathered(self, b: Builder, simd: SimdEmitter, numbers: Sequence[Operand]) -> Operand:
+        if simd.width == 1:
+            return simd.spread(b, numbers[0])
+        vector = ir.Constant(simd.real, ir.Undefined)
         for k, number in enumerate(numbers):
-            vector = lanes.insert(b, vector, number, k)
+            vector = simd.insert(b, vector, number, k)
         return vector
 
     def _references(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         given: dict[str, Operand],
         records: Operand,
         lane: Operand | int,
-        ahead: int,
+        steps_ahead: int,
         later: int,
     ) -> Operand:
         """References so many steps ahead, for a block or one lane."""
         references = []
-        for k in range(lanes.width):
+        for k in range(simd.width):
             index = self._row(b, "count", k)
-            if lanes.width == 1:
+            if simd.width == 1:
                 index = b.add(index, integer(lane))
             steps = self._count(b, offset(b, records, index, self.element))
-            row = b.add(steps, integer(ahead + later))
+            row = b.add(steps, integer(steps_ahead + later))
             where = offset(b, given["references"], row, self.element)
             references.append(b.load(where, typ=self.element))
-        return self._gathered(b, lanes, references)
+        return self._gathered(b, simd, references)
 
     def _put_observation(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         given: dict[str, Operand],
         emitted: dict[int, Operand],
         entries: Sequence[Value],
         first: Operand,
     ) -> None:
         for i, entry in enumerate(entries):
-            for k in range(lanes.width):
-                number = lanes.extract(b, emitted[entry.id], k)
+            for k in range(simd.width):
+                number = simd.extract(b, emitted[entry.id], k)
                 row = b.mul(b.add(first, integer(k)), integer(len(entries)))
                 where = offset(b, given["observations"], b.add(row, integer(i)), FLOAT)
                 b.store(narrowed(b, number, FLOAT), where)

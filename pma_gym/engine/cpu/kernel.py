@@ -35,12 +35,12 @@ class Kernel:
     ) -> None:
         self.program, self.state_layout, self.observed = program, state_layout, table
         self.width, self.abreast, self.single = width, simd_lanes(), single
-        task, alone = (
+        task, undisturbed = (
             state_layout.task,
             state_layout.options.randomisation == "none" and not state_layout.events,
         )
         pulls_none = task.actuator == "motor" and task.exercise is None
-        self.draws = alone and pulls_none and hangs_by_itself(program.model)
+        self.draws = undisturbed and pulls_none and hangs_by_itself(program.model)
         self.library: Library = compiled(self._key(), lambda: Writer(self).module, "environment")
         get = self.library.function
         self.check = get("check", [ctypes.c_void_p], ctypes.c_int64)

@@ -37,7 +37,7 @@ TRUTHS = ("extrapolated",)
 _TYPES = {"p": POINTER, "i": INTEGER, "n": INDEX, "d": DOUBLE, "v": ir.VoidType()}
 
 
-def write_advance(module: ir.Module, state_layout: StateLayout) -> None:
+def write_python_step(module: ir.Module, state_layout: StateLayout) -> None:
     """Write `advance`, which makes a step by the module's own `check` and `step`.
 
     Its argument is the action: an array of one dimension and of single or double precision with an

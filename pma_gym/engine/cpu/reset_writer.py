@@ -83,7 +83,7 @@ class ResetWriter(BlockMemory):
         both = [("arguments", POINTER), ("crew", POINTER)]
         b, (arguments, _) = function(self.module, "begin", both, INTEGER)
         given = self._arguments(b, arguments)
-        lanes = SimdEmitter(1, fused=FUSED)
+        simd = SimdEmitter(1, fused=FUSED)
         settles = b.icmp_signed("!=", given["settles"], integer(0))
         with loop(b, given["last"], given["first"]) as row:
             index = b.load(offset(b, given["indices"], row, INTEGER), typ=INTEGER)
@@ -93,7 +93,7 @@ class ResetWriter(BlockMemory):
                 with b.if_then(settles):
                     self._settle(b, given, records, tables, lane, row)
             self._zero_sensors(b, records, tables, lane)
-            self._first(b, lanes, given, records, tables, lane, index)
+            self._first(b, simd, given, records, tables, lane, index)
         b.ret(integer(0))
 
     def _settle(
@@ -122,8 +122,8 @@ class ResetWriter(BlockMemory):
         reach = [known[value.id] for value in self.reach]
         none = ir.Constant(DOUBLE, 0.0)
         zero = balanced(b, self.eq, self.force, known, none, reach)
-        at_rest = {"zero": zero, "pressure": pressure}
-        real = {name: at_rest[what] for name, what in _AT_REST.items()}
+        rest_values = {"zero": zero, "pressure": pressure}
+        real = {name: rest_values[what] for name, what in _AT_REST.items()}
         real |= {name: known[value.id] for name, value in self.memories.items()}
         real |= {"zero_contraction": zero, "size": ir.Constant(DOUBLE, FIRST_S)}
         real |= {"regulator_voltage": regulator, "rest_regulator": regulator}
@@ -193,7 +193,7 @@ class ResetWriter(BlockMemory):
     def _first(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         given: dict[str, Operand],
         records: Operand,
         tables: Operand,
@@ -203,13 +203,13 @@ class ResetWriter(BlockMemory):
         options = self.state_layout.options
         entries = self.step_graph.observation(self.kernel.observed, self.begun)
         values = [*self.begun.values(), self.first_position, *entries]
-        known = self._known(b, lanes, values, records, tables, lane)
-        for ahead in range(options.preview + 1):
-            known[self.step_graph.reference(ahead).id] = self._references(
-                b, lanes, given, records, lane, ahead, 0
+        known = self._known(b, simd, values, records, tables, lane)
+        for steps_ahead in range(options.preview + 1):
+            known[self.step_graph.reference(steps_ahead).id] = self._references(
+                b, simd, given, records, lane, steps_ahead, 0
             )
-        emitted = lanes.emit(b, values, known)
-        self._store(b, lanes, emitted, self.begun, records, lane)
+        emitted = simd.emit(b, values, known)
+        self._store(b, simd, emitted, self.begun, records, lane)
         if self.traces:
             b.store(widened(b, emitted[self.first_position.id]), given["trace"])
-        self._put_observation(b, lanes, given, emitted, entries, index)
+        self._put_observation(b, simd, given, emitted, entries, index)

@@ -26,7 +26,7 @@ from pma_gym.codegen.machine.simd import SimdEmitter
 from pma_gym.codegen.threads.thread_pool import write_another
 from pma_gym.codegen.trace import split
 from pma_gym.engine.cpu.block_memory import BEFORE, KernelSpec, narrowed, widened
-from pma_gym.engine.cpu.python_step import write_advance
+from pma_gym.engine.cpu.python_step import write_python_step
 from pma_gym.engine.cpu.reset_writer import ResetWriter
 from pma_gym.engine.graph.scoring import COURSE, Course, course, sampling
 from pma_gym.integrator.integration import FUSED, Lane, Layout, integrate_lanes, memory
@@ -77,7 +77,7 @@ class Writer(ResetWriter):
         self._step()
         self._begin()
         if self.width == 1:
-            write_advance(self.module, self.state_layout)
+            write_python_step(self.module, self.state_layout)
 
     def _table(self) -> None:
         b, (vector, out) = function(self.module, "table", [("vector", POINTER), ("out", POINTER)])
@@ -95,14 +95,14 @@ class Writer(ResetWriter):
         """Whether all actions are finite, which a step takes for granted."""
         b, (arguments,) = function(self.module, "check", [("arguments", POINTER)], INTEGER)
         given = self._arguments(b, arguments)
-        bad, lanes = memory(b, INTEGER), SimdEmitter(self.width)
+        bad, simd = memory(b, INTEGER), SimdEmitter(self.width)
         b.store(integer(0), bad)
         with loop(b, given["last"], given["first"]) as block:
             for i in range(self.state_layout.actions):
-                action = self._actions(b, lanes, given, block, i)
+                action = self._actions(b, simd, given, block, i)
                 # Zero times a number that is not finite is none.
-                nothing = b.fmul(action, lanes.constant(0.0))
-                wrong = lanes.any(b, b.fcmp_unordered("uno", nothing, nothing))
+                nothing = b.fmul(action, simd.constant(0.0))
+                wrong = simd.any(b, b.fcmp_unordered("uno", nothing, nothing))
                 b.store(b.or_(b.load(bad, typ=INTEGER), b.zext(wrong, INTEGER)), bad)
         b.ret(b.mul(b.load(bad, typ=INTEGER), integer(BAD_ACTION)))
 
@@ -158,24 +158,24 @@ class Writer(ResetWriter):
         return b.load(offset(b, given["actions"], at, self.element), typ=self.element)
 
     def _actions(
-        self, b: Builder, lanes: SimdEmitter, given: dict[str, Operand], block: Operand, i: int
+        self, b: Builder, simd: SimdEmitter, given: dict[str, Operand], block: Operand, i: int
     ) -> Operand:
         first = b.mul(block, integer(self.width))
         return self._gathered(
             b,
-            lanes,
+            simd,
             [self._action(b, given, b.add(first, integer(k)), i) for k in range(self.width)],
         )
 
     def _command(self, b: Builder, given: dict[str, Operand], block: Operand) -> None:
-        lanes = self._lanes(self.width)
+        simd = self._lanes(self.width)
         records, tables = self._block(b, given, block)
         values = list(self.commanded.values())
-        known = self._known(b, lanes, values, records, tables, 0)
+        known = self._known(b, simd, values, records, tables, 0)
         for i in range(self.state_layout.actions):
-            known[self.step_graph.action(i).id] = self._actions(b, lanes, given, block, i)
-        emitted = lanes.emit(b, values, known)
-        self._store(b, lanes, emitted, self.commanded, records, 0)
+            known[self.step_graph.action(i).id] = self._actions(b, simd, given, block, i)
+        emitted = simd.emit(b, values, known)
+        self._store(b, simd, emitted, self.commanded, records, 0)
 
     def _integrate(
         self,
@@ -184,9 +184,9 @@ class Writer(ResetWriter):
         take_part: Callable[[], tuple[Operand, Operand]],
     ) -> None:
         real, paired = "float" if self.kernel.single else "double", pairs(self.width)
-        lanes = SimdEmitter(self.width, real, FUSED, paired)
+        simd = SimdEmitter(self.width, real, FUSED, paired)
         sums = [f"sum_{phase.name}" for phase in self.state_layout.task.protocol.phases]
-        lane = Lane(b, lanes, self.layout, ["clock", "sample", *sums])
+        lane = Lane(b, simd, self.layout, ["clock", "sample", *sums])
         period = self.state_layout.options.period
         following, behind = (variable(b, INTEGER, job) for job in self._jobs(b, given))
         kept = [*self.state_layout.states, "size"]
@@ -221,7 +221,7 @@ class Writer(ResetWriter):
                     lane.put(values[name], k, lane.narrow(number(job, name)))
                 for name in own:
                     lane.put(name, k, lane.narrow(number(job, name)))
-                lane.put(self.attempt.left, k, ir.Constant(lanes.element, period))
+                lane.put(self.attempt.left, k, ir.Constant(simd.element, period))
                 steps = b.load(address(job, "count"), typ=INTEGER)
                 time = b.fmul(b.uitofp(steps, DOUBLE), ir.Constant(DOUBLE, period))
                 lane.put("clock", k, lane.narrow(time))
@@ -247,7 +247,7 @@ class Writer(ResetWriter):
             return take(k, again=True)
 
         def watch(emitted: dict[int, Operand]) -> None:
-            self._sample(b, lanes, lane, emitted, given)
+            self._sample(b, simd, lane, emitted, given)
 
         made = integrate_lanes(lane, self.attempt, take, proceed, watch, self.extra)
         b.store(b.load(made, typ=INTEGER), given["attempts"])
@@ -255,7 +255,7 @@ class Writer(ResetWriter):
     def _sample(
         self,
         b: Builder,
-        lanes: SimdEmitter,
+        simd: SimdEmitter,
         lane: Numbers,
         emitted: dict[int, Operand],
         given: dict[str, Operand],
@@ -278,36 +278,36 @@ class Writer(ResetWriter):
             outputs = [one.due, one.position, one.sample, *one.sums]
             if one.ideal is not None:
                 # Whoever passes no sample looks nothing up.
-                known = lanes.emit(b, [one.due], known)
-                leave_if(b.not_(lanes.any(b, known[one.due.id])))
-                known[one.ideal.id] = self._ideals(b, lanes, given, lane.vector("sample"))
-            taken = lanes.emit(b, outputs, known)
+                known = simd.emit(b, [one.due], known)
+                leave_if(b.not_(simd.any(b, known[one.due.id])))
+                known[one.ideal.id] = self._ideals(b, simd, given, lane.vector("sample"))
+            sampled = simd.emit(b, outputs, known)
             if one.ideal is None:
-                leave_if(b.not_(lanes.any(b, taken[one.due.id])))
+                leave_if(b.not_(simd.any(b, sampled[one.due.id])))
             if self.traces:
                 number = known[graph.input("record.sample", 2).id]
-                index = b.fptoui(lanes.extract(b, number, 0), INTEGER)
+                index = b.fptoui(simd.extract(b, number, 0), INTEGER)
                 where = offset(b, given["trace"], index)
-                b.store(widened(b, lanes.extract(b, taken[one.position.id], 0)), where)
-            lane.put_vector("sample", taken[one.sample.id])
+                b.store(widened(b, simd.extract(b, sampled[one.position.id], 0)), where)
+            lane.put_vector("sample", sampled[one.sample.id])
             for phase, value in zip(phases, one.sums, strict=True):
-                lane.put_vector(f"sum_{phase.name}", taken[value.id])
+                lane.put_vector(f"sum_{phase.name}", sampled[value.id])
 
     def _ideals(
-        self, b: Builder, lanes: SimdEmitter, given: dict[str, Operand], samples: Operand
+        self, b: Builder, simd: SimdEmitter, given: dict[str, Operand], samples: Operand
     ) -> Operand:
         """Ideal position at the next sample of every lane, from the table."""
         ideals = []
-        for k in range(lanes.width):
-            index = b.fptoui(lanes.extract(b, samples, k), INTEGER)
+        for k in range(simd.width):
+            index = b.fptoui(simd.extract(b, samples, k), INTEGER)
             where = offset(b, given["ideals"], index, self.element)
-            ideals.append(narrowed(b, b.load(where, typ=self.element), lanes.element))
-        return self._gathered(b, lanes, ideals)
+            ideals.append(narrowed(b, b.load(where, typ=self.element), simd.element))
+        return self._gathered(b, simd, ideals)
 
     # -- what comes of it --------------------------------------------------------------------------
 
     def _sense(self, b: Builder, given: dict[str, Operand], block: Operand, ended: Operand) -> None:
-        lanes = self._lanes(self.width)
+        simd = self._lanes(self.width)
         records, tables = self._block(b, given, block)
         entries = self.step_graph.observation(self.kernel.observed, self.sensed)
         options = self.state_layout.options
@@ -315,26 +315,26 @@ class Writer(ResetWriter):
         at_end = to_real(self.sensed["count"]) >= self.step_graph.horizon
         truncated = at_end & ~is_over
         values = [*self.sensed.values(), *entries, is_over, truncated]
-        known = self._known(b, lanes, values, records, tables, 0)
-        horizon = lanes.spread(b, b.uitofp(given["horizon"], lanes.element))
+        known = self._known(b, simd, values, records, tables, 0)
+        horizon = simd.spread(b, b.uitofp(given["horizon"], simd.element))
         known[self.step_graph.horizon.id] = horizon
-        for ahead in range(options.preview + 1):
-            known[self.step_graph.reference(ahead).id] = self._references(
-                b, lanes, given, records, 0, ahead, 1
+        for steps_ahead in range(options.preview + 1):
+            known[self.step_graph.reference(steps_ahead).id] = self._references(
+                b, simd, given, records, 0, steps_ahead, 1
             )
-        emitted = lanes.emit(b, values, known)
-        self._store(b, lanes, emitted, self.sensed, records, 0)
+        emitted = simd.emit(b, values, known)
+        self._store(b, simd, emitted, self.sensed, records, 0)
         first = b.mul(block, integer(self.width))
-        self._put_observation(b, lanes, given, emitted, entries, first)
+        self._put_observation(b, simd, given, emitted, entries, first)
         for k in range(self.width):
             index = b.add(first, integer(k))
-            reward = lanes.extract(b, emitted[self.sensed["reward"].id], k)
+            reward = simd.extract(b, emitted[self.sensed["reward"].id], k)
             b.store(reward, offset(b, given["rewards"], index, self.element))
             for name, truth in (("terminated", is_over), ("truncated", truncated)):
-                flag = b.zext(lanes.extract(b, emitted[truth.id], k), ir.IntType(8))
+                flag = b.zext(simd.extract(b, emitted[truth.id], k), ir.IntType(8))
                 b.store(flag, offset(b, given[name], index, ir.IntType(8)))
         # SimdEmitter beyond the last environment never end: their records are copies of a rest.
-        any_over = b.zext(lanes.any(b, emitted[is_over.id]), INTEGER)
-        any_end = b.zext(lanes.any(b, emitted[truncated.id]), INTEGER)
+        any_over = b.zext(simd.any(b, emitted[is_over.id]), INTEGER)
+        any_end = b.zext(simd.any(b, emitted[truncated.id]), INTEGER)
         both = b.or_(any_over, b.shl(any_end, integer(1)))
         b.store(b.or_(b.load(ended, typ=INTEGER), both), ended)

@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from pma_gym.engine.cuda.kernel import THREADS, CudaKernel, Name
 from pma_gym.engine.engine import Engine
+from pma_gym.engine.nominal_rig import rig_model
 from pma_gym.engine.observation import ObservationTable
-from pma_gym.engine.options import Options, rig_model
+from pma_gym.engine.options import Options
 from pma_gym.engine.reset.reset_state import hangs_slack
 from pma_gym.engine.state_layout import StateLayout
 from pma_gym.plant.compiled_model import regulator_voltage
@@ -106,8 +107,10 @@ class DeviceEngine:
         self._own_tables = options.randomisation != "none"
         pressures = self._pressures()
         # What comes beside pressure and rest is drawn by the processor.
-        alone = not self._own_tables and not self.state_layout.events and task.actuator == "motor"
-        self._draws = alone and self._hangs_slack(pressures)
+        undisturbed = (
+            not self._own_tables and not self.state_layout.events and task.actuator == "motor"
+        )
+        self._draws = undisturbed and self._hangs_slack(pressures)
         self.kernel = CudaKernel(
             self.nominal.program,
             self.state_layout,

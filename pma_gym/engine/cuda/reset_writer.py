@@ -32,10 +32,10 @@ class CudaResetWriter(ThreadMemory):
             with b.if_then(b.icmp_unsigned("!=", b.or_(*flags), ir.Constant(_BYTE, 0))):
                 records, tables = self._block(b, given, job)
                 self._keep_final(b, given, records, job)
-                lanes, first = self._lanes(1), integer(0)
+                simd, first = self._lanes(1), integer(0)
                 self._settle(b, given, records, tables, first, job)
                 self._zero_sensors(b, records, tables, first)
-                self._first(b, lanes, given, records, tables, first, job)
+                self._first(b, simd, given, records, tables, first, job)
 
     def _keep_final(
         self, b: Builder, given: dict[str, Operand], records: Operand, job: Operand

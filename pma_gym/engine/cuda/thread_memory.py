@@ -91,14 +91,14 @@ class ThreadMemory(Writer):
     def _lanes(self, width: int) -> SimdEmitter:
         return SimdEmitter(width, self.real, FUSED)
 
-    def _load(self, b: Builder, lanes: SimdEmitter, where: Operand, kind: Kind) -> Operand:
-        return self._count(b, where) if kind == "integer" else super()._load(b, lanes, where, kind)
+    def _load(self, b: Builder, simd: SimdEmitter, where: Operand, kind: Kind) -> Operand:
+        return self._count(b, where) if kind == "integer" else super()._load(b, simd, where, kind)
 
     def _keep(
-        self, b: Builder, lanes: SimdEmitter, number: Operand, where: Operand, kind: Kind
+        self, b: Builder, simd: SimdEmitter, number: Operand, where: Operand, kind: Kind
     ) -> None:
         if kind != "integer":
-            super()._keep(b, lanes, number, where, kind)
+            super()._keep(b, simd, number, where, kind)
         else:
             b.store(b.trunc(number, INDEX) if self.kernel.single else number, where)
 
@@ -109,7 +109,7 @@ class ThreadMemory(Writer):
         return b.load(where, typ=INTEGER)
 
     def _fixed(
-        self, b: Builder, lanes: SimdEmitter, tables: Operand, lane: Operand | int
+        self, b: Builder, simd: SimdEmitter, tables: Operand, lane: Operand | int
     ) -> dict[int, Operand]:
         known = {}
         for i, value in enumerate(self.fixed):
@@ -117,7 +117,7 @@ class ThreadMemory(Writer):
                 where = offset(b, tables, b.mul(self._spacing, integer(i)), self.element)
                 known[value.id] = b.load(where, typ=self.element)
             else:
-                known[value.id] = narrowed(b, self._given[f"fixed_{i}"], lanes.element)
+                known[value.id] = narrowed(b, self._given[f"fixed_{i}"], simd.element)
         return known
 
     def _number(self, b: Builder, records: Operand, name: str) -> Operand:

@@ -61,7 +61,7 @@ class ThreadWriter(CudaResetWriter):
         with loop(b, given["count"], thread, threads) as job:
             self._command(b, given, job)
         turns.meet()
-        self._march_all(b, given, thread, turns)
+        self._integrate_all(b, given, thread, turns)
         turns.meet()
         ended = memory(b, INTEGER)
         b.store(integer(0), ended)
@@ -80,10 +80,10 @@ class ThreadWriter(CudaResetWriter):
             b.store(ir.Constant(INDEX, 1), given["faults"])
         return b.select(wrong, before, asked)
 
-    def _march_all(
+    def _integrate_all(
         self, b: Builder, given: dict[str, Operand], thread: Operand, turns: Turns
     ) -> None:
-        lanes, made = self._lanes(1), self.attempt
+        simd, made = self._lanes(1), self.attempt
         cells = _Cells(b, self.element)
         kept = {name: self.step_graph.slot(name) for name in self.state_layout.states}
         kept["size"] = made.size
@@ -107,11 +107,11 @@ class ThreadWriter(CudaResetWriter):
                 time = b.fmul(count, ir.Constant(DOUBLE, period))
                 cells.put_vector("clock", narrowed(b, time, self.element))
                 b.store(time, self._clock)
-                known = self._fixed(b, lanes, tables, 0)
+                known = self._fixed(b, simd, tables, 0)
                 for name in self.state_layout.held:
                     if name in self.offsets:
                         known[self.step_graph.slot(name).id] = self._number(b, records, name)
-                emitted = lanes.emit(b, self.layout.held, known)
+                emitted = simd.emit(b, self.layout.held, known)
                 for value in self.layout.held:
                     cells.put(value, emitted[value.id])
 
@@ -134,12 +134,12 @@ class ThreadWriter(CudaResetWriter):
             _, tables = self._block(b, given, b.select(works, now, last))
             made_one = b.zext(works, INDEX)
             b.store(b.add(b.load(attempts, typ=INDEX), made_one), attempts)
-            known = self._fixed(b, lanes, tables, 0)
+            known = self._fixed(b, simd, tables, 0)
             for value in (*self.layout.changing, *self.layout.held):
                 known[value.id] = cells.get(value)
-            emitted = lanes.emit(b, [*self.layout.outputs, *self.extra], known)
+            emitted = simd.emit(b, [*self.layout.outputs, *self.extra], known)
             with b.if_then(works):
-                self._sample(b, lanes, cells, emitted, given)
+                self._sample(b, simd, cells, emitted, given)
             for value, new in zip(self.layout.changing, self.layout.outputs, strict=True):
                 cells.put(value, emitted[new.id])
             left = emitted[made.next_left.id]

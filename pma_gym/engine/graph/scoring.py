@@ -144,6 +144,6 @@ COURSE = ("start", "speed", "acceleration", "end", "end_speed")
 """Names of a course's values."""
 
 
-def attempt_due(taken: Value, share: Value) -> Value:
+def attempt_due(accepted: Value, share: Value) -> Value:
     """Whether a sample lies in an attempt that is taken; up to its very end."""
-    return taken & (share <= 1.0 + 1e-6)
+    return accepted & (share <= 1.0 + 1e-6)

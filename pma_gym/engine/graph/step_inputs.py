@@ -36,9 +36,9 @@ class StepInputs:
         """An entry of the action, as an input."""
         return self.graph.input(f"action.{i}", CHANGING)
 
-    def reference(self, ahead: int) -> Value:
+    def reference(self, steps_ahead: int) -> Value:
         """The reference so many steps after the one that begins (m or rad), as an input."""
-        return self.graph.input(f"reference.{ahead}", CHANGING)
+        return self.graph.input(f"reference.{steps_ahead}", CHANGING)
 
     @property
     def horizon(self) -> Value:

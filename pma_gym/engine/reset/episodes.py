@@ -8,7 +8,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pma_gym.engine.cpu.block_memory import ARGUMENTS
 from pma_gym.engine.engine_memory import EngineMemory
-from pma_gym.engine.options import Options, Pressure, motor_at_rest, nominal_model, rig_model
+from pma_gym.engine.nominal_rig import motor_at_rest, nominal_model, rig_model
+from pma_gym.engine.option_checks import Pressure
+from pma_gym.engine.options import Options
 from pma_gym.engine.reset.operators import check_prescription, operators, wound_back
 from pma_gym.engine.reset.reset_state import (
     Settled,

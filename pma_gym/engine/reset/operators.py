@@ -6,7 +6,8 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.engine.options import Options, Pressure
+from pma_gym.engine.option_checks import Pressure
+from pma_gym.engine.options import Options
 from pma_gym.engine.state_layout import DRAW
 from pma_gym.plant.exercise_device.device import (
     FULL_ANGLE,

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.codegen.random import philox, uniform
-from pma_gym.engine.options import Options, Pressure
+from pma_gym.engine.option_checks import Pressure
+from pma_gym.engine.options import Options
 from pma_gym.engine.state_layout import DISTURB, DRAW
 from pma_gym.plant.compiled_model import regulator_voltage
 from pma_gym.plant.equilibrium import solver

@@ -16,7 +16,7 @@ class CompiledEquations(Protocol):
     balance: Callable
 
     @property
-    def places(self) -> Mapping[str, int]:
+    def offsets(self) -> Mapping[str, int]:
         """Where a vector of parameters has which number."""
         ...
 
@@ -208,5 +208,5 @@ def effect_parameters(
 ) -> dict[str, np.ndarray]:
     """An effect's parameters, one each or one for all."""
     numbers = plant.vector[None, :] if vectors is None else vectors
-    fields, places = plant.parameters[effect]._fields, plant.program.places
-    return {field: numbers[:, places[f"{effect}.{field}"]] for field in fields}
+    fields, offsets = plant.parameters[effect]._fields, plant.program.offsets
+    return {field: numbers[:, offsets[f"{effect}.{field}"]] for field in fields}

@@ -36,7 +36,7 @@ PORTS: dict[str, Port] = {
 """Ports of the rig: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "operator": "the motion is imposed, whoever pulls; take [constant_force] for a force beside it",
+    "hand_push": "the motion is imposed, whoever pulls; take [constant_force] for a force beside it",
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }
@@ -57,6 +57,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.travelled = (eq["contraction"], eq["velocity"])
     # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
     eq.let("command", eq["motor_voltage"])
+    eq.let("position", eq["contraction"])
     acceleration = eq.one("imposed_motion")
     regulated = bool(eq.at("regulator_line"))
     eq.let("pressure_asked", eq.one("regulator_line") if regulated else eq["regulator_voltage"])
@@ -68,7 +69,11 @@ def write_equations(equations: PlantEquations) -> None:
     at_once = corner * eq["pressure_command"], corner
     force = eq.total("muscle_force") + eq.total("slide_force") + eq.total("contact_force")
     resistance = eq.total("muscle_damping") * eq.product("damping_factor")
-    eq.outputs = {"force": force - resistance * eq["velocity"], "pressure": eq["pressure"]}
+    eq.outputs = {
+        "contraction": eq["contraction"],
+        "force": force - resistance * eq["velocity"],
+        "pressure": eq["pressure"],
+    }
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state("velocity", acceleration, SCALES["velocity"])
     source = eq.one("regulator_lag") if lag else at_once
@@ -94,7 +99,7 @@ def solve_equilibrium(problem: EquilibriumProblem) -> None:
 
 IMPOSED = Rig(
     name="imposed",
-    signals=signals("force", "pressure"),
+    signals=signals("contraction", "force", "pressure"),
     ports=PORTS,
     parts=(),
     position_tolerances={"contraction": 0.001, "velocity": 0.01},
@@ -109,5 +114,12 @@ IMPOSED = Rig(
     has_muscle=False,
     is_diagnosable=True,
     imposes_motion=True,
+    needed_ports={
+        "muscle_force": "muscle_force",
+        **dict.fromkeys(
+            ("regulator_delay", "regulator_lag", "regulator_pace", "chamber"), "regulator_line"
+        ),
+    },
+    shown_shapes=("presliding",),
     direct_commands={"imposed_motion": "contraction_command"},
 )

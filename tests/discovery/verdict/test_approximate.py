@@ -18,6 +18,9 @@ from pma_gym.discovery.workflow import diagnose
 from pma_gym.plant.plant import Plant
 from tests.discovery.laboratory import STATION, commanded, diagnosed
 
+ONE, TWO = ("hysteresis",), ("hysteresis", "creep")
+"""Names of one effect, and of two with laws of their own."""
+
 SIZES = (6.0, 6.0, 8.0, 8.0)
 """Hysteresis (N) in each trial: of no one size, as where it depends on what nobody logged."""
 
@@ -41,27 +44,32 @@ def gaps(parameters, after, held_out=True):
 
 
 def test_what_is_left_is_a_share_of_the_mean_square_beyond_noise():
-    known = closing(gaps(11.0**0.5, 2.0**0.5), 1)
+    known = closing(gaps(11.0**0.5, 2.0**0.5), ONE)
     assert known is not None
     assert known.left == pytest.approx(0.1) and known.closed == pytest.approx(0.9)
     assert known.left < MOST_LEFT and known.named and known.worth_saying
 
 
 def test_what_closes_less_is_not_named_and_what_closes_little_not_sized():
-    half, little = closing(gaps(11.0**0.5, 5.0**0.5), 1), closing(gaps(11.0**0.5, 3.0), 1)
+    half, little = closing(gaps(11.0**0.5, 5.0**0.5), ONE), closing(gaps(11.0**0.5, 3.0), ONE)
     assert half is not None and little is not None
     assert half.worth_saying and not half.named
     assert not little.worth_saying
 
 
 def test_neither_several_effects_nor_fitted_readings_name_by_what_they_close():
-    several, seen = closing(gaps(4.0, 1.1), 2), closing(gaps(4.0, 1.1, held_out=False), 1)
+    several, seen = closing(gaps(4.0, 1.1), TWO), closing(gaps(4.0, 1.1, held_out=False), ONE)
     assert several is not None and not several.named
     assert seen is not None and not seen.named
 
 
+def test_terms_of_one_law_count_as_one():
+    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("coulomb_friction", "pressure_friction"))
+    assert friction is not None and friction.named
+
+
 def test_a_share_of_hardly_anything_is_none():
-    assert closing(gaps((1.0 + 0.9 * LEAST_MISFIT) ** 0.5, 1.0), 1) is None
+    assert closing(gaps((1.0 + 0.9 * LEAST_MISFIT) ** 0.5, 1.0), ONE) is None
 
 
 def test_an_effect_of_no_one_size_is_named_with_what_it_leaves():

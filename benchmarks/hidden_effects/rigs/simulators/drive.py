@@ -65,13 +65,13 @@ class Drive:
         if not part:
             return _line(start, end, time / span, self._lagged, lag, span)
         # The bend of a late command lies within the interval.
-        bend = part * span
+        breakpoint = part * span
         first = start + (before - start) * part
-        if time <= bend:
+        if time <= breakpoint:
             slope = (start - before) / span
             return _lagged(first, slope, time, self._lagged, lag)
-        at_bend = _lagged(first, (start - before) / span, bend, self._lagged, lag)
-        return _lagged(start, (end - start) / span, time - bend, at_bend, lag)
+        at_breakpoint = _lagged(first, (start - before) / span, breakpoint, self._lagged, lag)
+        return _lagged(start, (end - start) / span, time - breakpoint, at_breakpoint, lag)
 
     def _gained(self, command: float) -> float:
         gain = self.transmission.forward if command > 0.0 else self.transmission.backward

@@ -30,7 +30,7 @@ SLOWEST_HZ = 60.0
 PARABOLA = 4
 """Fewest readings that a parabola is drawn through."""
 
-BEND = 1e-4
+CURVATURE = 1e-4
 """Largest change of a command by leaving rows out, as a share of its span."""
 
 
@@ -111,7 +111,7 @@ def _bends(trial: Trial, times: Array) -> NDArray[np.int64]:
         knots = np.unique(np.concatenate([trial.time[[0, -1]], times]))
         for _ in range(8):
             drawn = np.interp(trial.time, knots, np.interp(knots, trial.time, values))
-            off = np.abs(drawn - values) > BEND * span
+            off = np.abs(drawn - values) > CURVATURE * span
             if not off.any():
                 break
             added = np.flatnonzero(off)

@@ -16,6 +16,7 @@ from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import TrialError
 from pma_gym.discovery.preparation.data_checks import timing
 from pma_gym.discovery.preparation.data_checks.averaging import averaged
+from pma_gym.discovery.preparation.data_checks.lead_in import with_lead_in
 from pma_gym.discovery.preparation.data_checks.simulated import pairs
 from pma_gym.discovery.preparation.data_checks.starts import moving_start, with_start
 from pma_gym.discovery.preparation.data_checks.wrong_columns import clock_proposals, unit_proposals
@@ -51,7 +52,10 @@ def check_dataset(dataset: Dataset, model: Model, stop: bool = True) -> Dataset:
         _refuse(unit_proposals(dataset, named, model), stop, words)
         # Lags after units: a signal turned round has none.
         words += timing.words(timing.lags(pairs(model, [each.trial for each in named])))
-        named = _started(named, Plant(model), wholes, words)
+        if model.rig.imposes_motion:
+            named = [with_lead_in(each, model) for each in named]
+        else:
+            named = _started(named, Plant(model), wholes, words)
     named, said = averaged(named)
     words += said
     # What the lab states of a sensor is no longer true of averages of its readings.

@@ -86,8 +86,8 @@ def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
     lag = float(tried[at])
     if 0 < at < len(tried) - 1:
         before, here, after = left[at - 1 : at + 2]
-        bend = before - 2.0 * here + after
-        lag += step * 0.5 * (before - after) / bend if bend > 0.0 else 0.0
+        curvature = before - 2.0 * here + after
+        lag += step * 0.5 * (before - after) / curvature if curvature > 0.0 else 0.0
     none = _left(time, simulated, measured, 0.0)
     clear = lag >= max(LEAST_S, LEAST_ROWS * row) and left[at] <= GAIN * none
     return lag, bool(clear and at < len(tried) - 1)

@@ -1,0 +1,70 @@
+"""The model that an environment simulates: nominal, with what its task and options ask for."""
+
+from pma_gym.effects import CATALOGUE
+from pma_gym.engine.options import Options
+from pma_gym.plant.model import Model
+from pma_gym.tasks import Task
+
+
+def rig_model(task: Task, options: Options) -> Model:
+    """The nominal model with all that the options ask for: somebody at the slide, if they do.
+
+    Raises:
+        ModelError: no such model, or one that cannot be used.
+        ValueError: a cascade where there must be a station.
+    """
+    model = options.nominal
+    if not model.rig.has_muscle:
+        raise ValueError(
+            f"an environment needs the model of a station or a cascade, got {model.name}, a slide, "
+            "which has no muscle; take station or serres2008"
+        )
+    pushed = options.disturbing.hand_push_force != 0.0
+    if not model.rig.balances_loads and (pushed or task.load or task.exercise):
+        what = f"disturbances={options.disturbances!r}" if pushed else f"task {task.name}"
+        held = "plays an operator" if task.exercise else "holds a load"
+        why = "somebody pulls at its slide" if pushed else f"the motor {held}"
+        raise ValueError(
+            f"{what} needs the model of a station, where {why}; got {model.name}, a {model.plant}; "
+            "take station or serres2008"
+        )
+    model = nominal_model(task, model)
+    if not pushed or "hand_push" in model.parameters:
+        return model
+    return model.with_effects({"hand_push": {"share": 1.0}})
+
+
+def nominal_model(task: Task, model: Model) -> Model:
+    """The nominal model that controllers receive: with a leg on its lever in an exercise."""
+    if task.exercise is None or "leg" in model.parameters or not model.rig.balances_loads:
+        return model
+    leg = CATALOGUE["leg"]
+    usual = {door: leg.quantities[stem].usual for door, stem in leg.names_at_the_door().items()}
+    return model.with_effects({"leg": {door: float(value or 0.0) for door, value in usual.items()}})
+
+
+def motor_at_rest(model: Model, task: Task) -> float:
+    """Motor voltage that episodes begin at (V): what a nominal drive needs for the task's load.
+
+    Raises:
+        ValueError: the drive does not hold such a load.
+    """
+    load = rest_load(model, task)
+    if not load:
+        return 0.0
+    drive = model.parameters["drive"]
+    volts = (load - drive.offset) / drive.gain
+    if not 0.0 <= volts <= 10.0:
+        raise ValueError(
+            f"task {task.name}: the load must lie in {max(0.0, drive.offset):.4g} to "
+            f"{10.0 * drive.gain + drive.offset:.4g} N, what the drive of model {model.name} holds "
+            f"with 0-10 V; got {load:g} N"
+        )
+    return volts
+
+
+def rest_load(model: Model, task: Task) -> float:
+    """Load that the motor holds as an episode begins (N), by the nominal pulley."""
+    if task.exercise is None:
+        return task.load
+    return task.exercise.start_moment / model.parameters["rotor"].radius

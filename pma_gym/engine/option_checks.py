@@ -1,0 +1,173 @@
+"""Checks of single options: names, numbers and pressures, with errors that say how to fix them."""
+
+import difflib
+import numbers
+from collections.abc import Iterable, Sequence
+from typing import TypeGuard
+
+from pma_gym.engine.plain_values import plain_sequence
+from pma_gym.tasks import OPERATOR_BOUNDS, Operator
+
+LOWEST_PRESSURE_KPA = 150.0
+HIGHEST_PRESSURE_KPA = 575.0
+"""Pressures at which the station was ever shown (kPa): table I3."""
+
+Pressure = float | Sequence[float] | str
+"""Gauge pressure of the episodes (kPa): one, several to draw from, or "random"."""
+
+
+def check_known(what: str, given: Iterable[str], known: Sequence[str]) -> None:
+    """Refuse names that nobody knows.
+
+    Raises:
+        TypeError: the first unknown name, the nearest known one, and all known.
+    """
+    for name in given:
+        if name not in known:
+            raise TypeError(
+                f"unknown {what} {name!r}{_nearest(name, known)}; known: {', '.join(known)}"
+            )
+
+
+def check_keywords(
+    caller: str, given: Iterable[str], known: Sequence[str], others: Sequence[str] = ()
+) -> None:
+    """Refuse keyword arguments that do not exist, in Python's own words.
+
+    Libraries look for these words to see whether an environment takes an argument.
+
+    Args:
+        caller: who takes them.
+        given: names that came.
+        known: names of the options.
+        others: names of further keyword arguments of the caller.
+    Raises:
+        TypeError: the first unknown name, the nearest known one, and all known.
+    """
+    for name in given:
+        if name not in known:
+            raise TypeError(
+                f"{caller} got an unexpected keyword argument {name!r}"
+                f"{_nearest(name, [*known, *others])}; known: {', '.join([*known, *others])}"
+            )
+
+
+def check_named(what: str, value: object, known: Iterable[str]) -> None:
+    """Refuse a value that is none of the known names.
+
+    Raises:
+        ValueError: what it is, the known names, what came and the nearest known name.
+    """
+    names = list(known)
+    if not isinstance(value, str) or value not in names:
+        raise unknown_name(what, value, names)
+
+
+def check_operator(operator: Operator) -> None:
+    """Refuse an operator whom nobody could be.
+
+    Raises:
+        ValueError: names the number, its range and unit, and what came.
+    """
+    for name, value in operator._asdict().items():
+        lower, upper, unit = OPERATOR_BOUNDS[name]
+        check_number(f"operator.{name}", value, lower, upper, unit)
+
+
+def check_pressure(pressure: object) -> None:
+    """Refuse a pressure that the station was never shown at.
+
+    Raises:
+        ValueError: names the range, the unit and what came.
+    """
+    if isinstance(pressure, str) and pressure == "random":
+        return
+    several = pressure if isinstance(pressure, list | tuple) else [pressure]
+    if not several or not all(map(is_real, several)):
+        raise ValueError(
+            f'pressure_kpa must be a number in kPa, a list of numbers or "random", got {pressure!r}'
+        )
+    for one in several:
+        check_number("pressure_kpa", one, LOWEST_PRESSURE_KPA, HIGHEST_PRESSURE_KPA, "kPa")
+
+
+def parse_pressure(given: object) -> Pressure:
+    """The checked pressure of episodes, as plain Python values.
+
+    Raises:
+        ValueError: names the range, the unit and what came.
+    """
+    pressure = plain_sequence(given)
+    check_pressure(pressure)
+    return pressure
+
+
+def parse_pressures(given: object, count: int) -> list[Pressure]:
+    """The checked pressures of so many environments, one each, as plain Python values.
+
+    Raises:
+        ValueError: names the rule and what came.
+    """
+    pressures = plain_sequence(given)
+    length = f"{len(pressures)}" if isinstance(pressures, list) else "no sequence"
+    if length != f"{count}":
+        raise ValueError(
+            f"pressures_kpa must hold one pressure for each of the {count} environments, got "
+            f"{length}: {given!r}; pressure_kpa is one for all"
+        )
+    for pressure in pressures:
+        check_pressure(pressure)
+    return pressures
+
+
+def check_count(name: str, count: object, most: int) -> None:
+    """Refuse a number of things that is none.
+
+    Raises:
+        ValueError: names it, the rule and what came.
+    """
+    if not is_whole(count) or not 1 <= count <= most:
+        raise ValueError(f"{name} must be a whole number in 1-{most}, got {count!r}")
+
+
+def check_whole(name: str, value: object) -> None:
+    """Refuse what is no whole number of control steps in 0-1000.
+
+    Raises:
+        ValueError: names the option, the rule and what came.
+    """
+    if not is_whole(value) or not 0 <= value <= 1000:
+        raise ValueError(f"{name} must be a whole number of control steps in 0-1000, got {value!r}")
+
+
+def check_number(name: str, value: object, lower: float, upper: float, unit: str) -> None:
+    """Refuse what is no number of a range.
+
+    Raises:
+        ValueError: names the option, its range and unit, and what came.
+    """
+    # `not <=`: NaN is out of every range.
+    if not is_real(value) or not lower <= value <= upper:
+        raise ValueError(f"{name} must be a number in {lower:g}-{upper:g} {unit}, got {value!r}")
+
+
+def is_real(value: object) -> TypeGuard[float]:
+    """Whether a value is a real number; True and False are none."""
+    return isinstance(value, numbers.Real) and not isinstance(value, bool)
+
+
+def is_whole(value: object) -> TypeGuard[int]:
+    """Whether a value is a whole number; True and False are none."""
+    return isinstance(value, numbers.Integral) and not isinstance(value, bool)
+
+
+def unknown_name(what: str, value: object, names: Sequence[str]) -> ValueError:
+    """The error of a value that is none of the known names; says the nearest one."""
+    return ValueError(
+        f"{what} must be one of {', '.join(names)}, got {value!r}{_nearest(value, names)}"
+    )
+
+
+def _nearest(name: object, known: Sequence[str]) -> str:
+    close = difflib.get_close_matches(str(name).lower(), known, n=1, cutoff=0.5)
+    return f" (did you mean {close[0]!r}?)" if close else ""

@@ -1,0 +1,221 @@
+"""What can be read of an episode, from the record that the engine keeps of it."""
+
+import copy
+import math
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.engine.engine import Engine
+from pma_gym.engine.observation import ObservationTable
+from pma_gym.engine.options import Options
+from pma_gym.engine.state_layout import HAND_PUSH, PARTS, START, TRUTH
+from pma_gym.envs.station_info import Measurement, Reference, StationInfo, detached_task
+from pma_gym.envs.summary import episode_summary
+from pma_gym.plant.condition import Condition
+from pma_gym.plant.plant import Plant
+from pma_gym.renamed_names import renamed_attribute
+from pma_gym.tasks import Events, Operator, Task
+
+NOT_BEGUN = "no episode has begun"
+
+
+class Episode:
+    """What an agent, a controller and a reader see of an environment's episode.
+
+    `PMAEnv` and the members of a batch are read by it; it changes nothing.
+
+    Attributes:
+        task: the Task.
+        options: the checked Options.
+        table: the ObservationTable.
+        nominal_plant: the Plant of the nominal model.
+    """
+
+    task: Task
+    options: Options
+    table: ObservationTable
+    nominal_plant: Plant
+    _engine: Engine
+    _index: int = 0
+    """Its number in the engine."""
+    _row: NDArray[np.float64]
+    """Its record."""
+    _idle: str | None
+
+    def _find_offsets(self) -> None:
+        self._offsets = self._engine.state_layout.offsets
+        # The record holds a reading's parts side by side.
+        first = self._offsets[f"{PARTS[0]}_{self.options.observation_delay}"]
+        self._measured = slice(first, first + len(PARTS))
+        self._datum = START if START in self._offsets else "zero_contraction"
+
+    def _number(self, name: str) -> float:
+        return float(self._row[self._offsets[name]])
+
+    @cached_property
+    def plant(self) -> Plant:
+        """The Plant of this episode; differs from the nominal one with `randomisation`."""
+        return self._episode_plant()
+
+    def _episode_plant(self) -> Plant:
+        model = self._engine.models[self._index]
+        nominal = self.nominal_plant
+        return nominal if model is nominal.model else Plant(model, nominal.tolerance)
+
+    @property
+    def pressure(self) -> float:
+        """Gauge pressure that this episode began at (Pa)."""
+        return float(self._engine.pressures[self._index])
+
+    @property
+    def condition(self) -> Condition:
+        """Where the plant stands; a copy."""
+        state = np.array([self._number(name) for name in self.nominal_plant.states])
+        zero, size = self._number("zero_contraction"), self._number("size")
+        return Condition(state, zero, self.time, size, (self.motor_voltage, self.regulator_voltage))
+
+    @property
+    def _count(self) -> int:
+        """Control steps so far."""
+        return int(self._row.view(np.int64)[self._offsets["count"]])
+
+    @property
+    def time(self) -> float:
+        """Time since the trial began (s)."""
+        return self._count * self.options.period
+
+    @property
+    def measurement(self) -> Measurement:
+        """What the sensors say, `observation_delay_s` ago."""
+        taken = max(self._count - self.options.observation_delay, 0) * self.options.period
+        return Measurement(taken, *self._row[self._measured].tolist())
+
+    reading = renamed_attribute("reading", "measurement")
+    human = renamed_attribute("human", "operator")
+
+    @property
+    def truth(self) -> dict[str, float]:
+        """True contraction, extension (m), rotation (rad), load (N) and pressure (Pa).
+
+        Contraction is from the muscle's resting length, extension from the trial's beginning;
+        rotation from where the cable begins to be wound in with no load, in an exercise from where
+        it begins.
+        """
+        truth = {name: self._number(f"true_{name}") for name in TRUTH}
+        return truth | {"extension": self._number(self._datum) - truth["contraction"]}
+
+    @property
+    def position(self) -> float:
+        """True position that the task asks for (m, rad; N m for a moment's excess)."""
+        truth = self.truth
+        if self.task.protocol.followed.shortens:
+            return truth["contraction"] - self._number(START)
+        if self.task.protocol.followed.is_force:
+            return self._number("excess_nm")
+        return truth[self.task.protocol.quantity]
+
+    @property
+    def operator(self) -> Operator | None:
+        """The operator of this exercise; None without one, or before. Not for controllers."""
+        if self.task.exercise is None or self._idle == NOT_BEGUN:
+            return None
+        return Operator(*(self._number(f"operator_{name}") for name in Operator._fields))
+
+    @property
+    def disturbance(self) -> tuple[float, float]:
+        """What disturbed the last step: the regulator's jump (V) and the hand's force (N)."""
+        jumps = [name for name in self._offsets if name.startswith("jump_step_")]
+        count = self._count - 1
+        volts = [
+            self._number(name.replace("_step", "")) for name in jumps if count >= self._number(name)
+        ]
+        force = self._number(HAND_PUSH) if HAND_PUSH in self._offsets else 0.0
+        return sum(volts), force
+
+    @property
+    def events(self) -> Events:
+        """What disturbs this episode, and when; not for controllers."""
+        return self._engine.events(self._index)
+
+    @property
+    def station(self) -> StationInfo:
+        """What a controller may know, in copies: what it was designed with, how it is driven."""
+        options = self.options
+        return StationInfo(
+            copy.copy(self._engine.nominal_model),
+            self._detached_task,
+            self.pressure,
+            options.period,
+            options.action_delay * options.period,
+            options.observation_delay * options.period,
+        )
+
+    @property
+    def error(self) -> float:
+        """True position less reference (m or rad)."""
+        return self.position - float(self.table.references[self._count])
+
+    @property
+    def extrapolated(self) -> bool:
+        """Whether the pressure lies outside this task's trials or the model's validity."""
+        return self._number("extrapolated") != 0.0
+
+    @property
+    def motor_voltage(self) -> float:
+        """Motor voltage that the station received in the last step (V)."""
+        return self._number("motor_voltage")
+
+    @property
+    def regulator_voltage(self) -> float:
+        """Regulator voltage that the station received in the last step (V)."""
+        return self._number("regulator_voltage")
+
+    @property
+    def motor_voltages(self) -> NDArray[np.float64]:
+        """Motor voltage that the station received in every step so far (V), shape (steps,).
+
+        Raises:
+            AttributeError: in an exercise, whose operator is not written down step by step.
+        """
+        if self.task.exercise:
+            raise AttributeError(
+                "motor_voltages are not kept in an exercise, where the motor plays the operator; "
+                'collect info["motor_voltage_v"] of every step'
+            )
+        if self.task.actuator == "motor":
+            return self.voltages
+        return np.full(self._count, self.motor_voltage)
+
+    @property
+    def voltages(self) -> NDArray[np.float64]:
+        """Voltage of the task's actuator that the station received in every step so far (V)."""
+        return self._engine.voltages[: self._count].copy()
+
+    @property
+    def reference(self) -> Reference:
+        """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
+        return Reference(self._detached_task.protocol)
+
+    @cached_property
+    def _detached_task(self) -> Task:
+        """What controllers get of the task; made once, so that repeated trials have equal ones."""
+        return detached_task(self.task)
+
+    def trajectory(self) -> NDArray[np.float64]:
+        """True position (m or rad) at k / 384 s so far, whatever the control rate, shape (k,)."""
+        return self._engine.trace[: math.floor(self._number("sample") + 0.5)].copy()
+
+    def episode_summary(self) -> dict[str, Any]:
+        """RMSE of the true position at 384 Hz so far, as the dissertation defines it.
+
+        Returns:
+            `rmse_mm` or `rmse_deg`: over all phases; `rmse_by_phase_mm` or `rmse_by_phase_deg`: of
+            each phase begun, by its name; `percent_of_range`: the first, of 25 mm, 90 deg
+            or the contraction's stroke; `ended_by`: the limit that terminated the episode, in
+            words, or "". An exercise has `exercise_summaries` too, and its RMSE in N m where it
+            prescribes a moment.
+        """
+        return episode_summary(self._engine, self._index)

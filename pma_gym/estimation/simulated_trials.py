@@ -1,0 +1,257 @@
+"""Measured trials simulated by a model at many values of its free parameters.
+
+Every trial begins settled at its first commands. Where nothing says how a memory stands or how
+fast a free rig moves then, each trial is simulated once more with another start, and moved along
+the difference to where it meets its readings best.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import repeat
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.estimation import initial_states
+from pma_gym.estimation.free_parameters import free_parameters
+from pma_gym.estimation.logged import Logged
+from pma_gym.integrator.equations import Interpolation, check_interpolation
+from pma_gym.plant import memory_start, sensors
+from pma_gym.plant.compiled_model import DEFAULT_TOLERANCE
+from pma_gym.plant.equilibrium import solver
+from pma_gym.plant.model import Model
+from pma_gym.plant.plant import Plant
+from pma_gym.plant.program import FIRST_S, table
+from pma_gym.plant.simulation import Run, simulate_all
+
+Array = NDArray[np.float64]
+
+MOST_BYTES = 1 << 28
+"""Most memory for the states of trials that are simulated together."""
+
+
+class SimulatedTrials:
+    """Measured trials, and a model that simulates them all with any values of its free parameters.
+
+    Args:
+        model: the model; its drive and its regulator's line say what commanded loads and pressures
+            are in volts.
+        trials: the trials, which need measurements.
+        free: paths of the free parameters.
+        tolerance: of the integrator, as `Plant`.
+        interpolation: of the commands between rows: "foh" (first-order hold, linear) or "zoh" (each
+            held until the next).
+        threads: how many threads share the work; the results' bits do not depend on it.
+
+    Attributes:
+        free: the free parameters.
+        factors: SI value of one unit in files of each, shape (p,).
+        start: their values in the model, in file units, shape (p,).
+        count: number of readings that count.
+        deviations: standard deviations of the sensors (SI), shape (signals,).
+        trials: number of trials.
+        balanced: which of the parameters tried last balance the load where trials begin.
+    Raises:
+        ModelError: a path that the model does not have, a row of numbers or a sensor's noise.
+        ValueError: no trial, or one that measures nothing.
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        trials: Sequence[Trial],
+        free: Sequence[str],
+        tolerance: float = DEFAULT_TOLERANCE,
+        interpolation: Interpolation = "foh",
+        threads: int = 1,
+    ) -> None:
+        check_interpolation(interpolation)
+        self.plant, self.threads = Plant(model, tolerance), threads
+        self.interpolation: Interpolation = interpolation
+        self.free = free_parameters(self.plant.model, free)
+        indices = [parameter.place for parameter in self.free]
+        self.factors = np.array([parameter.quantity.factor for parameter in self.free])
+        self.start: Array = self.plant.vector[indices] / self.factors
+        self.lower = np.array([parameter.quantity.lower for parameter in self.free], float)
+        self.upper = np.array([parameter.quantity.upper for parameter in self.free], float)
+        self.deviations: Array = sensors.deviations(self.plant.model)
+        self.trials = len(trials)
+        if not trials:
+            raise ValueError("a fit needs at least one trial")
+        self._trials = [Logged.of(self.plant.model, i, trial) for i, trial in enumerate(trials)]
+        self.count = sum(logged.count for logged in self._trials)
+        self._buffer = np.empty(0)
+        self.balanced: NDArray[np.bool_] = np.ones(1, bool)
+        self._own: list[tuple[int, Array]] = []
+        self._begun: list[tuple[int, Array]] = []
+        if self.plant.model.rig.is_free:
+            where, speed = initial_states.starts(self._trials)
+            paths = dict(
+                zip(self.plant.model.rig.start_paths.values(), (where, speed), strict=True)
+            )
+            self._begun = self._indices({path: list(row) for path, row in paths.items()})
+        guesses = memory_start.first_guesses(trials)
+        nuisances = [p for p in memory_start.memory_starts(self.plant.model) if p not in free]
+        self._memories = self._indices({path: list(guesses) for path in nuisances})
+        self._reaches = [memory_start.reach(trial) for trial in trials]
+
+    def _each(
+        self, tried: Array, work: Callable[[Logged, Array, Array, Array], Array]
+    ) -> list[Array]:
+        """Simulate all trials at all parameters; what `work` makes of each trial, in their order.
+
+        It gets states of shape (tried, rows, states), x0 of shape (tried,) and their vectors.
+        """
+
+        def trials(
+            block: list[int], spaces: list[Array], zeros: Array, vectors: Array
+        ) -> list[Array]:
+            logs = [self._trials[i] for i in block]
+            with ThreadPoolExecutor(self.threads) as pool:
+                # A thread costs more than the work of a small trial does.
+                each = pool.map if self.threads > 1 else map
+                return list(each(work, logs, spaces, zeros, repeat(vectors)))
+
+        return self._by_block(tried, trials)
+
+    def _by_block(
+        self, tried: Array, work: Callable[[list[int], list[Array], Array, Array], list[Array]]
+    ) -> list[Array]:
+        """As `_each`, but `work` gets several trials at once, by their numbers."""
+        vectors = np.repeat(self.plant.vector[None, :], len(tried), axis=0)
+        for column, parameter in enumerate(self.free):
+            vectors[:, parameter.place] = tried[:, column] * self.factors[column]
+        moved = self._moved_starts()
+        count, number = len(tried) + len(moved), len(self.plant.states)
+        every = self._every(np.concatenate([vectors, *([vectors[:1]] * len(moved))]))
+        for further, indices in enumerate(moved, len(tried)):
+            for place, move in indices:
+                every[further::count, place] += move
+        tables = self._tables(every, count)
+        first = np.array([logged.first for logged in self._trials])
+        commands = np.repeat(first, count, axis=0).T
+        states, zeros = solver.equilibria_at(self.plant, commands[0], commands[1], every)
+        results: list[Array] = []
+        shape = (len(self._trials), count)
+        finite = np.isfinite(zeros) & np.isfinite(states).all(axis=1)
+        self._settled = bool(finite.all())
+        self.balanced = np.asarray(finite.reshape(shape).all(axis=0))
+        if not self._settled:
+            return results
+        states, zeros = states.reshape(*shape, number), zeros.reshape(shape)
+        for block in self._blocks(8 * number * count):
+            runs, spaces = [], self._spaces(block, count)
+            for i, space in zip(block, spaces, strict=True):
+                logged = self._trials[i]
+                columns = (logged.time, logged.motor, logged.regulator, self.interpolation)
+                runs += [
+                    Run(*columns, tables[i][k], states[i, k], zeros[i, k], FIRST_S, space[k])
+                    for k in range(count)
+                ]
+            simulate_all(self.plant.program, runs, self.threads)
+            if moved:
+                each = zip(block, spaces, strict=True)
+                spaces = [self._met(i, space, zeros[i], vectors) for i, space in each]
+            results += work(block, spaces, zeros[block, : len(tried)], vectors)
+        return results
+
+    def _moved_starts(self) -> list[list[tuple[int, float]]]:
+        """Parameters that say how trials begin, moved in one more simulation each, and by how much.
+
+        A position whose zero is free begins anywhere.
+        """
+        if self._begun:
+            free = self.plant.model.rig.signals[0].has_free_zero
+            return [[(place, initial_states.MOVE)] for place, _ in self._begun[free:]]
+        return [[(place, memory_start.MOVE) for place, _ in self._memories]] * bool(self._memories)
+
+    def _met(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """States of a trial that begins as fits best, shape (tried, rows, states).
+
+        The last of those given are the first with another start; x0 moves with them.
+        """
+        if self._begun:
+            return self._met_freely(space, zeros, vectors, self._trials[number])
+        shares = self._start_shares(number, space, zeros, vectors)
+        space[:-1] += shares[:, None, None] * (space[-1] - space[0])
+        zeros[:-1] += shares * (zeros[-1] - zeros[0])
+        return space[:-1]
+
+    def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
+        """How many moves bring each simulation nearest to a trial's readings, shape (tried,)."""
+        logged = self._trials[number]
+        held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]))
+        left = np.stack(held, axis=1) - logged.measured
+        changes = self._in_noise(logged, left * logged.counts)
+        along = changes[-1] - changes[0]
+        return memory_start.best_shares(changes[:-1], along, self._reaches[number])
+
+    def _in_noise(self, logged: Logged, left: Array) -> Array:
+        """Differences (SI), (tried, signals, rows), in units of noise, (tried, numbers)."""
+        return (left / self.deviations[:, None]).reshape(len(left), -1)
+
+    def _met_freely(self, space: Array, zeros: Array, vectors: Array, logged: Logged) -> Array:
+        """States of a free rig, begun as fits best; shape (tried, rows, states)."""
+        tried, further = len(vectors), len(space) - len(vectors)
+        every = np.concatenate([vectors, *([vectors[:1]] * further)])
+        held = np.stack(self._held(space, zeros, every), axis=1)
+        initial_states.meet(space, held, logged, self._levels, further)
+        return space[:tried]
+
+    @property
+    def _levels(self) -> Array:
+        """Standard deviations that signals are weighed by where a start is sought (SI)."""
+        return self.deviations
+
+    def _every(self, vectors: Array) -> Array:
+        """Parameters of every trial at each of some, shape (trials * tried, numbers)."""
+        every = np.tile(vectors, (len(self._trials), 1))
+        for place, values in (*self._begun, *self._memories, *self._own):
+            every[:, place] = np.repeat(values, len(vectors))
+        return every
+
+    def _tables(self, every: Array, count: int) -> list[list[Array]]:
+        """Tables of every trial; the same ones where trials have no parameters of their own."""
+        program = self.plant.program
+        if not self._own:
+            return [[table(program, vector) for vector in every[:count]]] * len(self._trials)
+        parts = np.split(every, len(self._trials))
+        return [[table(program, vector) for vector in part] for part in parts]
+
+    def _indices(self, own: Mapping[str, Sequence[float]]) -> list[tuple[int, Array]]:
+        """Where values (SI) go that a parameter has in each trial, by its path."""
+        free = free_parameters(self.plant.model, list(own))
+        return [(each.place, np.asarray(own[each.path], float)) for each in free]
+
+    def _blocks(self, bytes_a_row: int) -> list[list[int]]:
+        """Trials that fit into memory together."""
+        blocks, room = [], 0
+        for i, logged in enumerate(self._trials):
+            needed = bytes_a_row * len(logged.time)
+            if not blocks or needed > room:
+                blocks.append([])
+                room = MOST_BYTES
+            blocks[-1].append(i)
+            room -= needed
+        return blocks
+
+    def _spaces(self, block: list[int], count: int) -> list[Array]:
+        """Room for the states of a block's trials, shape (count, rows, states) each; used again."""
+        shapes = [(count, len(self._trials[i].time), len(self.plant.states)) for i in block]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
+        if len(self._buffer) < ends[-1]:
+            self._buffer = np.empty(ends[-1])
+        parts = np.split(self._buffer[: ends[-1]], ends[:-1])
+        return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
+
+    def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
+        """What the sensors hold, shape (tried, rows) each."""
+        columns, program = self.plant.sensor_columns, self.plant.program
+        count, rows, _ = states.shape
+        truth = np.empty((count, rows, len(self.plant.outputs)) if min(columns) < 0 else (0, 0, 0))
+        for i, out in enumerate(truth):
+            addresses = (vectors[i].ctypes.data, out.ctypes.data)
+            program.observe(rows, states[i].ctypes.data, float(zeros[i]), *addresses)
+        return [states[:, :, at] if at >= 0 else truth[:, :, i] for i, at in enumerate(columns)]

@@ -1,0 +1,59 @@
+"""Records of an imposed motion: what a diagnosis makes of them before it looks at the force."""
+
+import numpy as np
+import pytest
+
+from pma_gym.data.datasets.dataset import NamedTrial
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.preparation.data_checks.lead_in import with_lead_in
+from pma_gym.discovery.preparation.prepared_trials import prepared
+from pma_gym.discovery.screening.candidates import candidate_effects
+from tests.plant.test_imposed import FRICTION, SINE, TIME, imposed
+
+MUSCLE = {"contractile_force": {"slope_n_per_kpa": 2.9, "intercept_n": 45.0}}
+
+
+def named(time, position):
+    force = {"force": np.zeros(len(time))}
+    return NamedTrial("run.csv", Trial(time, {"contraction_command": position}, force))
+
+
+def test_a_record_that_begins_in_motion_gets_the_motion_before_it():
+    time = np.linspace(5.0, 8.0, 601)
+    led = with_lead_in(named(time, 0.02 * (time - 5.0)), imposed()).trial
+    assert led.time[0] == pytest.approx(4.0) and len(led) == 801
+    np.testing.assert_allclose(np.diff(led.commands["contraction_command"]), 1e-4, atol=1e-9)
+    assert np.isnan(led.measurements["force"][:200]).all()
+    assert np.isfinite(led.measurements["force"][200:]).all()
+
+
+def test_a_record_that_begins_at_rest_stays_as_it_is():
+    given = named(TIME, 0.02 * SINE)
+    assert with_lead_in(given, imposed()) is given
+
+
+def test_a_record_of_positions_is_no_voltage():
+    (kept,), _ = prepared([named(TIME, 0.02 * SINE)], imposed())
+    np.testing.assert_array_equal(kept.trial.commands["contraction_command"], 0.02 * SINE)
+
+
+def test_what_may_be_missing_is_what_the_rig_has():
+    bare = {each.name for each in candidate_effects(imposed(coulomb_friction=FRICTION))}
+    muscle = {each.name for each in candidate_effects(imposed(**MUSCLE))}
+    assert {"backlash", "pressure_friction", "constant_force", "cogging"} <= bare
+    assert not {"hysteresis", "creep", "filling", "regulator_delay"} & bare
+    assert {"hysteresis", "creep", "coulomb_friction"} <= muscle
+
+
+def test_the_presliding_that_a_slide_hides_is_looked_for_at_every_size():
+    (friction,) = [c for c in candidate_effects(imposed()) if c.name == "coulomb_friction"]
+    path = "coulomb_friction.presliding_um"
+    assert path in friction.fitted_paths
+    looked = friction.probes[:, friction.paths.index(path)]
+    assert looked.min() <= 10.0 and looked.max() >= 2000.0
+
+
+def test_a_ripple_is_looked_for_about_its_usual_number_of_periods():
+    (ripple,) = [c for c in candidate_effects(imposed()) if c.name == "cogging"]
+    looked = np.unique(ripple.probes[:, ripple.paths.index("cogging.periods_per_m")])
+    np.testing.assert_allclose(looked, 12.5 * np.arange(1, 21))
