@@ -240,6 +240,7 @@ def test_a_line_that_was_changed_is_no_row(tmp_path, capsys):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.campaign
 def test_a_ray_cluster_writes_the_rows_of_one_process(suite, tmp_path):
     ray = pytest.importorskip("ray")
     mine = own(tmp_path, "Mine")
