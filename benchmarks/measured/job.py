@@ -118,7 +118,7 @@ def run_measured(
             lambda done, total: tell("pressures left out", done, total),
         )
         final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
-        blind, proposals = undecidable(
+        not_detectable, proposals = undecidable(
             final, few, jobs, seed, lambda done, total: tell("what cannot be told", done, total)
         )
         reverse = _reverse(stages, lambda done, total: tell("the reverse", done, total))
@@ -131,7 +131,7 @@ def run_measured(
         left_out,
         floors(),
         smooth_errors(*judged),
-        blind,
+        not_detectable,
         proposals,
         reverse,
         held,
