@@ -126,8 +126,8 @@ class OpenLoop:
 
         Args:
             faults: some of `CAUSES`.
-            interpolation: how samples become voltages where `timing` is a fault: joined (`foh`), or each
-                held until the next (`zoh`).
+            interpolation: how samples become voltages where `timing` is a fault: joined (`foh`), or
+                each held until the next (`zoh`).
             compensated: whether any lag is made up for; else tau = 0.
         """
         steps = self.station.task.steps(1.0 / self.station.period)

@@ -56,7 +56,8 @@ def run_voltages(order: Order, out: Path) -> int:
     text.write(
         f"# {order.controller}, {order.task}, {order.pressure_kpa:g} kPa, {order.rate_hz:g} Hz, "
         f"model {environment.nominal_plant.model.name}\n"
-        "# Settle at the first row; hold each row until the next (pma-gym simulate --interpolation zoh)\n"
+        "# Settle at the first row; hold each row until the next "
+        "(pma-gym simulate --interpolation zoh)\n"
     )
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("time_s", "motor_voltage_v", "regulator_voltage_v", f"reference_{unit}"))

@@ -1,7 +1,7 @@
 """How closely an exercise can be done by who knows the operator's whole course beforehand.
 
 The regulator's voltages of all control steps, v in 0-10 V, are tried with the very operator
-and the very station (`benchmarks.exercise.lag.repeated_exercise`), and improved by Gauss and Newton's way:
+and the very station (`benchmarks.exercise.lag.repeated_exercise`), and improved by Gauss-Newton:
 
     d = argmin |e + J d|^2 + mu |d|^2,   0 <= v + d <= 10
 

@@ -157,7 +157,7 @@ def test_every_baseline_sees_much_creep(baseline, folder, dataset, monkeypatch):
         if each.name in FEW
     ]
     monkeypatch.setattr(preparation, "candidate_effects", lambda model, orders: few)
-    monkeypatch.setattr(gaussian_process, "MOST_TICKS", 60)
+    monkeypatch.setattr(gaussian_process, "MOST_BINS", 60)
     for name in BASELINES[baseline].needs:
         pytest.importorskip(name)
     answer = BASELINES[baseline].ask(dataset, 0, 1)
