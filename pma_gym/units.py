@@ -64,6 +64,8 @@ SI_FACTORS: dict[str, float] = {
     "V/bar": 1e-5,
     "V/deg": 180.0 / math.pi,
     "N m s": 1.0,
+    "N m s^2": 1.0,
+    "N m/rad^3": 1.0,
     "kg m^2": 1.0,
 }
 """Value in SI of one of each unit."""

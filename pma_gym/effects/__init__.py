@@ -5,13 +5,29 @@ from pma_gym.effects.cable.hanging_load import HANGING_LOAD
 from pma_gym.effects.cable.leg import LEG
 from pma_gym.effects.contact.backlash import BACKLASH
 from pma_gym.effects.contact.cogging import COGGING
-from pma_gym.effects.contact.constant_force import CONSTANT_FORCE
+from pma_gym.effects.contact.constant_force import CONSTANT_FORCE, CONSTANT_TORQUE
+from pma_gym.effects.contact.directional_damping import (
+    DIRECTIONAL_DAMPING,
+    JOINT_DIRECTIONAL_DAMPING,
+)
 from pma_gym.effects.contact.imposed_motion import IMPOSED_MOTION
+from pma_gym.effects.contact.load_dependent_friction import (
+    JOINT_LOAD_FRICTION,
+    LOAD_DEPENDENT_FRICTION,
+)
 from pma_gym.effects.contact.piston_force import PISTON_FORCE
 from pma_gym.effects.contact.pressure_friction import PRESSURE_FRICTION
+from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
+from pma_gym.effects.contact.spring import (
+    HARDENING_SPRING,
+    JOINT_HARDENING_SPRING,
+    JOINT_SPRING,
+    SPRING,
+)
 from pma_gym.effects.delay import DRIVE_DELAY, REGULATOR_DELAY
 from pma_gym.effects.drive.bearing_friction import BEARING_FRICTION
 from pma_gym.effects.drive.current_imbalance import CURRENT_IMBALANCE
+from pma_gym.effects.drive.directional_gain import DIRECTIONAL_GAIN
 from pma_gym.effects.drive.drive import DRIVE
 from pma_gym.effects.drive.drive_dead_zone import DRIVE_DEAD_ZONE
 from pma_gym.effects.drive.drive_lag import DRIVE_LAG
@@ -24,12 +40,7 @@ from pma_gym.effects.drive.two_way_drive import TWO_WAY_DRIVE
 from pma_gym.effects.effect import Effect
 from pma_gym.effects.joint.inertia import INERTIA, JOINT_START
 from pma_gym.effects.joint.motor import DC_MOTOR, TORQUE_DRIVE
-from pma_gym.effects.joint.passive_torque import (
-    JOINT_DAMPING,
-    JOINT_FRICTION,
-    JOINT_SPRING,
-    JOINT_WEIGHT,
-)
+from pma_gym.effects.joint.passive_torque import JOINT_DAMPING, JOINT_FRICTION, JOINT_WEIGHT
 from pma_gym.effects.limits import LIMITS, VALIDITY
 from pma_gym.effects.muscle.colbrunn import COLBRUNN_SPRING
 from pma_gym.effects.muscle.contractile_force import CONTRACTILE_FORCE
@@ -145,6 +156,17 @@ CATALOGUE: dict[str, Effect] = {
         JOINT_SPRING,
         JOINT_DAMPING,
         JOINT_FRICTION,
+        QUADRATIC_DRAG,
+        JOINT_DRAG,
+        DIRECTIONAL_DAMPING,
+        JOINT_DIRECTIONAL_DAMPING,
+        SPRING,
+        HARDENING_SPRING,
+        JOINT_HARDENING_SPRING,
+        LOAD_DEPENDENT_FRICTION,
+        JOINT_LOAD_FRICTION,
+        DIRECTIONAL_GAIN,
+        CONSTANT_TORQUE,
         INERTIA,
         JOINT_START,
         *JOINT_SENSORS,

@@ -154,17 +154,24 @@ class PlantEquations(Equations):
         source, decay = rate
         self.add_state(name, source - decay * self[name] + self.total(beside), scale)
 
-    def add_memories(self, ports: Sequence[str]) -> None:
-        """Add the memory of every effect that has one at these ports."""
+    def add_memories(self, ports: Sequence[str], scales: Mapping[str, float] | None = None) -> None:
+        """Add the memory of every effect that has one at these ports.
+
+        Args:
+            ports: the ports.
+            scales: what errors of memories are counted against by port, where it is not the
+                effect's own scale.
+        """
         for effect in self.effects.values():
             if effect.port in ports and effect.rate:
-                self._add_memory(effect, effect.rate)
+                scale = (scales or {}).get(effect.port, effect.memory_scale)
+                self._add_memory(effect, effect.rate, scale)
 
-    def _add_memory(self, effect: Effect, law: Callable) -> None:
+    def _add_memory(self, effect: Effect, law: Callable, scale: float) -> None:
         pairs = self.call(effect, law)
         rates = pairs if effect.memories > 1 else (pairs,)
         for name, rate in zip(effect.memory_names, rates, strict=True):
-            self.add_decaying(name, rate, effect.memory_scale)
+            self.add_decaying(name, rate, scale)
 
     def add_breakpoints(self) -> None:
         """Add the bends of the effects' laws; all states must have been added."""
@@ -191,4 +198,4 @@ class PlantEquations(Equations):
                 self.add_decaying(f"lag_{effect.name}", rate, LAG_SHARE * scales[output])
                 for error in self.at(effect.port):
                     if error.law and error.rate:
-                        self._add_memory(error, error.rate)
+                        self._add_memory(error, error.rate, error.memory_scale)

@@ -36,6 +36,8 @@ SIGNALS = {
     "displacement": (0.0, 0.05),
     "displacement_rate": (-0.2, 0.2),
     "signal": (-0.01, 500e3),
+    "position": (-1.5, 1.5),
+    "drive_force": (-400.0, 400.0),
     "travel": (0.0, 30e-6),
     "direction": (1.0, 1.0),
     "cable_tension": (0.0, 1000.0),

@@ -12,15 +12,26 @@ class ConstantForce(NamedTuple):
     force: Annotated[float, Quantity("N", -1e6, 1e6, "assumption: 5", 0.0, usual=5)]
 
 
+class ConstantTorque(NamedTuple):
+    """Parameters of `constant_force` about an axis."""
+
+    torque: Annotated[float, Quantity("N m", -1e6, 1e6, "assumption: 0.05", 0.0, usual=0.05)]
+
+    @property
+    def force(self) -> float:
+        """The same by the name that the law has for it (N m)."""
+        return self.torque
+
+
 def constant_force(p):
     """Force that depends on nothing.
 
         F = force
 
     Args:
-        p: ConstantForce: force (N).
+        p: ConstantForce or ConstantTorque: force (N, N m).
     Returns:
-        Force (N); positive in the direction of contraction.
+        Force (N, N m); positive in the direction in which the position grows.
     Source:
         None needed. Logs in one direction cannot tell it from dry friction.
     """
@@ -33,4 +44,11 @@ CONSTANT_FORCE = Effect(
     parameters=ConstantForce,
     law=constant_force,
     signature="the same force at every position, speed, direction and pressure",
+)
+CONSTANT_TORQUE = Effect(
+    name="constant_torque",
+    port="joint_torque",
+    parameters=ConstantTorque,
+    law=constant_force,
+    signature="the same torque at every angle, speed and direction",
 )

@@ -1,4 +1,4 @@
-"""Torques at a joint that need no command: weight, a spring, viscous damping, dry friction."""
+"""Torques at a joint that need no command: weight, viscous damping, dry friction."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -43,27 +43,6 @@ def weight_torque(angle, p):
     return -p.moment * cosine(angle + p.offset - _QUARTER)
 
 
-class JointSpring(NamedTuple):
-    """Parameters of `spring_torque`."""
-
-    stiffness: Annotated[float, Quantity("N m/rad", 0, 1e6, "assumption: 0.5", 0.0, usual=0.5)]
-    rest: Annotated[float, Quantity("deg", -1e4, 1e4, "where it is relaxed: 0", usual=0.0)]
-
-
-def spring_torque(angle, p):
-    """Torque of a linear spring: T = -stiffness (q - rest).
-
-    Args:
-        angle: of the joint q (rad).
-        p: JointSpring: stiffness (N m/rad), rest (rad).
-    Returns:
-        Torque (N m), towards where the spring is relaxed.
-    Source:
-        Hooke's law.
-    """
-    return -p.stiffness * (angle - p.rest)
-
-
 class JointDamping(NamedTuple):
     """Parameters of `damping_torque`."""
 
@@ -101,13 +80,6 @@ JOINT_WEIGHT = Effect(
     parameters=JointWeight,
     law=weight_torque,
     signature="torque that depends on the angle, as its sine",
-)
-JOINT_SPRING = Effect(
-    name="joint_spring",
-    port="joint_torque",
-    parameters=JointSpring,
-    law=spring_torque,
-    signature="torque in proportion to the angle",
 )
 JOINT_DAMPING = Effect(
     name="joint_damping",

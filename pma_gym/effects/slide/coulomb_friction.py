@@ -87,10 +87,19 @@ def friction_breakpoint(memory, direction, p):
     Returns:
         Way (m), 0 where all slip or nothing rubs.
     """
+    return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * elastic_way(memory, direction)
+
+
+def elastic_way(memory, direction):
+    """Way, in preslidings, to where the deflection bends over or, from there, to where all slip.
+
+    Args:
+        memory: z where the travel begins.
+        direction: 1 where the motion is forwards, else -1.
+    """
     start, slipping = direction * memory, 1.0 - BREAKAWAY_SHARE
     rest = positive(1.0 - start) * (1.0 / slipping)
-    left = where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
-    return where(p.static + p.dynamic > 0.0, p.presliding, 0.0) * left
+    return where(start < BREAKAWAY_SHARE, BREAKAWAY_SHARE - start, 2.0 * slipping * rest**0.5)
 
 
 def release_path(memory, direction, p):

@@ -36,7 +36,7 @@ PORTS: dict[str, Port] = {
 """Ports of the rig: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "operator": "the motion is imposed, whoever pulls; take [constant_force] for a force beside it",
+    "hand_push": "the motion is imposed, whoever pulls; [constant_force] is a force beside it",
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }
@@ -57,6 +57,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.travelled = (eq["contraction"], eq["velocity"])
     # The states follow two commands, a position (m) and what gives the pressure (V or Pa).
     eq.let("command", eq["motor_voltage"])
+    eq.let("position", eq["contraction"])
     acceleration = eq.one("imposed_motion")
     regulated = bool(eq.at("regulator_line"))
     eq.let("pressure_asked", eq.one("regulator_line") if regulated else eq["regulator_voltage"])

@@ -17,12 +17,19 @@ from pma_gym.plant.rigs.rig import Rig
 
 PORTS: dict[str, Port] = {
     "joint_drive": Port("torque of the drive or motor (N m)", least=1, most=1),
+    "drive_delay": Port("command that has reached the drive (N m, V)", most=1),
+    "drive_lag": Port("command that arrives at the joint (N m, V)", most=1),
+    "drive_gain": Port("torque of the drive besides (N m), added"),
+    "joint_drive_loss": Port("torque that the drive loses on its way (N m), added"),
     "joint_torque": Port("torque on the joint (N m), added; positive as the angle grows"),
 }
 """Ports of the joint: how many effects each takes, and what becomes of their results."""
 
 SCALES: dict[str, float] = {"angle": 1.0, "spin": 4.0}
 """What an error is counted against (rad, rad/s)."""
+
+LEAST_COMMAND = 0.1
+"""What an error of a command on its way is counted against (N m, V): a small drive's range."""
 
 TURNING_RAD = 1e-8
 """Angle (rad) by which a step may miss where the joint turns."""
@@ -34,12 +41,18 @@ def write_equations(equations: PlantEquations) -> None:
     eq.travelled = (eq["angle"], eq["spin"])
     # Laws of friction know the rate of what they act on as `velocity`.
     eq.let("velocity", eq["spin"])
-    eq.let("command", eq["motor_voltage"])
-    torque = eq.one("joint_drive") + eq.total("joint_torque")
+    eq.let("position", eq["angle"])
+    # A drive that is late is so whatever its command asks for.
+    eq.let("load_asked", eq["motor_voltage"])
+    eq.let("load_command", eq.passed("drive_delay", "load_asked"))
+    eq.let("command", eq.passed("drive_lag", "load_command"))
+    eq.let("drive_force", eq.one("joint_drive"))
+    eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
+    torque = eq["drive_force"] + eq.total("joint_drive_loss") + eq.total("joint_torque")
     eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
-    eq.add_memories(tuple(PORTS))
+    eq.add_memories(tuple(PORTS), dict.fromkeys(("drive_delay", "drive_lag"), LEAST_COMMAND))
     eq.add_sensors({"angle": SCALES["angle"], "speed": SCALES["spin"]})
     eq.add_event("turning", eq["spin"], TURNING_RAD, turning=True)
     eq.add_breakpoints()

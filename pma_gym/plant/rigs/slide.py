@@ -19,10 +19,15 @@ from pma_gym.plant.rigs.station import SCALES, TURNING_M
 
 PORTS: dict[str, Port] = {
     "slide_force": Port("force on the slide (N), added; positive in the direction of contraction"),
+    "contact_force": Port(
+        "force on the slide (N), added; positive in the direction of contraction"
+    ),
     "muscle_damping": Port("damping coefficient of the slide (N s/m), added"),
     "two_way_drive": Port("load that the drive asks for (N)", least=1, most=1),
     "drive_delay": Port("load command that has reached the drive (N)", most=1),
     "drive_lag": Port("load that arrives at the slide (N)", most=1),
+    "drive_gain": Port("force of the drive besides (N), added; positive as the contraction grows"),
+    "drive_loss": Port("force that the drive loses on its way (N), added; positive likewise"),
 }
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
@@ -48,10 +53,15 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("load_asked", eq.one("two_way_drive"))
     eq.let("load_command", eq.passed("drive_delay", "load_asked"))
     eq.let("load_arriving", eq.passed("drive_lag", "load_command"))
-    eq.let("slide_force", eq.total("slide_force"))
+    eq.let("position", eq["contraction"])
+    # What pulls the slide out counts as backwards.
+    eq.let("drive_force", -eq["load_arriving"])
+    eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
+    eq.let("slide_force", eq.total("slide_force") + eq.total("contact_force"))
     eq.let("resistance", eq.total("muscle_damping"))
     eq.outputs = {"contraction": eq["contraction"]}
-    force = eq["slide_force"] - eq["load_arriving"] - eq["resistance"] * eq["velocity"]
+    pushed = eq["drive_force"] + eq.total("drive_loss")
+    force = eq["slide_force"] + pushed - eq["resistance"] * eq["velocity"]
     eq.add_state("contraction", eq["velocity"], SCALES["contraction"])
     eq.add_state("velocity", force / slide.mass, SCALES["velocity"])
     eq.add_memories(tuple(PORTS))

@@ -1,0 +1,124 @@
+"""Drag, springs, and what depends on direction or on the force of a drive, on slides and joints."""
+
+import numpy as np
+import pytest
+
+from pma_gym import Plant
+from pma_gym.data.trial import Trial
+from pma_gym.effects import CATALOGUE
+from pma_gym.plant.model import Model
+
+INERTIA, TORQUE = 0.01, 0.5
+
+
+def joint(**tables):
+    """A joint with a torque drive, and effects by their tables in files."""
+    given = {
+        "torque_drive": {"gain": 1.0},
+        **tables,
+        "inertia": {"inertia_kg_m2": INERTIA},
+        "joint_start": {"angle_deg": 0.0, "spin_deg_per_s": 0.0},
+    }
+    return Model("arm", "An arm", "joint", {n: CATALOGUE[n].parse(t) for n, t in given.items()})
+
+
+def slide(**tables):
+    """A slide on a drive of 100 N/V, and effects by their tables in files."""
+    given = {
+        "two_way_drive": {"gain_n_per_v": 100.0, "middle_v": 5.0},
+        **tables,
+        "slide": {"mass_kg": 2.0},
+        "start": {"contraction_mm": 0.0, "velocity_mm_per_s": 0.0},
+    }
+    return Model("axis", "An axis", "slide", {n: CATALOGUE[n].parse(t) for n, t in given.items()})
+
+
+def held(model, command, value, seconds=1.0):
+    """Truth (SI) under a constant command."""
+    time = np.linspace(0.0, seconds, 401)
+    trial = Trial(time, {command: np.full(time.size, value)})
+    return time, Plant(model).simulate(trial, noise=False).truth
+
+
+def test_drag_lets_a_joint_run_up_to_where_it_takes_all_torque():
+    time, truth = held(
+        joint(joint_drag={"coefficient_n_m_s2": 0.02}), "torque_command", TORQUE, 3.0
+    )
+    final = np.sqrt(TORQUE / 0.02)
+    run_up = final * np.tanh(time * np.sqrt(TORQUE * 0.02) / INERTIA)
+    np.testing.assert_allclose(truth["speed"], run_up, atol=2e-4 * final)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_damping_by_direction_brakes_one_way_and_pushes_the_other(sign):
+    damped = joint(
+        joint_damping={"coefficient_n_m_s": 0.1},
+        joint_directional_damping={"difference_n_m_s": 0.1},
+    )
+    _, truth = held(damped, "torque_command", sign * TORQUE, 4.0)
+    assert truth["speed"][-1] == pytest.approx(sign * TORQUE / (0.1 + sign * 0.05), rel=1e-4)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_gain_by_direction_is_larger_forwards(sign):
+    uneven = joint(directional_gain={"difference_percent": 20.0})
+    time, truth = held(uneven, "torque_command", sign * TORQUE)
+    gained = sign * TORQUE * (1.0 + 0.1 * sign)
+    np.testing.assert_allclose(truth["speed"], gained / INERTIA * time, rtol=1e-6)
+
+
+@pytest.mark.parametrize("load", [50.0, -50.0])
+def test_a_slides_gain_by_direction_goes_with_the_side_it_is_pushed_to(load):
+    _, truth = held(slide(directional_gain={"difference_percent": 20.0}), "load_command", load, 0.2)
+    # A load pulls out: a negative one pushes forwards.
+    forwards = -load * (1.0 + 0.1 * np.sign(-load))
+    assert truth["contraction"][-1] == pytest.approx(0.5 * forwards / 2.0 * 0.2**2, rel=1e-6)
+
+
+@pytest.mark.parametrize("torque", [0.2, 1.0])
+def test_friction_by_load_takes_a_share_of_the_drives_torque(torque):
+    rubbing = joint(joint_load_friction={"share_percent": 30.0, "presliding_deg": 0.01})
+    time, truth = held(rubbing, "torque_command", torque)
+    slope = np.polyfit(time[100:], truth["speed"][100:], 1)[0]
+    assert slope == pytest.approx(0.7 * torque / INERTIA, rel=1e-3)
+
+
+def test_a_hardening_spring_swings_faster_where_it_swings_further():
+    model = joint(joint_hardening_spring={"cubic_n_m_per_rad3": 2.0})
+    periods = []
+    for start in (20.0, 40.0):
+        _, truth = held(
+            model.replace({"joint_start.angle_deg": start}), "torque_command", 0.0, 12.0
+        )
+        falls = np.flatnonzero((truth["angle"][:-1] > 0.0) & (truth["angle"][1:] <= 0.0))
+        periods.append(float(np.mean(np.diff(falls))))
+    # Without a linear part the period is inverse to the amplitude.
+    assert periods[0] / periods[1] == pytest.approx(2.0, rel=0.02)
+
+
+def test_a_spring_holds_a_slide_where_its_force_is_the_drives():
+    sprung = slide(
+        spring={"stiffness_n_per_mm": 1.0, "rest_mm": 5.0},
+        symmetric_damping={"intercept_n_s_per_mm": 0.1, "slope_n_s_per_mm_per_kpa": 0.0},
+    )
+    _, truth = held(sprung, "load_command", 20.0, 2.0)
+    assert truth["contraction"][-1] == pytest.approx(5e-3 - 20e-3, abs=1e-6)
+
+
+def test_a_constant_torque_is_as_much_of_the_drives():
+    model = joint(constant_torque={"torque_n_m": 0.1})
+    _, pushed = held(model, "torque_command", 0.1)
+    _, twice = held(joint(), "torque_command", 0.2)
+    np.testing.assert_allclose(pushed["angle"], twice["angle"], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("effect", "late"), [("drive_delay", "delay"), ("drive_lag", "time_constant")]
+)
+def test_a_late_drive_moves_a_joint_as_much_later(effect, late):
+    time, truth = held(joint(), "torque_command", TORQUE, 0.5)
+    ramp = Trial(time, {"torque_command": TORQUE * time})
+    model = joint(**{effect: {"share": 1.0, f"{late}_ms": 10.0}})
+    speeds = [Plant(each).simulate(ramp, noise=False).truth["speed"] for each in (joint(), model)]
+    shifted = np.interp(time[100:] - 0.01, time, speeds[0])
+    np.testing.assert_allclose(speeds[1][100:], shifted, atol=2e-3 * truth["speed"].max())
