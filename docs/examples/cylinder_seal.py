@@ -1,7 +1,7 @@
 """A pneumatic cylinder pushed and pulled at constant pressure: what do its seals take?
 
-The logs are measured, from https://github.com/EvaZillen/3D-printed-pneumatic-actuator (CC0): a rod of
-a cylinder of 25 mm bore that another drive moves at 10 to 15 mm/s, at 1, 3 and 7 bar.
+The logs are measured, from https://github.com/EvaZillen/3D-printed-pneumatic-actuator (CC0): a rod
+of a cylinder of 25 mm bore that another drive moves at 10 to 15 mm/s, at 1, 3 and 7 bar.
 """
 
 # %%
