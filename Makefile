@@ -20,6 +20,9 @@ REQUIREMENTS = pyproject.toml constraints.txt
 INSTALL = $(BIN)/python -m pip install --disable-pip-version-check $(PIP_FLAGS) -c constraints.txt
 EXPLAIN = { echo "make: the installation failed; 'make $(MAKECMDGOALS) PIP_FLAGS=' shows every step of it" >&2; exit 1; }
 
+# A suite starts hundreds of processes; without kept bytecode each compiles every source anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Its notice about MkDocs 2 is no fault of this project's pages.
 export NO_MKDOCS_2_WARNING = 1
 

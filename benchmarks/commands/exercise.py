@@ -47,7 +47,7 @@ def exercise(
             help="Prescription: CSV with angle_deg and moment_nm; the pressure follows the angle."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="Folder of the report.")] = RESULTS / "exercise",
+    out: Annotated[Path, typer.Option(help="Folder of the report.")] = RESULTS / "exercise-device",
 ) -> None:
     """Show which moments muscles of which size give, and the smallest for a prescription."""
     from benchmarks.exercise.choice import Choice, ChoiceError

@@ -17,7 +17,7 @@ from benchmarks.commands.options import (
     refuse,
 )
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.terminal import print_json
+from pma_gym.cli.terminal import print_json, print_table
 
 
 def register(app: typer.Typer) -> None:
@@ -93,7 +93,8 @@ def report(
         if isinstance(frozen, ReproductionSuite):
             page = report_again(frozen, folder, out or folder, local(2))
         else:
-            page = run_report(frozen, folder, out or folder)
+            page, ranks = run_report(frozen, folder, out or folder)
+            print_table(ranks)
         print(f"Report: {page}")
     except SuiteError as error:
         refuse(error)

@@ -4,11 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from benchmarks.commands.options import LOCAL, RESULTS, chosen_executor, refuse
 from pma_gym.cli.options import JsonOption
-from pma_gym.cli.terminal import print_json
+from pma_gym.cli.terminal import print_json, print_table
 
 
 def register(app: typer.Typer) -> None:
@@ -32,7 +31,6 @@ def targets(
     from benchmarks.suites.frozen import frozen_suite
     from benchmarks.suites.reproduction import ReproductionSuite
     from benchmarks.suites.suite import SuiteError
-    from pma_gym.terminal import table_console
 
     try:
         frozen = frozen_suite(suite)
@@ -50,8 +48,5 @@ def targets(
     if as_json:
         print_json(documents)
     else:
-        shown = Table(*table.header, title=table.title)
-        for row in table.rows:
-            shown.add_row(*row)
-        table_console().print(shown)
+        print_table(table)
     raise typer.Exit(1 if any(each["verdict"] == "missed" for each in documents) else 0)

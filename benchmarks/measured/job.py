@@ -4,7 +4,8 @@ import json
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -63,6 +64,9 @@ FOLDS = ((150.0, 275.0, 400.0, 550.0), (200.0, 300.0, 450.0, 575.0), (250.0, 350
 """All pressures, each left out once from a fit of all effects."""
 
 
+Tell = Callable[[str, int, int], None]
+
+
 def run_measured(
     out: Path,
     jobs: int = 1,
@@ -83,49 +87,52 @@ def run_measured(
         recompute: anew what other code made.
     """
     console, begun = console or SafeConsole(), time.perf_counter()
-    stages, given = Stages(out / "stages", recompute), load_model(GIVEN)
+    stages = Stages(out / "stages", recompute)
     if others := stages.others():
         console.print(others, highlight=False, markup=False, soft_wrap=True)
-    few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
     with _bar(console) as tell:
-        diagnoses, amended = rounds(
-            (few, more),
-            given,
-            stages,
-            seed,
-            jobs,
-            lambda number: _prefixed(tell, f"round {number}: "),
-            most,
-        )
-        effects = [name for each in diagnoses for name in each.effects]
-        judged = judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA)
-        stepped = steps(
-            given,
-            amended,
-            effects,
-            (diagnosed(DIAGNOSED_KPA), *judged),
-            stages,
-            jobs,
-            lambda done, total: tell("effect by effect", done, total),
-        )
-        left_out = folds(
-            given,
-            amended,
-            effects,
-            _without,
-            FOLDS,
-            jobs,
-            lambda done, total: tell("pressures left out", done, total),
-        )
-        final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
-        blind, proposals = undecidable(
-            final, few, jobs, seed, lambda done, total: tell("what cannot be told", done, total)
-        )
-        reverse = _reverse(stages, lambda done, total: tell("the reverse", done, total))
+        result = _computed(stages, jobs, seed, most, tell)
+    result = replace(result, seconds=time.perf_counter() - begun)
+    write_text(out / "model.toml", result.steps[-1].model)
+    write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
+    write_text(out / "measured.html", measured_page(result))
+    print_measured(result, console)
+    console.print(f"written: {out / 'measured.html'}, measured.json, model.toml")
+    return result
+
+
+def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Measured:
+    """Diagnoses and what judges them, one stage after the other; the time it took is left 0."""
+    given = load_model(GIVEN)
+    few, more = (diagnosed(DIAGNOSED_KPA, *which) for which in zip(LOADS_N, REPEATS, strict=True))
+    diagnoses, amended = rounds(
+        (few, more),
+        given,
+        stages,
+        seed,
+        jobs,
+        lambda number: _prefixed(tell, f"round {number}: "),
+        most,
+    )
+    effects = [name for each in diagnoses for name in each.effects]
+    judged = judged_at(DIAGNOSED_KPA), judged_at(UNSEEN_KPA)
+    stepped = steps(
+        given,
+        amended,
+        effects,
+        (diagnosed(DIAGNOSED_KPA), *judged),
+        stages,
+        jobs,
+        partial(tell, "effect by effect"),
+    )
+    left_out = folds(
+        given, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
+    )
+    final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
+    blind, proposals = undecidable(final, few, jobs, seed, partial(tell, "what cannot be told"))
+    reverse = _reverse(stages, partial(tell, "the reverse"))
     models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
-    held = held_against(models, given)
-    seconds = time.perf_counter() - begun
-    result = Measured(
+    return Measured(
         diagnoses,
         stepped,
         left_out,
@@ -134,16 +141,10 @@ def run_measured(
         blind,
         proposals,
         reverse,
-        held,
-        seconds,
+        held_against(models, given),
+        0.0,
         _settings(seed, stages),
     )
-    write_text(out / "model.toml", stepped[-1].model)
-    write_text(out / "measured.json", json.dumps(asdict(result), indent=1) + "\n")
-    write_text(out / "measured.html", measured_page(result))
-    print_measured(result, console)
-    console.print(f"written: {out / 'measured.html'}, measured.json, model.toml")
-    return result
 
 
 def _reverse(stages: Stages, progress: Callable[[int, int], None]) -> list[list[Explanation]]:
@@ -220,9 +221,6 @@ def _settings(seed: int, stages: Stages) -> dict[str, Any]:
         "loads_n": LOADS_N,
         "repeats": REPEATS,
     }
-
-
-Tell = Callable[[str, int, int], None]
 
 
 def _prefixed(tell: Tell, prefix: str) -> Tell:

@@ -49,7 +49,7 @@ def score_pictures(leaderboard: Leaderboard) -> dict[str, bytes]:
     """Every plot of the scores that there are figures for, as PNG by name."""
     styles = styles_of(leaderboard.labels)
     pictures: dict[str, bytes] = {}
-    single = _shown(leaderboard, pooled=False)
+    single = shown_standings(leaderboard, pooled=False)
     if single:
         pictures["distributions"] = distribution_plot(single, styles)
         pictures["profiles"] = profile_plot(single, styles)
@@ -109,7 +109,7 @@ def _notes(leaderboard: Leaderboard) -> list[str]:
     return notes
 
 
-def _shown(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
+def shown_standings(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
     """Standings with somebody in them, with or without that of all tasks together."""
     standings = [each for each in leaderboard.standings.values() if each.errors.values.size]
     return (
@@ -119,13 +119,13 @@ def _shown(leaderboard: Leaderboard, pooled: bool) -> list[Standings]:
 
 def _headline(leaderboard: Leaderboard) -> Standings | None:
     """The measure that all controllers are compared in: all tasks, or the only one."""
-    standings = _shown(leaderboard, pooled=True)
+    standings = shown_standings(leaderboard, pooled=True)
     return standings[-1] if standings else None
 
 
 def _ranking_blocks(leaderboard: Leaderboard) -> list[Block]:
     labels = leaderboard.labels
-    shown = _shown(leaderboard, pooled=True)
+    shown = shown_standings(leaderboard, pooled=True)
     # What pools all tasks stands first.
     shown.sort(key=lambda each: each.errors.measure.unit != PERCENT)
     blocks: list[Block] = [Heading("Ranking"), Paragraph(_RANKS)]
@@ -160,7 +160,7 @@ def _obstacle_blocks(leaderboard: Leaderboard) -> list[Block]:
     return [
         Heading("References that cannot be followed", 3),
         Paragraph(text),
-        obstacle_table(leaderboard.obstacles, _shown(leaderboard, pooled=False)),
+        obstacle_table(leaderboard.obstacles, shown_standings(leaderboard, pooled=False)),
     ]
 
 
@@ -174,7 +174,7 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
             "higher and further left, the better. Bands: 95 %, of each point by itself.",
         ),
         Picture("pressures", "Median error by pressure, on a logarithmic scale."),
-        *case_figures(_shown(leaderboard, pooled=False), styles_of(leaderboard.labels)),
+        *case_figures(shown_standings(leaderboard, pooled=False), styles_of(leaderboard.labels)),
     ]
 
 
@@ -187,7 +187,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
         "often the 99th percentile of the computing time fits into a control period."
     )
     blocks: list[Block] = [Heading("What it costs"), Paragraph(text)]
-    for each in _shown(leaderboard, pooled=False):
+    for each in shown_standings(leaderboard, pooled=False):
         measure = each.errors.measure
         if not (measure.returning or measure.alone):
             names = [row.name for row in each.rows]
@@ -203,7 +203,7 @@ def _spending_blocks(leaderboard: Leaderboard) -> list[Block]:
 def _exercise_blocks(leaderboard: Leaderboard) -> list[Block]:
     """What exercises came to beside their errors."""
     blocks: list[Block] = []
-    for each in _shown(leaderboard, pooled=False):
+    for each in shown_standings(leaderboard, pooled=False):
         measure = each.errors.measure
         exercises = [task for task in measure.tasks if task_of(task).exercise]
         if exercises and not measure.alone:

@@ -11,12 +11,18 @@ from typing import Any
 from benchmarks.executors.local import Background
 from benchmarks.files import write_bytes, write_text
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
-from benchmarks.report.page import loop_pictures, page_blocks, score_pictures
+from benchmarks.report.page import (
+    loop_pictures,
+    page_blocks,
+    score_pictures,
+    shown_standings,
+)
 from benchmarks.report.standings import Pair
 from benchmarks.report.statistics import Interval
+from benchmarks.report.tables import ranks_table
 from benchmarks.suites.suite import FrozenSuite
 from pma_gym.cli.progress import StepProgress
-from pma_gym.pages.document import to_html, to_markdown
+from pma_gym.pages.document import TextTable, to_html, to_markdown
 
 OnStep = Callable[[str, int, int], None]
 
@@ -25,7 +31,7 @@ NUMBERS, PAIRS = "leaderboard.csv", "pairs.csv"
 PAGE, TEXT = "report.html", "report.md"
 
 
-def run_report(suite: FrozenSuite, results: Path, out: Path) -> Path:
+def run_report(suite: FrozenSuite, results: Path, out: Path) -> tuple[Path, TextTable]:
     """Read a run's results and write the page; says on stderr what it is at.
 
     Args:
@@ -33,12 +39,14 @@ def run_report(suite: FrozenSuite, results: Path, out: Path) -> Path:
         results: folder of the results.
         out: folder of the page; may be the same.
     Returns:
-        The page.
+        The page, and the ranks as a table for a terminal.
     Raises:
         SuiteError: there are no results of this suite and version.
     """
     with StepProgress() as progress:
-        return write_leaderboard(read_leaderboard(suite, results), out, progress)
+        leaderboard = read_leaderboard(suite, results)
+        page = write_leaderboard(leaderboard, out, progress)
+    return page, ranks_table(shown_standings(leaderboard, pooled=True), leaderboard.labels)
 
 
 def write_leaderboard(

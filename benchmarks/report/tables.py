@@ -35,6 +35,29 @@ def standings_table(standings: Standings, labels: Labels) -> TextTable:
     return TextTable(title, header, rows, words=2)
 
 
+def ranks_table(standings: Sequence[Standings], labels: Labels) -> TextTable:
+    """Interquartile mean and rank of every controller, a column a measure, for a terminal.
+
+    Args:
+        standings: the measures; controllers stand in the order of the first.
+        labels: what people call the controllers.
+    """
+    header = ["Controller"]
+    header += [
+        f"{capital(each.errors.measure.name)} ({each.errors.measure.unit})" for each in standings
+    ]
+    columns = [{row.name: row for row in each.rows} for each in standings]
+    names = dict.fromkeys(name for column in columns for name in column)
+    rows = [
+        [labels.get(name, name), *(_rank(column.get(name)) for column in columns)] for name in names
+    ]
+    return TextTable("Interquartile mean, rank in brackets", header, rows)
+
+
+def _rank(row: Standing | None) -> str:
+    return NONE if row is None else f"{figure(row.mean.estimate)} [{row.rank or 'bound'}]"
+
+
 def _standing_cells(row: Standing, labels: Labels, unit: str, bounded: bool) -> list[str]:
     cells = [
         str(row.rank) if row.rank else "bound",

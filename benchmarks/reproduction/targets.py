@@ -44,8 +44,13 @@ class Check:
 
     def document(self) -> dict[str, object]:
         """The target for programs."""
-        got = {"target": self.what, "limit": self.limit, "got": self.got}
-        return got | {"unit": self.unit, "verdict": self.verdict}
+        return {
+            "target": self.what,
+            "limit": self.limit,
+            "got": self.got,
+            "unit": self.unit,
+            "verdict": self.verdict,
+        }
 
 
 def check_targets(results: Results) -> list[Check]:

@@ -122,7 +122,7 @@ def _greeting(todo: PendingCases, entries: Sequence[Entry], out: Path, jobs: int
         words += f"\n{done} cases are done in {out / JOURNAL} and used again"
     if todo.outdated:
         words += (
-            f"\n{todo.outdated} rows there were made with other code, another version or another "
+            f"\n{todo.outdated} rows there were made with other options, other code or another "
             "file of these controllers; they stay there, are not used, and their cases run anew"
         )
     return words

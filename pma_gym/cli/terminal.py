@@ -9,14 +9,25 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from rich.table import Table
+
 from pma_gym.data.files.trial_files import TrialWarning, read_trial
 from pma_gym.data.trial import Trial
+from pma_gym.pages.document import TextTable
 from pma_gym.terminal import SafeConsole, table_console
 
 
 def console() -> SafeConsole:
     """Where tables go; as wide as they need where nobody watches."""
     return table_console()
+
+
+def print_table(table: TextTable) -> None:
+    """Print a page's table on the terminal."""
+    shown = Table(*table.header, title=table.title)
+    for row in table.rows:
+        shown.add_row(*row)
+    console().print(shown)
 
 
 def print_json(document: object) -> None:

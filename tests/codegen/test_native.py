@@ -1,5 +1,6 @@
 """Compiled libraries: calls, and what is kept on disk and found again."""
 
+import ast
 import ctypes
 import gc
 import os
@@ -7,9 +8,11 @@ import subprocess
 import sys
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
+import pma_gym
 from pma_gym.codegen.cache import compile_cache
 from pma_gym.codegen.machine import native
 from pma_gym.codegen.machine.control import DOUBLE, INTEGER, function, integer, loop, variable
@@ -134,6 +137,32 @@ def test_the_key_covers_every_text_that_code_is_written_by(tmp_path, monkeypatch
     (tmp_path / "effects" / "new.py").write_text("")
     digests.append(compile_cache.source_digest.__wrapped__())
     assert len(set(digests)) == 5
+    for name in compile_cache.WRITES_NO_CODE:
+        (tmp_path / f"{name}.py").write_text("x = 1\n")
+    assert compile_cache.source_digest.__wrapped__() == digests[-1]
+
+
+def imported_names(path):
+    """Modules that a file imports, anywhere in it."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+
+
+def test_what_the_key_leaves_out_writes_no_code_and_lies_above_all_that_does():
+    package = Path(pma_gym.__file__).parent
+    above = tuple(f"pma_gym.{name}." for name in compile_cache.WRITES_NO_CODE)
+    rooms = {path.relative_to(package).with_suffix("").parts[0] for path in package.rglob("*.py")}
+    assert set(compile_cache.WRITES_NO_CODE) < rooms
+    for path in package.rglob("*.py"):
+        room = path.relative_to(package).with_suffix("").parts[0]
+        writes = room not in compile_cache.WRITES_NO_CODE
+        if room == "__init__":
+            continue
+        refused = above if writes else ("pma_gym.codegen.machine", "llvmlite")
+        assert not [name for name in imported_names(path) if name.startswith(refused)], path
 
 
 def test_mistakes_are_named(folder):

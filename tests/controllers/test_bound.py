@@ -7,6 +7,7 @@ for the rounding of the times at which a voltage changes.
 from functools import lru_cache
 
 import numpy as np
+import pytest
 
 from benchmarks.bounds.achievable import achievable_bound
 from controllers import CONTROLLERS
@@ -21,6 +22,7 @@ RIVALS = [
 bound_of = lru_cache(achievable_bound)
 
 
+@pytest.mark.campaign
 def test_no_controller_comes_closer_in_rotation(drive):
     bound = bound_of("station", "rotation", 400)
     for make in RIVALS:
@@ -42,6 +44,7 @@ def test_phase_three_is_limited_by_what_the_drive_cannot_push():
     assert achievable_bound(braked, "rotation", 400)["III"] > 3.0 * free > 0.0
 
 
+@pytest.mark.campaign
 def test_cascade_that_is_pushed_and_pulled_alike_has_no_floor():
     bound = achievable_bound("cascade", "rotation", 300)
     assert np.all(np.array(list(bound.values())) < 0.005)

@@ -1,5 +1,6 @@
 """The pages for developers name files and folders that exist, and layers in their order."""
 
+import ast
 import re
 import tomllib
 
@@ -30,3 +31,27 @@ def test_the_diagram_has_the_layers_of_the_contract():
     contract = [re.sub(r"[()]", "", layer) for layer in layers]
     at_bottom = contract.index("codegen") + 1
     assert boxes[: at_bottom + 2] == ["benchmarks", "controllers", *contract[:at_bottom]]
+
+
+LONG = 60
+ROW = re.compile(r"^\| `([\w./]+\.py)` `(\w+)` \|", re.MULTILINE)
+
+
+def long_functions(path):
+    """Names of a file's functions of more than 60 lines."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            if node.end_lineno - node.lineno + 1 > LONG:
+                yield node.name
+
+
+def test_long_functions_stand_on_the_page_with_their_reason():
+    page = (ROOT / "docs" / "development" / "architecture.md").read_text(encoding="utf-8")
+    listed = sorted(ROW.findall(page))
+    there = sorted(
+        (path.relative_to(ROOT).as_posix(), name)
+        for package in ("pma_gym", "controllers", "benchmarks")
+        for path in (ROOT / package).rglob("*.py")
+        for name in long_functions(path)
+    )
+    assert listed == there

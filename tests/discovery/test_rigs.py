@@ -68,7 +68,14 @@ def test_what_is_hidden_in_an_example_is_named_and_sized(name):
     assert all(gap.held_out for gap in diagnosis.gap.values())
 
 
-@pytest.mark.parametrize("name", SETS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        # Half a minute at a tight tolerance takes as long as all others.
+        pytest.param(name, marks=pytest.mark.campaign if name == "one_long_trial" else ())
+        for name in SETS
+    ],
+)
 def test_the_examples_are_what_their_generator_makes(name):
     made, folder = SETS[name](), FROZEN / name
     assert sorted(made) == sorted(path.name for path in folder.glob("*.csv"))
@@ -105,6 +112,7 @@ def test_no_sensor_of_the_frozen_trials_is_taken_for_one_that_ends():
         assert ends(trials) == [], folder.name
 
 
+@pytest.mark.campaign
 def test_of_one_long_trial_stretches_are_left_out():
     diagnosis = diagnosed("one_long_trial")
     assert named(diagnosis) == [HIDDEN["one_long_trial"][0]], diagnosis.sentence
@@ -195,6 +203,7 @@ def test_dry_friction_is_found_at_one_and_two_kilohertz():
     assert diagnosis.effects[0].parameters["dynamic_n"].value == pytest.approx(12.0, rel=0.05)
 
 
+@pytest.mark.campaign
 def test_nothing_is_claimed_of_a_muscle_that_lifts_weights():
     diagnosis = diagnose(hanging_load(), FROZEN / "hanging_load" / "model.toml", propose=False)
     assert diagnosis.verdict == "parameters" and not diagnosis.effects, diagnosis.sentence

@@ -103,7 +103,7 @@ def test_one_trial_works_and_says_so():
 )
 def test_some_sensors_are_enough(kept):
     trials = [only(trial, *kept) for trial in laboratory("hysteresis")[0]]
-    diagnosis = diagnose(trials, STATION)
+    diagnosis = diagnose(trials, STATION, propose=False)
     assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
     assert {signal.rpartition("_")[0] for signal in diagnosis.gap} == set(kept)
     assert set(diagnosis.floors) == set(diagnosis.gap)
@@ -112,7 +112,7 @@ def test_some_sensors_are_enough(kept):
 def test_trials_may_have_different_sensors():
     trials = laboratory("hysteresis")[0]
     mixed = [only(trial, *EVERY[k % 2 : 3 + k % 2]) for k, trial in enumerate(trials)]
-    diagnosis = diagnose(mixed, STATION)
+    diagnosis = diagnose(mixed, STATION, propose=False)
     assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
 
 
@@ -126,7 +126,7 @@ def test_gaps_do_no_harm():
         }
         rows["load"][40:90] = np.nan
         trials.append(Trial(trial.time, trial.commands, rows))
-    diagnosis = diagnose(trials, STATION)
+    diagnosis = diagnose(trials, STATION, propose=False)
     assert [effect.name for effect in diagnosis.effects] == ["hysteresis"]
     force = diagnosis.effects[0].parameters["force_n"]
     assert force.low is not None and force.high is not None

@@ -22,6 +22,9 @@ from pma_gym.home import home_folder, temporary_folder
 
 _MAGIC = b"pma_gym kernels 2\n"
 
+WRITES_NO_CODE = ("cli", "demo", "discovery", "envs", "sb3", "studies")
+"""What of the package lies above all that writes code: an edit there leaves kernels as they are."""
+
 _FIX = "set PMA_GYM_CACHE to a writable folder that only you may write, to keep them"
 
 
@@ -97,10 +100,12 @@ def digest(parts: Iterable[str]) -> str:
 def source_digest() -> str:
     """A hash of the texts of all modules that compiled code is written by."""
     package, total = Path(__file__).parents[2], hashlib.sha256()
-    # All of them: what a kernel is written by reaches from the laws to tasks and calibrations.
+    # All below the environments: what a kernel is written by reaches from laws to calibrations.
     for path in sorted(package.glob("**/*.py")):
-        text = path.read_bytes()
-        total.update(f"{path.relative_to(package)} {len(text)}\n".encode() + text)
+        name = path.relative_to(package)
+        if name.with_suffix("").parts[0] not in WRITES_NO_CODE:
+            text = path.read_bytes()
+            total.update(f"{name} {len(text)}\n".encode() + text)
     return total.hexdigest()
 
 

@@ -36,7 +36,7 @@ PORTS: dict[str, Port] = {
 """Ports of the rig: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "hand_push": "the motion is imposed, whoever pulls; take [constant_force] for a force",
+    "hand_push": "the motion is imposed, whoever pulls; [constant_force] is a force beside it",
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }

@@ -165,7 +165,7 @@ def test_only_what_was_made_with_the_same_is_used_again(suite, tmp_path, monkeyp
         monkeypatch.setattr(module, "code_digest", lambda: "another")
     assert len(pending_cases(suite, entries, out).missing) == 12
     _, words = run(suite, "pid", out)
-    assert "6 rows there were made with other code" in words
+    assert "6 rows there were made with other options" in words
     # What was made with other code is not compared with what is made now.
     assert {row["controller"] for row in finished_rows(out)} == {"pid"}
 
@@ -240,6 +240,7 @@ def test_a_line_that_was_changed_is_no_row(tmp_path, capsys):
 
 
 @pytest.mark.filterwarnings("ignore")
+@pytest.mark.campaign
 def test_a_ray_cluster_writes_the_rows_of_one_process(suite, tmp_path):
     ray = pytest.importorskip("ray")
     mine = own(tmp_path, "Mine")

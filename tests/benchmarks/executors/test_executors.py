@@ -185,8 +185,14 @@ def is_alive(pid):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("name", list(ExecutorName))
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        *[(name, signal.SIGKILL) for name in ExecutorName],
+        *[(name, signal.SIGTERM) for name in ExecutorName if name is not ExecutorName.RAY],
+        pytest.param(ExecutorName.RAY, signal.SIGTERM, marks=pytest.mark.campaign),
+    ],
+)
 def test_no_worker_outlives_its_parent_by_two_seconds(tmp_path, how, name):
     if name is ExecutorName.RAY:
         pytest.importorskip("ray")

@@ -267,7 +267,11 @@ def folder(tmp_path):
 def test_page_and_numbers_are_written(folder, tmp_path):
     suite, results = folder
     out = tmp_path / "page"
-    assert run_report(suite, results, out) == out / PAGE
+    page, ranks = run_report(suite, results, out)
+    assert page == out / PAGE
+    assert "Displacement (mm)" in ranks.header
+    column = ranks.header.index("Displacement (mm)")
+    assert {row[column].partition(" [")[2] for row in ranks.rows} >= {"bound]"}
     written = {p.name: p.read_bytes() for p in out.rglob("*") if p.is_file()}
     names = {"distributions.png", "profiles.png", "pressures.png", "improvement.png"}
     assert names <= set(written)

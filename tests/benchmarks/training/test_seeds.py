@@ -27,6 +27,7 @@ def weights(path):
     }
 
 
+@pytest.mark.campaign
 def test_a_seed_has_the_same_policy_in_any_process(preset, tmp_path):
     order, console = Order(preset("ppo"), seed=3), Console(file=io.StringIO())
     (here,) = job.run_seeds([(order, tmp_path / "here")], ThisProcess(), console)

@@ -38,7 +38,10 @@ def test_a_journal_changes_no_byte(written):
 
 @pytest.mark.parametrize(
     ("step", "done"),
-    [("fitting effect 1", 3), ("trials left out", 1)],
+    [
+        pytest.param("fitting effect 1", 3, marks=pytest.mark.campaign),
+        ("trials left out", 1),
+    ],
 )
 def test_an_interrupted_diagnosis_goes_on(trials, written, tmp_path, step, done):
     with pytest.raises(KeyboardInterrupt):

@@ -19,6 +19,7 @@ def _trials(model: Model) -> list[Trial]:
     return trials
 
 
+@pytest.mark.campaign
 def test_a_limit_that_is_never_reached_is_fitted_from_its_own_size() -> None:
     """The steps of its derivatives come from its value, not from bounds a million times as wide."""
     hidden = {"regulator_rate_limit": {"limit_kpa_per_s": 600.0}}

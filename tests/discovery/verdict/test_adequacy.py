@@ -258,7 +258,7 @@ def test_an_exact_sensor_agrees_by_a_tolerance_alone():
     assert diagnosis.verdict == "agrees"
 
 
-@pytest.mark.parametrize("case", ["hysteresis", "bump"])
+@pytest.mark.parametrize("case", [pytest.param("hysteresis", marks=pytest.mark.campaign), "bump"])
 def test_a_refit_alone_does_not_call_a_wrong_structure_right(case):
     trials = measured(
         STATION.with_effects({"hysteresis": {"force_n": 12.0, "distance_mm": 1.0}})

@@ -56,12 +56,17 @@ def test_a_command_that_is_written_once_is_held_and_no_gap(tmp_path):
     assert checked(write(tmp_path / "lab", written)).checked == ()
 
 
-def test_trials_that_begin_in_motion_get_a_start_of_their_own(tmp_path):
+def in_motion(folder):
+    """A data set whose trials begin in motion, checked."""
     written = []
     for columns, begin in zip(logs(seconds=8.0), (1.3, 1.5, 1.2), strict=True):
         kept = {name: values[columns["time_s"] >= begin] for name, values in columns.items()}
         written.append(kept | {"time_s": kept["time_s"] - kept["time_s"][0]})
-    data = checked(write(tmp_path / "lab", written))
+    return checked(write(folder, written))
+
+
+def test_trials_that_begin_in_motion_get_a_start_of_their_own(tmp_path):
+    data = in_motion(tmp_path / "lab")
     assert len(data.checked) == 3
     for words, each in zip(data.checked, data.trials, strict=True):
         assert f"{each.name} begins at 0.0" in words
@@ -69,7 +74,11 @@ def test_trials_that_begin_in_motion_get_a_start_of_their_own(tmp_path):
         # It begins settled: no command moves in its first rows, nothing counts there.
         assert np.ptp(each.trial.commands["motor_voltage"][:20]) == 0.0
         assert np.isnan(each.trial.measurements["contraction"][:100]).all()
-    sizes = size_of(data, "hysteresis")
+
+
+@pytest.mark.campaign
+def test_what_is_hidden_in_trials_that_begin_in_motion_is_sized(tmp_path):
+    sizes = size_of(in_motion(tmp_path / "lab"), "hysteresis")
     assert sizes["force_n"].value == pytest.approx(20.0, abs=0.5)
     assert sizes["distance_mm"].value == pytest.approx(3.0, abs=0.15)
 
