@@ -42,8 +42,9 @@ PERIODS = tuple(range(1, 21))
 """How many eighths of its usual number of periods a ripple is looked for at: a trial of a quarter
 turn tells no finer."""
 
-RELEASED = (6.0, 36.0, 216.0)
-"""How many times its usual value a shape is looked for at as well that the rig does not hold."""
+PRESLIDINGS = (0.1, 0.4, 1.0, 2.5, 10.0, 40.0)
+"""How many times its usual value a presliding distance is looked for at: a seal's is a hundred
+times that of a rolling guide."""
 
 SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
@@ -94,7 +95,7 @@ def _lacking(
     shown = {
         stem: quantity
         for stem, quantity in quantities.items()
-        if (not model.rig.holds(effect, stem) or quantity.neutral is not None)
+        if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
         # Free in every trial already, as `estimation.residuals` has it.
         and stem not in ("repeat", effect.memory_start)
@@ -130,7 +131,7 @@ def _candidate(
     absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
     probes, signs = [], []
     for size in _sizes(amplitudes, switches, shown):
-        for shape in _shapes(shapes, bool(switches), shown, effect.held):
+        for shape in _shapes(shapes, bool(switches), shown):
             row = dict(zip(stems, absent, strict=True))
             row.update(size)
             row.update(shape)
@@ -158,21 +159,17 @@ def _candidate(
 
 
 def _shapes(
-    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity], held: Sequence[str]
+    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity]
 ) -> Iterator[dict[str, float]]:
-    """Shapes at which an effect is looked for: the first in some steps, the others as usual.
-
-    What other rigs hold may be of any size on one that shows it.
-    """
+    """Shapes at which an effect is looked for: the first in some steps, the others as usual."""
     usual = {stem: _usual(shown[stem]) for stem in shapes}
     if "phase" in shapes:
         for periods, phase in product(PERIODS, (0.0, 90.0)):
             yield usual | {"periods": usual["periods"] * periods / 8.0, "phase": phase}
         return
-    for factor in (DELAYS if timed else SHAPES) if shapes else (1.0,):
+    steps = PRESLIDINGS if "presliding" in shapes else DELAYS if timed else SHAPES
+    for factor in steps if shapes else (1.0,):
         yield usual | {stem: factor * usual[stem] for stem in shapes[:1]}
-    for stem, factor in product([stem for stem in shapes if stem in held], RELEASED):
-        yield usual | {stem: factor * usual[stem]}
 
 
 def _sizes(
@@ -211,7 +208,7 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
                 quantity.neutral is None
                 or quantity.usual is None
                 or stem in effect.rows
-                or model.rig.holds(effect, stem)
+                or stem in effect.held
                 or here != quantity.to_si(quantity.neutral)
             ):
                 continue

@@ -24,7 +24,7 @@ class CoulombFriction(NamedTuple):
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 20000, "assumption: 10 um at full static force", usual=10)
+        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force", usual=10)
     ]
 
 
@@ -138,7 +138,6 @@ COULOMB_FRICTION = Effect(
     law=friction_force,
     rate_independent_law=friction_path,
     path_breakpoint=friction_breakpoint,
-    release_path=release_path,
     breakpoint=stribeck_breakpoint,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "

@@ -64,7 +64,7 @@ def test_neither_several_effects_nor_fitted_readings_name_by_what_they_close():
 
 
 def test_terms_of_one_law_count_as_one():
-    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("coulomb_friction", "pressure_friction"))
+    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("contact_friction", "pressure_friction"))
     assert friction is not None and friction.named
 
 
