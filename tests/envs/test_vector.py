@@ -37,9 +37,9 @@ def test_threads_begin_many_episodes_as_one_does(monkeypatch, threads, options):
         for count in (1, threads)
     )
     # What it does alone is what few episodes are worth.
-    alone, begun = many.engine.kernel.begin, []
+    original, begun = many.engine.kernel.begin, []
     monkeypatch.setattr(
-        many.engine.kernel, "begin", lambda *given: (begun.append(given), alone(*given))
+        many.engine.kernel, "begin", lambda *given: (begun.append(given), original(*given))
     )
     mask = np.random.default_rng(3).uniform(size=70) < 0.7
     few = np.arange(70) % 9 == 4
