@@ -98,6 +98,9 @@ _GROUP = " | "
 DPI = 120
 """Resolution of the PNGs (1/inch)."""
 
+_MANY = 12
+"""Columns beyond which print breaks words of the header, to fit the page."""
+
 _PANELS_FROM = 800
 """Width (CSS pixels) beyond which a picture has panels side by side: a phone scrolls over it."""
 
@@ -236,9 +239,10 @@ def _html_table(table: TextTable) -> str:
         body.append(f'<tr class="ruled">{cells}</tr>' if ruled else f"<tr>{cells}</tr>")
         ruled = False
     head = _html_header(table)
-    prose = ' class="prose"' if table.words == columns else ""
+    kind = "prose" if table.words == columns else "many" if columns > _MANY else "few"
     return (
-        f'<div class="wide"><table{prose}><caption><span>{_inline(table.title)}</span></caption>'
+        f'<div class="wide"><table class="{kind}">'
+        f"<caption><span>{_inline(table.title)}</span></caption>"
         f"<thead>{head}</thead><tbody>{''.join(body)}</tbody></table></div>"
     )
 
