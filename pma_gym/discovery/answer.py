@@ -194,6 +194,9 @@ def _estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     if not np.isfinite(error):
         return Estimate(value, None, None, unit(path), limit)
     low, high = max(value - 1.96 * error, lower), min(value + 1.96 * error, upper)
+    # A range may be a million times as wide as what a light axis has: what is surely off an end of
+    # it is not at that end.
+    limit = "" if lower < low and high < upper else limit
     return Estimate(value, low, high, unit(path), limit)
 
 
