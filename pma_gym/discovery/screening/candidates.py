@@ -12,8 +12,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.fitting.free_parameters import unit, values
+from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, ModelError
@@ -48,23 +50,37 @@ SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
 
 
-def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> list[CandidateEffect]:
+def candidate_effects(
+    model: Model,
+    orders: Sequence[float] | None = None,
+    trials: Sequence[Trial] = (),
+) -> list[CandidateEffect]:
     """Every effect that a model lacks, in the order of the catalogue.
 
     Args:
         model: the model.
         orders: which repeat each trial is, 0 for the first; None where that is not known.
+        trials: the trials, by whose sizes effects of a free rig are looked for.
     """
+    usual = sizes(model, trials) if trials else None
     candidates = [
-        *(_lacking(model, effect, orders) for effect in CATALOGUE.values()),
+        *(_lacking(model, effect, orders, usual) for effect in CATALOGUE.values()),
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
-    return [candidate for candidate in candidates if candidate is not None]
+    return [each for each in candidates if each is not None and _can_act(model, each)]
+
+
+def _can_act(model: Model, candidate: CandidateEffect) -> bool:
+    """Whether a rig has what an effect grows with: one without a pressure shows no part of it."""
+    if model.rig.has_muscle or any(signal.is_pressure for signal in model.rig.signals):
+        return True
+    units = [unit(path) for path in candidate.fitted_paths]
+    return not all("kPa" in each or "bar" in each for each in units)
 
 
 def _lacking(
-    model: Model, effect: Effect, orders: Sequence[float] | None
+    model: Model, effect: Effect, orders: Sequence[float] | None, sizes: Sizes | None
 ) -> "CandidateEffect | None":
     """An effect that the model has not."""
     if effect.name in model.parameters or effect.replaces or effect.neutral is None:
@@ -80,9 +96,13 @@ def _lacking(
     if needed and all(each.port != needed for each in model.effects.values()):
         return None
     doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+    quantities = {
+        stem: quantity if sizes is None or stem in effect.held else sizes.scaled(quantity)
+        for stem, quantity in effect.quantities.items()
+    }
     shown = {
         stem: quantity
-        for stem, quantity in effect.quantities.items()
+        for stem, quantity in quantities.items()
         if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
         # Free in every trial already, as `estimation.residuals` has it.
@@ -90,7 +110,7 @@ def _lacking(
     }
     if any(quantity.usual is None for quantity in shown.values()):
         return None
-    usual = {doors[stem]: q.usual for stem, q in effect.quantities.items() if q.usual is not None}
+    usual = {doors[stem]: q.usual for stem, q in quantities.items() if q.usual is not None}
     neutral = {
         doors[stem]: quantity.neutral
         for stem, quantity in shown.items()
@@ -118,16 +138,16 @@ def _candidate(
     shapes = [stem for stem in stems if shown[stem].neutral is None]
     absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
     probes, signs = [], []
-    for sizes in _sizes(amplitudes, switches, shown):
+    for size in _sizes(amplitudes, switches, shown):
         for shape in _shapes(shapes, bool(switches), shown):
             row = dict(zip(stems, absent, strict=True))
-            row.update(sizes)
+            row.update(size)
             row.update(shape)
             probes.append([float(np.clip(row[s], shown[s].lower, shown[s].upper)) for s in stems])
             signs.append(
                 "phase" in shapes
-                or all(shown[s].lower < _neutral_or_usual(shown[s]) < shown[s].upper for s in sizes)
-                and not any(_is_limit(shown[s]) for s in sizes)
+                or all(shown[s].lower < _neutral_or_usual(shown[s]) < shown[s].upper for s in size)
+                and not any(_is_limit(shown[s]) for s in size)
             )
     kept = [k for k, row in enumerate(probes) if row not in probes[:k]]
     times = [stem in shapes for stem in stems] if switches else [False] * len(stems)

@@ -18,8 +18,8 @@ beyond."""
 class CoulombFriction(NamedTuple):
     """Parameters of `friction_force`."""
 
-    static: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.96", 0.0, usual=1.96)]
-    dynamic: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.47", 0.0, usual=1.47)]
+    static: Annotated[float, Quantity("N", 0, 1e5, "Serres 2008, 2.1.1.1: 1.96", 0.0, usual=1.96)]
+    dynamic: Annotated[float, Quantity("N", 0, 1e5, "Serres 2008, 2.1.1.1: 1.47", 0.0, usual=1.47)]
     stribeck_speed: Annotated[
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]

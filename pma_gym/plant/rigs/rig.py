@@ -41,6 +41,7 @@ class Rig:
             state that is its rate.
         start_paths: parameters of a free rig that say where a trial begins, by the state that is
             there then: its position, then its speed.
+        drive_port: port of the drive whose force moves a free rig.
         imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
@@ -60,6 +61,7 @@ class Rig:
     is_free: bool = False
     has_muscle: bool = True
     is_diagnosable: bool = False
+    drive_port: str = ""
     imposes_motion: bool = False
     needed_ports: Mapping[str, str] = field(default_factory=dict)
     modifying_ports: tuple[str, ...] = ()
