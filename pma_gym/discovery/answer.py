@@ -48,7 +48,8 @@ from pma_gym.discovery.verdict.unknown import (
     widest_scatter,
 )
 from pma_gym.discovery.verdict.worsened import worsened
-from pma_gym.plant.model import Model, Note
+from pma_gym.plant.model import Model
+from pma_gym.plant.parameter_rows import Note
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""
