@@ -42,8 +42,9 @@ SCANNED, WIDER = 32, 4.0
 """Values of a parameter that a scan of its range simulates, and how far it goes beyond the
 probes."""
 
-MILD = 0.05
-"""Share of the largest promise over a range that a value must make to be worth a refit."""
+MILD, TELLING = 0.05, 30.0
+"""Share of the largest promise over a range, and chi-square, that a value must promise to be worth
+a refit: of less, what a fit stops short of would tell as much."""
 
 FINER = 0.005
 """Share of the smallest probe whose being seen for certain asks for smaller probes."""
@@ -413,7 +414,8 @@ class ScannedRange:
 
     def mildest(self) -> int | None:
         """Which value changes least of those that promise a share of the most; None: none does."""
-        promising = np.flatnonzero(self.promises >= MILD * self.most)
+        least = max(MILD * self.most, min(self.most, TELLING))
+        promising = np.flatnonzero(self.promises >= least)
         return int(promising[np.argmin(self.changes[promising])]) if self.most > 0.0 else None
 
 
