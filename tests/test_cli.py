@@ -67,12 +67,15 @@ def test_the_seed_and_the_noise_are_options(run, ramp, tmp_path):
 def test_commands_are_joined_or_held(run, ramp, tmp_path):
     model = ("--model", "serres2008", "--no-noise")
     loads = {}
-    for hold in ("linear", "zero"):
-        assert run("simulate", ramp, *model, "--hold", hold, "--out", f"{hold}.csv")[0] == 0
-        loads[hold] = read_trial(tmp_path / f"{hold}.csv").measurements["load"][1]
+    for how in ("foh", "zoh"):
+        assert run("simulate", ramp, *model, "--interpolation", how, "--out", f"{how}.csv")[0] == 0
+        loads[how] = read_trial(tmp_path / f"{how}.csv").measurements["load"][1]
     # Held, the motor has not yet been told to pull when the second row is logged.
-    assert loads["linear"] > 200.0
-    assert loads["zero"] == pytest.approx(0.0, abs=1e-6)
+    assert loads["foh"] > 200.0
+    assert loads["zoh"] == pytest.approx(0.0, abs=1e-6)
+    code, _, err = run("simulate", ramp, *model, "--hold", "zero", "--out", "old.csv")
+    assert code == 0 and "--hold zero is now --interpolation zoh" in err
+    assert (tmp_path / "old.csv").read_bytes() == (tmp_path / "zoh.csv").read_bytes()
 
 
 def test_leaving_the_models_range_is_said(run, tmp_path):
@@ -98,6 +101,7 @@ def test_unknown_columns_are_said(run, tmp_path):
         (RAMP, ["--out", "log.txt"], "must end in .csv, .parquet, .xlsx"),
         (RAMP, ["--out", "nowhere/log.csv"], "there is no folder nowhere"),
         (RAMP, ["--out", "log.csv", "--model", "statoin"], "no model 'statoin'.*did you mean"),
+        (RAMP, ["--out", "log.csv", "--interpolation", "cubic"], "'cubic' is not one of"),
         (RAMP, ["--out", "log.csv", "--hold", "cubic"], "'cubic' is not one of"),
         (RAMP, ["--out", "log.csv", "--seed", "-1"], "--seed"),
         (RAMP, [], "Missing option '--out'"),

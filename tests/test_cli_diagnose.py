@@ -24,7 +24,7 @@ from pma_gym.plant.model import load_model
 
 TIME = np.arange(20) / 10
 TRIAL = Trial(TIME, {"motor_voltage": TIME}, {"load": 98.0 * TIME})
-FOUND = Diagnosis(
+DIAGNOSIS = Diagnosis(
     verdict="parameters",
     sentence="The drive pulls 3 % less than the model says.",
     where=(Place("load_n", "above 100 N", 0.7, 0.002),),
@@ -62,7 +62,7 @@ def engine(monkeypatch):
     """A stand-in that finds `answer`, or raises it; remembers what it was given."""
 
     class Engine:
-        answer = FOUND
+        answer = DIAGNOSIS
         calls = []
 
         def __call__(self, trials, model=None, *, progress=None, journal=None, **rest):
@@ -102,7 +102,7 @@ def test_diagnose_writes_its_files_and_says_what_it_found(run, engine, tmp_path)
     assert "Seed" in (folder / "report.html").read_text()
     assert out.splitlines() == [
         "Parameters were off.",
-        FOUND.sentence,
+        DIAGNOSIS.sentence,
         "",
         "Note: Only one trial.",
         "Where:      load, above 100 N: 70 % of its misfit (p = 0.002)",
@@ -136,7 +136,7 @@ def test_an_older_result_is_kept_unless_forced(run, engine, tmp_path, command):
     assert err.startswith("error: old holds an older result (model.toml, ")
     assert "--force replaces it, --out FOLDER writes to another place" in err
     assert before == {path: path.read_bytes() for path in (tmp_path / "old").iterdir()}
-    engine.answer = replace(FOUND, next_experiment=None)
+    engine.answer = replace(DIAGNOSIS, next_experiment=None)
     assert run(command, "lab", "--out", "old", "--force")[0] == 0
     assert "next.csv" not in names(tmp_path / "old")
 
@@ -147,7 +147,7 @@ def test_ctrl_c_says_how_to_go_on(run, engine, tmp_path):
     assert (code, out) == (130, "")
     assert err.endswith("interrupted; the same command with --resume goes on\n")
     assert names(tmp_path / "lab-diagnosis") == ["unfinished"]
-    engine.answer = FOUND
+    engine.answer = DIAGNOSIS
     code, _, err = run("diagnose", "lab")
     assert code == 2
     assert "lab-diagnosis holds an unfinished run; --resume goes on with it, --force begins" in err
@@ -222,11 +222,11 @@ def test_fit_prints_and_writes_the_parameters(run, engine, tmp_path):
 
 def test_fit_says_when_parameters_do_not_explain_it_all(run, engine):
     left = Judgement(0.5, "rest segments", 8.0, 6.0, 6.5, 7.0, "misfit")
-    engine.answer = replace(FOUND, adequacy={"load_n": left})
+    engine.answer = replace(DIAGNOSIS, adequacy={"load_n": left})
     code, out, _ = run("fit", "lab")
     assert code == 0
     assert "in noise floors: 8 in load (the noise at rest, 0.5 N)." in out
-    engine.answer = FOUND
+    engine.answer = DIAGNOSIS
     assert "noise floors" not in run("fit", "lab", "--force")[1]
 
 

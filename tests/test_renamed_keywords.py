@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from controllers import SerresReplay
 from pma_gym import Plant
 from pma_gym.effects.effect import Effect
 
@@ -17,6 +18,13 @@ def test_joined_is_interpolation(joined, interpolation):
     with pytest.warns(DeprecationWarning, match=f"is now run.interpolation='{interpolation}'"):
         old, _ = plant.run(TIME, MOTOR, regulator, joined=joined)  # pyright: ignore
     assert np.array_equal(new, old)
+
+
+@pytest.mark.parametrize(("hold", "interpolation"), [("linear", "foh"), ("zero", "zoh")])
+def test_hold_of_a_replay_is_interpolation(hold, interpolation):
+    with pytest.warns(DeprecationWarning, match=f"interpolation='{interpolation}'") as said:
+        replay = SerresReplay(hold=hold)  # pyright: ignore
+    assert len(said) == 1 and replay.interpolation == interpolation
 
 
 def test_both_names_are_refused():

@@ -91,8 +91,8 @@ def reference(plant: Plant, start: Condition, commands: Commands) -> NDArray[np.
         ) -> NDArray:
             return plant.derivative(state, motor, regulator, start.zero_contraction)
 
-        kinks = switches(plant, start.zero_contraction)
-        states.append(integrated(rate, states[-1], float(duration), kinks))
+        events = switches(plant, start.zero_contraction)
+        states.append(integrated(rate, states[-1], float(duration), events))
     return np.array(states)
 
 
@@ -115,7 +115,7 @@ def switches(plant: Plant, zero: float) -> list[NDArray[np.float64]]:
 
 
 def integrated(
-    rate: Rate, state: NDArray, duration: float, kinks: list[NDArray], rtol: float = 1e-11
+    rate: Rate, state: NDArray, duration: float, events: list[NDArray], rtol: float = 1e-11
 ) -> NDArray[np.float64]:
     """The state after a while of constant commands.
 
@@ -123,14 +123,14 @@ def integrated(
         rate: rate of the state.
         state: where it begins.
         duration: how long (s).
-        kinks: linear functions of the state at whose zeros the rate has a kink, see `switches`.
+        events: linear functions of the state at whose zeros the rate has a kink, see `switches`.
         rtol: relative tolerance.
     """
     begin, pause = 0.0, 1e-7
     while begin < duration:
-        events = [_event(factors, rate, state) for factors in kinks]
+        detectors = [_event(factors, rate, state) for factors in events]
         span = solve_ivp(
-            rate, (begin, duration), state, "DOP853", rtol=rtol, atol=1e-13, events=events
+            rate, (begin, duration), state, "DOP853", rtol=rtol, atol=1e-13, events=detectors
         )
         moved = span.t[-1] > begin + 1e-12
         if not moved:
@@ -139,7 +139,7 @@ def integrated(
             span = solve_ivp(rate, (begin, end), state, "DOP853", rtol=rtol, atol=1e-13)
         pause = 1e-7 if moved else 4.0 * pause
         begin, state = float(span.t[-1]), span.y[:, -1].copy()
-        for factors, crossings in zip(kinks, span.t_events if moved else (), strict=False):
+        for factors, crossings in zip(events, span.t_events if moved else (), strict=False):
             if len(crossings) and np.count_nonzero(factors) == 1:
                 # On the switch to the last bit, so that it is not found again at once.
                 state[np.flatnonzero(factors)] = 0.0

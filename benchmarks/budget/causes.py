@@ -36,6 +36,7 @@ from controllers.models.muscle import Muscle
 from controllers.models.nominal_motion import nominal_motion
 from controllers.serres_feedforward import PROFILE_RADIUS
 from pma_gym.envs import StationInfo
+from pma_gym.integrator.equations import Interpolation
 from pma_gym.plant.model import Model
 from pma_gym.plant.plant import Plant
 from pma_gym.studies.tustin import cascade_transfer, inverse_recursion, tustin_recursion
@@ -119,20 +120,22 @@ class OpenLoop:
         self.smooth = Plant(without(plant.model, "hysteresis", "dry friction"))
 
     def voltages(
-        self, faults: frozenset[str], hold: str = "linear", compensated: bool = True
+        self, faults: frozenset[str], interpolation: Interpolation = "foh", compensated: bool = True
     ) -> Array:
         """Motor voltage of every control period with these faults (V), shape (steps,).
 
         Args:
             faults: some of `CAUSES`.
-            hold: how samples become voltages where `timing` is a fault: joined (`linear`), or each
-                held until the next (`zero`).
+            interpolation: how samples become voltages where `timing` is a fault: joined (`foh`), or
+                each held until the next (`zoh`).
             compensated: whether any lag is made up for; else tau = 0.
         """
         steps = self.station.task.steps(1.0 / self.station.period)
         middle = self.station.period * (np.arange(steps) + 0.5)
         if "timing" in faults:
-            volts = self._joined(self._mapped(self._samples, faults, compensated), middle, hold)
+            volts = self._interpolated(
+                self._mapped(self._samples, faults, compensated), middle, interpolation
+            )
         else:
             volts = self._mapped(middle, faults, compensated)
         if "slack" not in faults and not self.rotation:
@@ -152,8 +155,8 @@ class OpenLoop:
         """Times of the dissertation's samples (s)."""
         return SAMPLE_TIME * np.arange(round(self.station.task.protocol.duration / SAMPLE_TIME) + 1)
 
-    def _joined(self, samples: Array, times: Array, hold: str) -> Array:
-        if hold == "linear":
+    def _interpolated(self, samples: Array, times: Array, interpolation: Interpolation) -> Array:
+        if interpolation == "foh":
             return np.interp(times, self._samples, samples)
         return samples[np.searchsorted(self._samples, times + 1e-9, side="right") - 1]
 

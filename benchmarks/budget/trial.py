@@ -139,7 +139,7 @@ def _variants(open_loop: OpenLoop) -> dict[str, Errors]:
     printed = open_loop.voltages(faults)
     others = {name: Plant(without(plant.model, part)) for name, part in WITHOUT.items()}
     cases = {
-        "samples held": (plant, open_loop.voltages(faults, hold="zero")),
+        "samples held": (plant, open_loop.voltages(faults, interpolation="zoh")),
         "no lag compensation": (plant, open_loop.voltages(faults - {"chatter"}, compensated=False)),
         **{name: (other, printed) for name, other in others.items()},
     }

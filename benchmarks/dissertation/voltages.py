@@ -42,7 +42,7 @@ def run_voltages(order: Order, out: Path) -> int:
 
     Args:
         order: which.
-        out: CSV file that `pma-gym simulate --hold zero` takes.
+        out: CSV file that `pma-gym simulate --interpolation zoh` takes.
     Returns:
         The number of rows.
     Raises:
@@ -56,7 +56,8 @@ def run_voltages(order: Order, out: Path) -> int:
     text.write(
         f"# {order.controller}, {order.task}, {order.pressure_kpa:g} kPa, {order.rate_hz:g} Hz, "
         f"model {environment.nominal_plant.model.name}\n"
-        "# Settle at the first row; hold each row until the next (pma-gym simulate --hold zero)\n"
+        "# Settle at the first row; hold each row until the next "
+        "(pma-gym simulate --interpolation zoh)\n"
     )
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("time_s", "motor_voltage_v", "regulator_voltage_v", f"reference_{unit}"))

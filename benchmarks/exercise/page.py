@@ -47,12 +47,12 @@ def exercise_blocks(model: Model, devices: Sequence[Device], answer: Answer | No
         Picture(PICTURE, "Moment at 90 deg by constant pressure; moment over the angle."),
         *(Heading("Configurations"), Paragraph(_RANGES), range_table(model, devices)),
         *(Heading("The tested muscle"), Paragraph(_CHECK), check_table(model)),
-        *(Heading("The knee"), Paragraph(_knee_words()), knee_table(model)),
+        *(Heading("The knee"), Paragraph(_knee_text()), knee_table(model)),
         *(Heading("Other sizes"), Paragraph(_MAKERS), makers_table(model)),
     ]
 
 
-def _knee_words() -> str:
+def _knee_text() -> str:
     return (
         "Largest voluntary isometric torque of a man of 18–25 years after Anderson, Madigan and "
         f"Nussbaum 2007 (its table 3 as RBDL has it; the paper was not read), {BODY_MASS:g} kg and "

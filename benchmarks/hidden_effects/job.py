@@ -14,7 +14,7 @@ from benchmarks.files import write_text
 from benchmarks.hidden_effects.evaluation import records, scoring
 from benchmarks.hidden_effects.evaluation.diagnosis import Judge, diagnosed
 from benchmarks.hidden_effects.evaluation.one_case import Work
-from benchmarks.hidden_effects.evaluation.records import Record
+from benchmarks.hidden_effects.evaluation.records import CaseRecord
 from benchmarks.hidden_effects.evaluation.tables import percent, table
 from benchmarks.hidden_effects.evaluation.targets import RATES
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome
@@ -107,7 +107,7 @@ def run_block(order: Order) -> dict[str, Any] | None:
     failures: list[str] = []
 
     def on_done(index: int, result: object) -> None:
-        if isinstance(result, Record):
+        if isinstance(result, CaseRecord):
             records.write(result, order.folder)
             done[result.number] = result
             progress.tell(result)
@@ -126,9 +126,9 @@ def run_block(order: Order) -> dict[str, Any] | None:
     return document
 
 
-def judgeable(order: Order) -> list[Record]:
+def judgeable(order: Order) -> list[CaseRecord]:
     """Records of an order's folder that can be judged; the other cases are made anew."""
-    kept_records, damaged = list[Record](), list[str]()
+    kept_records, damaged = list[CaseRecord](), list[str]()
     for record in records.read(order.folder, order.count):
         try:
             if record.truth["seed"] != order.seed:
@@ -142,7 +142,7 @@ def judgeable(order: Order) -> list[Record]:
     return kept_records
 
 
-def figures(order: Order, kept: Sequence[Record]) -> dict[str, Any]:
+def figures(order: Order, kept: Sequence[CaseRecord]) -> dict[str, Any]:
     """The figures of a block's records."""
     counted = scoring.count([scoring.outcome_of(record) for record in kept])
     return {
@@ -215,7 +215,7 @@ class Progress:
         self.order, self.outcomes = order, list(known)
         self.begun, self.before = time.monotonic(), len(known)
 
-    def tell(self, record: Record) -> None:
+    def tell(self, record: CaseRecord) -> None:
         """One more case is done."""
         outcome = scoring.outcome_of(record)
         self.outcomes.append(outcome)
@@ -264,7 +264,7 @@ def _claimed(path: Path) -> dict[str, Any] | None:
     return theirs
 
 
-def _greeting(order: Order, done: dict[int, Record], code: str) -> str:
+def _greeting(order: Order, done: dict[int, CaseRecord], code: str) -> str:
     words = (
         f"Block {order.block.name}, seed {order.seed}: {order.count} cases, "
         f"{order.executor.jobs} at a time"

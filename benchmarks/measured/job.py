@@ -129,7 +129,8 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         given, amended, effects, _without, FOLDS, jobs, partial(tell, "pressures left out")
     )
     final = load_model(stages.folder / f"step_{len(stepped) - 1}.toml")
-    blind, proposals = undecidable(final, few, jobs, seed, partial(tell, "what cannot be told"))
+    questions = partial(tell, "what is not detectable")
+    not_detectable, proposals = undecidable(final, few, jobs, seed, questions)
     reverse = _reverse(stages, partial(tell, "the reverse"))
     models = {GIVEN: given, STATION: load_model(STATION), "amended": final}
     return Measured(
@@ -138,7 +139,7 @@ def _computed(stages: Stages, jobs: int, seed: int, most: int, tell: Tell) -> Me
         left_out,
         floors(),
         smooth_errors(*judged),
-        blind,
+        not_detectable,
         proposals,
         reverse,
         held_against(models, given),

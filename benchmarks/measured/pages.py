@@ -5,22 +5,22 @@ import numpy as np
 from benchmarks.measured.replays import PHASE_NAMES
 from benchmarks.measured.result import Measured
 from benchmarks.measured.tables import (
-    BLIND_HEADER,
     COLUMNS,
     HELD_HEADER,
+    NOT_DETECTABLE_HEADER,
     REPLAY_HEADER,
     REVERSE_HEADER,
     TARGET_MM,
-    blind_rows,
     error_rows,
-    experiment_words,
+    experiment_text,
     held_rows,
+    not_detectable_rows,
     readable,
     replay_rows,
     reverse_rows,
-    reverse_words,
+    reverse_text,
     round_rows,
-    verdict_words,
+    verdict_text,
 )
 from pma_gym.discovery.report.pictures import AFTER, BEFORE, FLOOR, PARAMETERS
 from pma_gym.pages.document import Block, Callout, Heading, Paragraph, Picture, TextTable, to_html
@@ -46,7 +46,7 @@ def _blocks(result: Measured) -> list[Block]:
             f"{', '.join(effects) or 'nothing'}.",
             tone="good",
         ),
-        *(Paragraph(words) for words in verdict_words(result)),
+        *(Paragraph(words) for words in verdict_text(result)),
         Picture(
             "errors",
             "Error of table I3's rows from the commands alone, model after model: at pressures "
@@ -79,12 +79,12 @@ def _blocks(result: Measured) -> list[Block]:
         TextTable(
             "Effects that these tables would not show at their usual size, beside the amended "
             "model",
-            BLIND_HEADER,
-            blind_rows(result),
+            NOT_DETECTABLE_HEADER,
+            not_detectable_rows(result),
             words=2,
         )
     )
-    blocks += [Paragraph(words) for words in experiment_words(result)]
+    blocks += [Paragraph(words) for words in experiment_text(result)]
     blocks += _reverse_blocks(result)
     return blocks
 
@@ -99,7 +99,7 @@ def _reverse_blocks(result: Measured) -> list[Block]:
             "its simulation misses of them, with each pressure left out in turn (one step of the "
             "fit, simulated)."
         ),
-        *(Paragraph(words) for words in reverse_words(result)),
+        *(Paragraph(words) for words in reverse_text(result)),
     ]
     for number, explanations in enumerate(result.reverse, 1):
         title = f"Explanations, {number}: rms (mm at the muscle)"

@@ -20,7 +20,7 @@ class Measured:
         folds: rms errors of all effects with every pressure left out once, by figure.
         floors: scatter between repeats, by figure.
         smooth: rms errors at unseen pressures of a smooth function of the commands, by figure.
-        blind: effects that I2 and I3 cannot tell beside the amended model.
+        not_detectable: effects that I2 and I3 cannot tell beside the amended model.
         proposals: experiments that would show them.
         reverse: what explains the misfit of the identified station in tables 21-30, round by round.
         held: models against the validation under triangular pressure.
@@ -33,7 +33,7 @@ class Measured:
     folds: dict[str, float]
     floors: dict[str, float]
     smooth: dict[str, float]
-    blind: list[Undecidable]
+    not_detectable: list[Undecidable]
     proposals: list[Proposal]
     reverse: list[list[Explanation]]
     held: list[Held]

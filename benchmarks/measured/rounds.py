@@ -34,7 +34,7 @@ class Round:
         effects: effects that it added, in order.
         p_values: family-wise, by effect.
         rivals: the candidates that came next: name, gain in log-likelihood, p-value, reason.
-        blind: effects that these trials would not show at their usual size.
+        not_detectable: effects that these trials would not show at their usual size.
         next_experiment: what to measure next, or nothing.
         gap: misfit as given, refitted, amended and the noise, by signal.
         seconds: by step.
@@ -46,7 +46,7 @@ class Round:
     effects: tuple[str, ...]
     p_values: Mapping[str, float]
     rivals: Sequence[Sequence[Any]]
-    blind: tuple[str, ...]
+    not_detectable: tuple[str, ...]
     next_experiment: Mapping[str, Any] | None
     gap: Mapping[str, Mapping[str, float | bool | None]]
     seconds: Mapping[str, float] = field(default_factory=dict)
@@ -137,7 +137,7 @@ def round_of(diagnosis: Diagnosis, trials: int) -> Round:
             (each.name, each.delta_log_likelihood, each.p_value, each.why)
             for each in diagnosis.candidates[:MOST_RIVALS]
         ],
-        blind=tuple(diagnosis.not_detectable),
+        not_detectable=tuple(diagnosis.not_detectable),
         next_experiment=None
         if experiment is None
         else {

@@ -30,7 +30,7 @@ ELSEWHERE = (
 
 T = TypeVar("T")
 
-_RENAMED = {"found": "explanations"}
+_RENAMED = {"found": "explanations", "blind": "not_detectable"}
 """Names in stages of older versions."""
 
 

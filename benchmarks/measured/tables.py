@@ -112,11 +112,11 @@ MOST_SHOWN = 8
 """Explanations that are listed."""
 
 
-def reverse_words(result: Measured) -> Iterator[str]:
+def reverse_text(result: Measured) -> Iterator[str]:
     """What explains the misfit, and what cannot be told from it."""
     for explanations in result.reverse:
         plain = next(each for each in explanations if each.name == NOTHING)
-        yield from _hypothesis_words(explanations, plain)
+        yield from _hypothesis_text(explanations, plain)
         counted = [each for each in explanations if not each.hypothesis]
         best, others = counted[0], [each for each in alike(counted) if each is not counted[0]]
         if best is plain or best.left_out_mm > GAIN * plain.left_out_mm:
@@ -133,7 +133,7 @@ def reverse_words(result: Measured) -> Iterator[str]:
         )
 
 
-def _hypothesis_words(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
+def _hypothesis_text(explanations: Sequence[Explanation], plain: Explanation) -> Iterator[str]:
     """Hypotheses made after the tables were seen: listed, and never counted."""
     for each in explanations:
         if each.hypothesis:
@@ -175,7 +175,7 @@ HELD_HEADER = (
 REPLAY_HEADER = ("model", "slope", "intercept", "mean", "mean, signed", "RMSE", "trials")
 
 
-def experiment_words(result: Measured) -> list[str]:
+def experiment_text(result: Measured) -> list[str]:
     """What to measure next, in words."""
     words = []
     for number, each in enumerate(result.rounds, 1):
@@ -194,7 +194,7 @@ def experiment_words(result: Measured) -> list[str]:
     return words
 
 
-def blind_rows(result: Measured) -> Rows:
+def not_detectable_rows(result: Measured) -> Rows:
     """Effects that these tables cannot tell, and which experiment would."""
     return [
         (
@@ -203,11 +203,16 @@ def blind_rows(result: Measured) -> Rows:
             "at no size" if each.shows_from is None else f"{each.shows_from:.2g}",
             "none of these" if each.experiment is None else str(each.experiment),
         )
-        for each in sorted(result.blind, key=lambda e: e.shows_from or 1e99)
+        for each in sorted(result.not_detectable, key=lambda e: e.shows_from or 1e99)
     ]
 
 
-BLIND_HEADER = ("effect", "verdict", "shows from, times its usual size", "shown by experiment")
+NOT_DETECTABLE_HEADER = (
+    "effect",
+    "verdict",
+    "shows from, times its usual size",
+    "shown by experiment",
+)
 
 
 def print_measured(result: Measured, console: Console) -> None:
@@ -226,15 +231,17 @@ def print_measured(result: Measured, console: Console) -> None:
             f"The reverse, {number}: misfit of `station` in tables 21-30, rms (mm at the muscle)"
         )
         _print(console, title, REVERSE_HEADER, reverse_rows(explanations))
-    for line in reverse_words(result):
+    for line in reverse_text(result):
         console.print(line, highlight=False)
     _print(console, "Triangular pressure, figures 28 and 29", HELD_HEADER, held_rows(result))
-    _print(console, "What I2 and I3 cannot tell", BLIND_HEADER, blind_rows(result))
-    for line in (*experiment_words(result), *verdict_words(result)):
+    _print(
+        console, "What I2 and I3 cannot tell", NOT_DETECTABLE_HEADER, not_detectable_rows(result)
+    )
+    for line in (*experiment_text(result), *verdict_text(result)):
         console.print(line, highlight=False)
 
 
-def verdict_words(result: Measured) -> Iterator[str]:
+def verdict_text(result: Measured) -> Iterator[str]:
     """What was aimed at, and what was reached."""
     first, last = result.steps[0], result.steps[-1]
     got = last.unseen["extension_mm"]

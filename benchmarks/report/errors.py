@@ -168,7 +168,7 @@ def _numbered(labels: list[Any]) -> NDArray[np.int64]:
 
 
 @dataclass(frozen=True)
-class Record:
+class SuiteRecord:
     """A suite and the rows that a run left, in whatever order they came.
 
     Attributes:
@@ -180,7 +180,7 @@ class Record:
     rows: Mapping[tuple[str, Episode], Row]
 
     @classmethod
-    def of(cls, suite: FrozenSuite, rows: Iterable[Row]) -> "Record":
+    def of(cls, suite: FrozenSuite, rows: Iterable[Row]) -> "SuiteRecord":
         """The rows that are the suite's: of its name, version and episodes; the last of each."""
         known = set(suite.episodes)
         kept = {}

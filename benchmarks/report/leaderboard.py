@@ -8,7 +8,7 @@ from typing import Any
 
 from benchmarks.bounds.cache import Bounds
 from benchmarks.comparison.command_lines import run_command
-from benchmarks.report.errors import Errors, Measure, Record, measures, pooled_measure, task_of
+from benchmarks.report.errors import Errors, Measure, SuiteRecord, measures, pooled_measure, task_of
 from benchmarks.report.margins import Condition, conditions, is_linear
 from benchmarks.report.standings import Standings
 from benchmarks.report.tables import standings_table
@@ -35,7 +35,7 @@ class Leaderboard:
         bounds: achievable bounds on the suite's model; computed here, and not kept, if None.
     """
 
-    record: Record
+    record: SuiteRecord
     info: Mapping[str, Any]
     bounds: Bounds | None = None
 
@@ -179,7 +179,7 @@ def read_leaderboard(suite: FrozenSuite, folder: Path, bounds: Bounds | None = N
             f"{run_command(suite, folder)}"
         )
     check_run(folder, info, suite.source)
-    return Leaderboard(Record.of(suite, rows), info, bounds)
+    return Leaderboard(SuiteRecord.of(suite, rows), info, bounds)
 
 
 def keep_bounds(suite: FrozenSuite, folder: Path) -> None:

@@ -62,7 +62,7 @@ class Interval(NamedTuple):
 def interquartile_mean(values: NDArray[np.float64]) -> Any:  # noqa: ANN401
     """Mean of the middle half: a quarter, rounded down, is left out at each end.
 
-    As little shaken by a few wild cases as the median, and far more precise.
+    As little shaken by a few outlying cases as the median, and far more precise.
     """
     return trim_mean(values, TRIMMED_SHARE, axis=-1)
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from benchmarks.report.errors import PERCENT, Record
+from benchmarks.report.errors import PERCENT, SuiteRecord
 from benchmarks.report.standings import Standing, Standings
 from benchmarks.report.statistics import Interval
 from benchmarks.report.tracking_cost import Spending
@@ -106,7 +106,7 @@ def spending_table(rows: Sequence[Spending], title: str, unit: str, labels: Labe
 
 
 def exercise_table(
-    record: Record, tasks: Sequence[str], names: Sequence[str], title: str, labels: Labels
+    record: SuiteRecord, tasks: Sequence[str], names: Sequence[str], title: str, labels: Labels
 ) -> TextTable:
     """What exercises came to beside their errors: medians over the cases that did not fail.
 
@@ -189,7 +189,7 @@ def verdict_table(checks: Sequence[Verdict]) -> TextTable:
     return TextTable("What the suite asks for", header, rows)
 
 
-def failure_table(record: Record, labels: Labels) -> TextTable:
+def failure_table(record: SuiteRecord, labels: Labels) -> TextTable:
     """Why cases have no figures: each reason of a controller once."""
     groups: dict[tuple[str, str], list[str]] = {}
     for name, episode, reason in record.failures():

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.report.errors import Measure, Record
+from benchmarks.report.errors import Measure, SuiteRecord
 
 MICROSECONDS = 1e6
 """Microseconds in a second."""
@@ -52,12 +52,12 @@ class Spending(NamedTuple):
     real_time_factor: float
 
 
-def spending(record: Record, measure: Measure, names: Sequence[str]) -> list[Spending]:
+def spending(record: SuiteRecord, measure: Measure, names: Sequence[str]) -> list[Spending]:
     """What each of these controllers spent in a measure's tasks."""
     return [_of_one(record, measure, name) for name in names]
 
 
-def _of_one(record: Record, measure: Measure, name: str) -> Spending:
+def _of_one(record: SuiteRecord, measure: Measure, name: str) -> Spending:
     rows = [
         row
         for (who, episode), row in record.rows.items()

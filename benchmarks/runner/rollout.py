@@ -135,8 +135,8 @@ def rollout(
         ControllerError: the controller returned what is no voltage.
         Exception: whatever the controller or the environment raised.
     """
-    for practice in range(1, getattr(controller, "repetitions", 1)):
-        _begin(environment, controller, practice_seed(seed, practice), nominal, reveal)
+    for trial in range(1, getattr(controller, "repetitions", 1)):
+        _begin(environment, controller, learning_seed(seed, trial), nominal, reveal)
         _drive(environment, controller, _Log())
     log = _Log()
     _begin(environment, controller, seed, nominal, reveal)
@@ -144,9 +144,9 @@ def rollout(
     return log.rollout(environment)
 
 
-def practice_seed(seed: int, practice: int) -> int:
+def learning_seed(seed: int, trial: int) -> int:
     """Seed of an episode before the one that is scored."""
-    return int(np.random.SeedSequence([seed, practice]).generate_state(1)[0])
+    return int(np.random.SeedSequence([seed, trial]).generate_state(1)[0])
 
 
 class _Log:

@@ -131,7 +131,7 @@ class Trained(NamedTuple):
     final: Validation
 
 
-Told = Callable[[int, Point | None], None]
+OnProgress = Callable[[int, Point | None], None]
 """Is told of progress: control steps so far, and a validation if there was one."""
 
 
@@ -152,13 +152,13 @@ def leg_seed(seed: int, leg: int) -> int:
     return int(np.random.SeedSequence([seed, leg]).generate_state(1)[0]) >> 2
 
 
-def train(order: Order, out: Path, told_of: Told) -> Trained:
+def train(order: Order, out: Path, on_progress: OnProgress) -> Trained:
     """Train a policy, or go on with a training that was interrupted.
 
     Args:
         order: what is to be trained.
         out: folder of its checkpoints and logs.
-        told_of: called with the progress.
+        on_progress: called with the progress.
     Raises:
         PresetError: a device that is absent.
         CheckpointError: a checkpoint of another training, a damaged one, or one that cannot be
@@ -180,7 +180,7 @@ def train(order: Order, out: Path, told_of: Told) -> Trained:
         course.wall_s += drawing_s(preset)
         ends = leg_ends(preset, int(envs.envs.task.steps(preset.rate_hz)))  # type: ignore[attr-defined]
         while course.legs < len(ends) and not course.stopped:
-            _leg(order, ends[course.legs], model, average, course, checks, told_of)
+            _leg(order, ends[course.legs], model, average, course, checks, on_progress)
             content = {"order": order.to_json()} | _as_json(course)
             save_checkpoint(out / "checkpoints", course.legs, model, average, content)
         if average is not None and average.weights is not None:
@@ -243,7 +243,7 @@ def _leg(
     average: WeightAverage | None,
     course: Course,
     checks: Any,  # noqa: ANN401
-    told_of: Told,
+    on_progress: OnProgress,
 ) -> None:
     """Train to a number of control steps."""
     began = time.perf_counter()
@@ -252,7 +252,7 @@ def _leg(
     model.set_random_seed(seed)
     # Fresh episodes: `learn` resets the environments where there is no last observation.
     model._last_obs = None
-    watch = _Watch(order, average, course, checks, told_of, began)
+    watch = _Watch(order, average, course, checks, on_progress, began)
     callbacks = CallbackList([one for one in (average, watch) if one is not None])
     model.learn(end - model.num_timesteps, callback=callbacks, reset_num_timesteps=False)
     watch.validate_at_end()
@@ -271,18 +271,18 @@ class _Watch(BaseCallback):
         average: WeightAverage | None,
         course: Course,
         checks: Any,  # noqa: ANN401
-        told_of: Told,
+        on_progress: OnProgress,
         began: float,
     ) -> None:
         super().__init__()
         self._order, self._average, self._course = order, average, course
-        self._checks, self._told_of, self._began = checks, told_of, began
+        self._checks, self._on_progress, self._began = checks, on_progress, began
         self.validating_s = 0.0
 
     def _on_rollout_start(self) -> None:
         if self.num_timesteps >= self._next:
             self._validate()
-        self._told_of(self.num_timesteps, None)
+        self._on_progress(self.num_timesteps, None)
 
     @property
     def _next(self) -> float:
@@ -313,4 +313,4 @@ class _Watch(BaseCallback):
         best = min(range(len(errors)), key=lambda i: (errors[i] > WORTH * min(errors), i))
         patience = self._order.patience
         self._course.stopped = bool(patience) and len(errors) - 1 - best >= patience
-        self._told_of(point.steps, point)
+        self._on_progress(point.steps, point)

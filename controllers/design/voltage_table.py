@@ -1,22 +1,18 @@
 """Voltages between samples 0.2 s apart, as the dissertation's station was driven."""
 
-from typing import Literal
-
 import numpy as np
 
 from pma_gym.envs import Measurement
-
-Hold = Literal["linear", "zero"]
-
-
-HOLDS = ("linear", "zero")
+from pma_gym.integrator.equations import Interpolation, check_interpolation
+from pma_gym.renamed_keywords import old_keywords
 
 
+@old_keywords({"hold": "interpolation"}, {"hold": {"linear": "foh", "zero": "zoh"}})
 class VoltageTable:
     """Motor voltage by time, between samples 0.2 s apart; what both controllers here replay.
 
     Args:
-        hold: `linear` joins the samples by lines; `zero` holds each until the next. The
+        interpolation: `foh` joins the samples by lines; `zoh` holds each until the next. The
             dissertation does not say which its station did.
 
     Attributes:
@@ -26,17 +22,16 @@ class VoltageTable:
 
     name = "voltage_table"
 
-    def __init__(self, hold: Hold = "linear") -> None:
-        if hold not in HOLDS:
-            raise ValueError(f"hold must be one of {', '.join(HOLDS)}, got {hold!r}")
-        self.hold = hold
+    def __init__(self, interpolation: Interpolation = "foh") -> None:
+        check_interpolation(interpolation)
+        self.interpolation = interpolation
         self.times = np.zeros(1)
         self.volts = np.zeros(1)
         self._period = 0.0
 
     def voltage(self, time: float) -> float:
         """Motor voltage (V) at a time (s); the last sample's from there on."""
-        if self.hold == "linear":
+        if self.interpolation == "foh":
             return float(np.interp(time, self.times, self.volts))
         # A sample begins at its time, also when that time went through a division.
         at = int(np.searchsorted(self.times, time + 1e-9, side="right")) - 1

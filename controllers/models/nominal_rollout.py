@@ -12,7 +12,7 @@ REPETITIONS = 3
 """How often voltages are nominal_rollout."""
 
 LEARNED_SHARE = 0.7
-"""Share of what an error calls for that is learned from a rehearsal."""
+"""Share of what an error calls for that is learned from a rollout."""
 
 WINDOW_S = 0.2
 """Width of the window (s) over which errors are averaged: some lags of the plant."""
@@ -56,7 +56,7 @@ def position_of(station: StationInfo, said: np.ndarray) -> np.ndarray:
 def improved(
     station: StationInfo, volts: np.ndarray, wanted: np.ndarray, stroke: Stroke
 ) -> np.ndarray:
-    """Voltages after some rehearsals, in each of which errors that stay are learned from.
+    """Voltages after some rollouts, in each of which errors that stay are learned from.
 
         V[k] += share * mean of e / g over a window about k
 

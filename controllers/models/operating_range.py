@@ -23,8 +23,8 @@ def stroke_along(positions: np.ndarray, station: StationInfo) -> Stroke:
         positions: of the motion (m or rad), shape (n,).
         station: nominal model, task, pressure, control period.
     """
-    task, ways = station.task, np.diff(positions)
-    rises, falls = bool(np.any(ways > 0.0)), bool(np.any(ways < 0.0))
+    task, distances = station.task, np.diff(positions)
+    rises, falls = bool(np.any(distances > 0.0)), bool(np.any(distances < 0.0))
     contracts, relaxes = (rises, falls) if task.actuator == "regulator" else (falls, rises)
     directions = ("relaxing",) * relaxes + ("contracting",) * contracts
     return _stroke(

@@ -26,11 +26,12 @@ from generators.exercise import (
     exercise_people,
     exercise_ranges,
     exercise_safety,
-    exercise_safety_words,
+    exercise_safety_text,
     exercise_worst,
 )
 from generators.files import calibrations, columns, raw_columns, tables
 from generators.hidden_effects import (
+    hidden_baselines,
     hidden_bound,
     hidden_cases,
     hidden_confused,
@@ -42,7 +43,6 @@ from generators.hidden_effects import (
     hidden_seconds,
     hidden_sizes,
     hidden_summary,
-    hidden_ways,
 )
 from generators.models import differences, identification, misfit, parameters, shipped
 from generators.policies import (
@@ -68,12 +68,12 @@ GENERATORS: dict[str, Callable[..., str]] = {
         *(controllers, example, targets, trials, tuning),
         *(suites, episode_plans, occasional),
         *(hidden_rates, hidden_cases, hidden_sizes, hidden_rounds, hidden_misses),
-        *(hidden_ways, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
+        *(hidden_baselines, hidden_bound, hidden_kinds, hidden_parameters, hidden_seconds),
         *(hidden_confused, hidden_summary),
         *(policies_shipped, policies_judged, policies_trained),
         *(policies_ablations, policies_robustness, policies_operators),
         *(exercise_check, exercise_worst, exercise_ranges, exercise_knee, exercise_makers),
-        *(exercise_people, exercise_safety, exercise_safety_words),
+        *(exercise_people, exercise_safety, exercise_safety_text),
     )
 }
 """Renderers by name; each takes the words after its name in the mark."""

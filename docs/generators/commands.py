@@ -14,12 +14,12 @@ PROGRAMS = {
     "pma-gym": pma_gym.cli.app,
     "benchmarks": benchmarks.__main__.app,
     "hidden_effects": benchmarks.hidden_effects.__main__.app,
-    "ways": benchmarks.hidden_effects.baselines.__main__.app,
+    "baselines": benchmarks.hidden_effects.baselines.__main__.app,
 }
 _CALLED = {
     "benchmarks": "python -m benchmarks",
     "hidden_effects": "python -m benchmarks.hidden_effects",
-    "ways": "python -m benchmarks.hidden_effects.baselines",
+    "baselines": "python -m benchmarks.hidden_effects.baselines",
 }
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from benchmarks.exercise.choice import Choice
 from benchmarks.exercise.safety_layer.episodes import Safety
-from benchmarks.exercise.safety_layer.job import read_safety, safety_table, safety_words
+from benchmarks.exercise.safety_layer.job import read_safety, safety_table, safety_text
 from benchmarks.exercise.tables import check_table, knee_table, makers_table, range_table
 from generators.text import table
 from pma_gym.pages.document import TextTable, to_markdown
@@ -63,9 +63,9 @@ def exercise_safety() -> str:
     return _markdown(safety_table(_safety()))
 
 
-def exercise_safety_words() -> str:
+def exercise_safety_text() -> str:
     """The same in a sentence."""
-    return safety_words(_safety())
+    return safety_text(_safety())
 
 
 def _safety() -> Safety:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.hidden_effects.baselines.comparison import COLUMNS
-from benchmarks.hidden_effects.baselines.registry import WAYS
+from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.bound import detected, identified
 from benchmarks.hidden_effects.evaluation.readme import diagnosis
 from benchmarks.hidden_effects.evaluation.summary import report_blocks
@@ -104,13 +104,15 @@ def hidden_misses() -> str:
     return table(["Block", "Case", "Hidden", "r", "Said"], rows, (1, 3))
 
 
-def hidden_ways() -> str:
-    """The diagnosis, itself with one part off, and simpler ways on the same cases."""
-    ways = _read("ways")["ways"]
-    shown = [name for name in COLUMNS if any(each["rates"][name]["n"] for each in ways.values())]
+def hidden_baselines() -> str:
+    """The diagnosis, itself with one part off, and simpler baselines on the same cases."""
+    baselines = _read("baselines")["baselines"]
+    shown = [
+        name for name in COLUMNS if any(each["rates"][name]["n"] for each in baselines.values())
+    ]
     rows = [
-        [WAYS[way].title, *(_hits(each["rates"][name]) for name in shown), _seconds(each)]
-        for way, each in ways.items()
+        [BASELINES[baseline].title, *(_hits(each["rates"][name]) for name in shown), _seconds(each)]
+        for baseline, each in baselines.items()
     ]
     return table(["Way", *shown, "s a case"], rows, range(1, len(shown) + 2))
 

@@ -43,11 +43,26 @@ _PRESSURE_TOLERANCE = 1.0
 """Rounding of a settled pressure (Pa) that is no extrapolation."""
 
 
-class Hold(StrEnum):
+class Interpolate(StrEnum):
     """What happens between two rows of commands."""
 
-    LINEAR = "linear"
-    ZERO = "zero"
+    FOH = "foh"
+    ZOH = "zoh"
+
+
+_OLD_INTERPOLATIONS = {"linear": Interpolate.FOH, "zero": Interpolate.ZOH}
+"""Values of `--hold`, the old name of `--interpolation`."""
+
+
+def _old_hold(hold: str | None) -> str | None:
+    """Warn of an option that has another name now."""
+    if hold is None:
+        return None
+    if hold not in _OLD_INTERPOLATIONS:
+        raise typer.BadParameter(f"{hold!r} is not one of 'linear', 'zero'; take --interpolation")
+    new = f"--interpolation {_OLD_INTERPOLATIONS[hold]}"
+    print(f"warning: --hold {hold} is now {new}; use that name", file=sys.stderr)
+    return hold
 
 
 @app.callback()
@@ -74,9 +89,11 @@ def simulate(
     model: NamedModel = "station",
     noise: Annotated[bool, typer.Option(help="Sensor noise and quantisation.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the noise.")] = 0,
-    hold: Annotated[
-        Hold, typer.Option(help="Join rows linearly, or hold each until the next (zero).")
-    ] = Hold.LINEAR,
+    interpolation: Annotated[
+        Interpolate,
+        typer.Option(help="Join rows linearly (foh), or hold each until the next (zoh)."),
+    ] = Interpolate.FOH,
+    hold: Annotated[str | None, typer.Option(hidden=True, callback=_old_hold)] = None,
 ) -> None:
     """Run a command file through a model and write the trial as the station's log would be."""
     check_writable(out)
@@ -85,9 +102,8 @@ def simulate(
     plant = Plant(load_model(model))
     given = read(commands)
     try:
-        trial = plant.simulate(
-            given, noise, seed, interpolation="foh" if hold is Hold.LINEAR else "zoh"
-        )
+        how = interpolation if hold is None else _OLD_INTERPOLATIONS[hold]
+        trial = plant.simulate(given, noise, seed, interpolation=how.value)
     except SampleError as error:
         raise TrialError(error.at(place_in_file(commands, error.sample))) from error
     except ValueError as error:

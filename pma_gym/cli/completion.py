@@ -12,20 +12,20 @@ from pma_gym.tasks import EVERY_TASK
 
 def model_names(incomplete: str) -> list[str]:
     """Shipped models that begin so."""
-    return _beginning(incomplete, shipped_models())
+    return _starting_with(incomplete, shipped_models())
 
 
 def task_names(incomplete: str) -> list[str]:
     """Tasks that begin so."""
-    return _beginning(incomplete, EVERY_TASK)
+    return _starting_with(incomplete, EVERY_TASK)
 
 
 def dissertation_tasks(incomplete: str) -> list[str]:
     """Tasks of the dissertation that begin so."""
-    return _beginning(incomplete, PROTOCOLS)
+    return _starting_with(incomplete, PROTOCOLS)
 
 
-def _beginning(incomplete: str, names: Iterable[str]) -> list[str]:
+def _starting_with(incomplete: str, names: Iterable[str]) -> list[str]:
     return [name for name in names if name.startswith(incomplete)]
 
 

@@ -93,7 +93,7 @@ def check_time(time: NDArray[np.float64], place: Place) -> None:
 
 
 def check_values(
-    name: str, values: NDArray[np.float64], column: Column | None, place: Place, mend: str
+    name: str, values: NDArray[np.float64], column: Column | None, place: Place, fix: str
 ) -> None:
     """Refuse infinity, and values outside the limits of their column.
 
@@ -102,7 +102,7 @@ def check_values(
         values: in the unit of the limits; NaN = not measured.
         column: whose limits hold; None for no limits.
         place: where a sample stands.
-        mend: what to do about a value outside the limits.
+        fix: what to do about a value outside the limits.
     Raises:
         TrialError: names the value, the limits, the unit and the place.
     """
@@ -120,5 +120,5 @@ def check_values(
         limits = f"{low:g}-{high:g}" if low >= 0 else f"{low:g} to {high:g}"
         raise TrialError(
             f"{name} must lie in {limits} {column.unit}, {place(int(bad[0]))} has "
-            f"{float(values[bad[0]])!r}; {mend}"
+            f"{float(values[bad[0]])!r}; {fix}"
         )

@@ -152,7 +152,7 @@ class _Work:
         problem, refitted = self._with_lines(problem, refitted, logged, named)
         orders = [each.order for each in named]
         known = None if None in orders else [float(order or 0.0) for order in orders]
-        every = candidate_effects(given, known) if search else []
+        every = candidate_effects(given, known, trials) if search else []
         selection = self._timed(
             "selection",
             lambda: (

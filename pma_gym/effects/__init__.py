@@ -6,6 +6,7 @@ from pma_gym.effects.cable.leg import LEG
 from pma_gym.effects.contact.backlash import BACKLASH
 from pma_gym.effects.contact.cogging import COGGING
 from pma_gym.effects.contact.constant_force import CONSTANT_FORCE, CONSTANT_TORQUE
+from pma_gym.effects.contact.contact_friction import CONTACT_FRICTION, PRESSURE_FRICTION
 from pma_gym.effects.contact.directional_damping import (
     DIRECTIONAL_DAMPING,
     JOINT_DIRECTIONAL_DAMPING,
@@ -16,7 +17,6 @@ from pma_gym.effects.contact.load_dependent_friction import (
     LOAD_DEPENDENT_FRICTION,
 )
 from pma_gym.effects.contact.piston_force import PISTON_FORCE
-from pma_gym.effects.contact.pressure_friction import PRESSURE_FRICTION
 from pma_gym.effects.contact.quadratic_drag import JOINT_DRAG, QUADRATIC_DRAG
 from pma_gym.effects.contact.spring import (
     HARDENING_SPRING,
@@ -173,6 +173,7 @@ CATALOGUE: dict[str, Effect] = {
         IMPOSED_MOTION,
         PISTON_FORCE,
         CONSTANT_FORCE,
+        CONTACT_FRICTION,
         PRESSURE_FRICTION,
         COGGING,
         BACKLASH,

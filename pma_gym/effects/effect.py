@@ -234,6 +234,11 @@ class Effect:
             else tuple(f"{name}_{i + 1}" for i in range(self.memories))
         )
 
+    def shares_law(self, other: "Effect") -> bool:
+        """Whether it is another, or both are terms of one law: their memories follow one path."""
+        path = self.rate_independent_law
+        return self.name == other.name or (path is not None and path is other.rate_independent_law)
+
     def laws(self) -> Iterator[Callable]:
         """The law and those beside it, where there are any."""
         of_memory = (

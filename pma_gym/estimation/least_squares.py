@@ -23,6 +23,9 @@ def _eigen(matrix: Array) -> tuple[Array, Array]:
 
 def least(gradient: Array, curvature: Array, damping: float, low: Array, high: Array) -> Array:
     """Where 2 g.x + x.(A + damping diag A) x is least between bounds that 0 lies between."""
+    if not gradient.size:
+        # A model without a parameter of its own: nothing moves.
+        return gradient
     scale = np.sqrt(np.diag(curvature))
     scale = np.where(scale > 0.0, scale, 1.0)
     matrix = curvature / np.outer(scale, scale) + damping * np.eye(len(scale))

@@ -64,12 +64,12 @@ def _times(task: Task) -> NDArray[np.float64]:
 
 def _jump(task: Task) -> str | None:
     protocol = task.protocol
-    ways = np.abs(np.diff(protocol.reference(_times(task))))
-    far = ways > JUMP_SHARE * protocol.span
+    distances = np.abs(np.diff(protocol.reference(_times(task))))
+    far = distances > JUMP_SHARE * protocol.span
     if not np.any(far):
         return None
     at = int(np.argmax(far))
-    size = ways[at] / SI_FACTORS[protocol.unit]
+    size = distances[at] / SI_FACTORS[protocol.unit]
     return f"the reference jumps by {size:.3g} {protocol.unit} at {(at + 1) / SAMPLE_RATE_HZ:.4g} s"
 
 

@@ -89,8 +89,8 @@ def test_voltage_stays_within_its_limits(station, reading):
     controller = ADRC()
     controller.reset(lambda time: 5e-3 * time, station())
     for k in range(400):
-        wild = reading(extension=float(generator.normal(0.0, 0.05)))
-        assert 0.0 <= controller.act(wild, k * PERIOD) <= 10.0
+        noisy = reading(extension=float(generator.normal(0.0, 0.05)))
+        assert 0.0 <= controller.act(noisy, k * PERIOD) <= 10.0
 
 
 def test_defaults_lie_within_their_bounds():

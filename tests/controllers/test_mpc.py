@@ -81,8 +81,8 @@ def test_voltages_keep_their_limits_whatever_the_sensors_say(station, reading):
     controller = PreviewMPC()
     controller.reset(lambda time: 5e-3 * time, station())
     for k in range(120):
-        wild = reading(extension=float(generator.normal(0.0, 0.03)), time=0.01 * k)
-        assert 0.0 <= controller.act(wild, 0.01 * k) <= 10.0
+        noisy = reading(extension=float(generator.normal(0.0, 0.03)), time=0.01 * k)
+        assert 0.0 <= controller.act(noisy, 0.01 * k) <= 10.0
     assert controller.program.limited > 0 and controller.program.failures == 0
 
 

@@ -47,14 +47,14 @@ def test_live_feedforward_gives_the_printed_voltages(task, pressure, station):
 def test_samples_are_joined_or_held(station):
     where = station("displacement", 300)
     volts = printed("displacement", 300)["motor_voltage_v"]
-    joined, held = SerresReplay(), SerresReplay(hold="zero")
-    for replay in (joined, held):
+    linear, held = SerresReplay(), SerresReplay(interpolation="zoh")
+    for replay in (linear, held):
         replay.reset(task_reference(where), where)
-    assert joined.voltage(0.3) == pytest.approx(0.5 * (volts[1] + volts[2]), abs=1e-12)
+    assert linear.voltage(0.3) == pytest.approx(0.5 * (volts[1] + volts[2]), abs=1e-12)
     assert held.voltage(0.3) == volts[1]
     # 3 * 0.2 is above 0.6 and 0.6 below it: neither rounding may lose a sample.
     assert held.voltage(3 * 0.2) == held.voltage(0.6) == volts[3]
-    assert joined.voltage(9.0) == held.voltage(9.0) == volts[-1]
+    assert linear.voltage(9.0) == held.voltage(9.0) == volts[-1]
 
 
 def test_a_period_gets_the_voltage_of_its_middle(station, reading):
@@ -64,9 +64,9 @@ def test_a_period_gets_the_voltage_of_its_middle(station, reading):
     assert replay.act(reading(), 1.0) == replay.voltage(1.005)
 
 
-def test_unknown_hold_is_refused():
-    with pytest.raises(ValueError, match="hold must be one of linear, zero, got 'cubic'"):
-        SerresReplay(hold="cubic")  # type: ignore[arg-type]
+def test_unknown_interpolation_is_refused():
+    with pytest.raises(ValueError, match="interpolation must be 'foh'.*or 'zoh'.*got 'cubic'"):
+        SerresReplay(interpolation="cubic")  # type: ignore[arg-type]
 
 
 def test_replay_names_the_printed_pressures(station):

@@ -242,14 +242,14 @@ SLIPS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "factor", "unit", "mend"),
+    ("name", "factor", "unit", "fix"),
     [(name, *slip) for name, slips in SLIPS.items() for slip in slips],
 )
-def test_a_unit_slip_is_refused_with_its_mend(folder, name, factor, unit, mend):
+def test_a_unit_slip_is_refused_with_its_fix(folder, name, factor, unit, fix):
     write(folder / "ramp.csv", **{name: factor * NORMAL[name]})
     message = refusal(folder)
     assert message.startswith(name) and re.search(r"\(row \d+ of ramp.csv\)", message)
-    assert f"it looks like {unit}" in message and re.search(mend, message)
+    assert f"it looks like {unit}" in message and re.search(fix, message)
     if "write under" in message:
         describe(folder, "[columns]\n" + message.partition("dataset.toml: ")[2])
         assert len(read_dataset(folder)) == 1
@@ -307,10 +307,10 @@ def test_a_broken_file_is_named(folder):
     assert "load_n must hold numbers, row 2 of b.csv has 'n/a'; leave the cell" in refusal(folder)
 
 
-@pytest.mark.parametrize("wild", [-4321.5, 1e6])
-def test_a_unit_is_not_guessed_from_one_reading(folder, wild):
+@pytest.mark.parametrize("outlier", [-4321.5, 1e6])
+def test_a_unit_is_not_guessed_from_one_reading(folder, outlier):
     spoiled = NORMAL["contraction_mm"].copy()
-    spoiled[20] = wild
+    spoiled[20] = outlier
     write(folder / "ramp.csv", contraction_mm=spoiled)
     message = refusal(folder)
     assert re.match(r"contraction_mm is \S+ mm in row 22, beyond the 250 mm that a muscle", message)

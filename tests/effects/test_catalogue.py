@@ -38,6 +38,7 @@ SIGNALS = {
     "signal": (-0.01, 500e3),
     "position": (-1.5, 1.5),
     "drive_force": (-400.0, 400.0),
+    "carried_force": (-400.0, 400.0),
     "travel": (0.0, 30e-6),
     "direction": (1.0, 1.0),
     "cable_tension": (0.0, 1000.0),

@@ -211,10 +211,10 @@ def test_repperger_is_a_polynomial_in_position_and_a_line_in_velocity():
     stiffness = 25.01 + 0.03403 * 300.0 - 0.6378 * 20.0 + 0.005308 * 20.0**2
     assert law(REPPERGER_SPRING)(300.0, 20.0) == pytest.approx(-20.0 * stiffness, rel=1e-12)
     p = REPPERGER_DAMPING.parse(NUMBERS["repperger_damping"])
-    at_rest = 1.79e3 + 1.6 * 300.0
+    rest_force = 1.79e3 + 1.6 * 300.0
     for velocity in (0.1, 0.0, -0.1):
         assert repperger_damping(300e3, velocity, p) == pytest.approx(
-            at_rest + 2e3 * velocity, rel=1e-12
+            rest_force + 2e3 * velocity, rel=1e-12
         )
     assert repperger_damping(300e3, -1e3, p) == 0.0
 

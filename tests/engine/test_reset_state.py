@@ -58,13 +58,13 @@ def test_the_oldest_go_first(drawn, monkeypatch):
 
 
 def test_threads_that_drop_what_others_take_find_the_same(drawn, monkeypatch):
-    alone = begun(*drawn)
+    single = begun(*drawn)
     # Room for one of three: every thread drops what another has just kept.
     monkeypatch.setattr(reset_state, "KEPT", 1)
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda _: begun(*drawn), range(24)))
     for states, zeros in together:
-        assert states.tobytes() == alone[0].tobytes() and zeros.tobytes() == alone[1].tobytes()
+        assert states.tobytes() == single[0].tobytes() and zeros.tobytes() == single[1].tobytes()
     assert len(reset_state._KEPT) == 1
 
 

@@ -138,8 +138,8 @@ def test_pressures_are_the_same_alone_and_among_many(make):
     envs = PMAVectorEnv(len(seeds), pressure_kpa="random")
     envs.reset(seed=seeds)
     env = make(pressure_kpa="random")
-    alone = [env.reset(seed=seed)[1]["pressure_kpa"] for seed in seeds]
-    assert (envs.engine.pressures * 1e-3).tolist() == alone
+    single = [env.reset(seed=seed)[1]["pressure_kpa"] for seed in seeds]
+    assert (envs.engine.pressures * 1e-3).tolist() == single
 
 
 def test_reset_options_set_the_pressure_of_one_episode(make):

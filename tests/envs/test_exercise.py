@@ -235,13 +235,13 @@ def test_scores_are_those_of_the_course(name):
 def test_many_are_as_one(name, threads):
     envs = PMAVectorEnv(19, name, threads=threads, randomisation="varied", history=2)
     together, _ = envs.reset(seed=40)
-    alone = PMAEnv(name, randomisation="varied", history=2)
-    expected, _ = alone.reset(seed=40 + 17)
+    single = PMAEnv(name, randomisation="varied", history=2)
+    expected, _ = single.reset(seed=40 + 17)
     np.testing.assert_array_equal(together[17], expected)
     for k in range(300):
         actions = np.full((19, 1), math.sin(0.05 * k))
         together, rewards, *_ = envs.step(actions)
-        expected, reward, *_, info = alone.step(actions[17])
+        expected, reward, *_, info = single.step(actions[17])
         np.testing.assert_array_equal(together[17], expected)
         assert rewards[17] == reward
     assert envs.station_info()["operator_nm"][17] == info["operator_nm"]
@@ -283,7 +283,7 @@ def test_people_are_drawn_within_their_ranges_and_by_the_seed():
     assert PMAEnv("displacement").operator is None
 
 
-def wild(env: PMAEnv, seed: int) -> dict:
+def adversarial(env: PMAEnv, seed: int) -> dict:
     """The last info of an episode in which the regulator is thrown from end to end."""
     generator = np.random.default_rng(seed)
     env.reset(seed=seed)
@@ -301,7 +301,7 @@ def test_the_safety_layer_keeps_wild_commands_from_harm(name):
     ends = {}
     for safety in (True, False):
         env = PMAEnv(name, safety=safety)
-        ends[safety] = [wild(env, seed)["ended_by"] for seed in range(6)]
+        ends[safety] = [adversarial(env, seed)["ended_by"] for seed in range(6)]
     assert ends[True] == [""] * 6
     assert all("joint" in end for end in ends[False])
 

@@ -102,8 +102,9 @@ def test_threads_and_sb3_have_the_same_rewards():
     assert rewards.min() < 0.0
 
 
-@pytest.mark.parametrize("name", sorted(REWARDS))
-@pytest.mark.parametrize("scale", [1e-3, 0.5, 7, np.float64(2.0)])
+@pytest.mark.parametrize(
+    ("name", "scale"), [*zip(sorted(REWARDS), [1e-3, 0.5, 7, np.float64(2.0)], strict=True)]
+)
 def test_a_scale_multiplies_every_reward(fragile, name, scale):
     made = {**MADE, "model": fragile, "reward": name}
     plain = rewards_of(PMAEnv(**made))

@@ -106,7 +106,7 @@ def test_states_are_immutable_and_share_nothing(single, course):
 
 @pytest.mark.parametrize(
     ("form", "randomisation"),
-    [("value", "none"), ("value", "varied"), ("pickle", "varied"), ("json", "none")],
+    [("value", "none"), ("pickle", "varied"), ("json", "none")],
 )
 def test_a_batch_goes_on_from_its_state(form, batch_options, randomisation, batch_course, same):
     made = batch_options | {"randomisation": randomisation}

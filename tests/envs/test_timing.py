@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 
 from pma_gym.metrics import PHASE_SAMPLES, phase_times, rmse
+from pma_gym.plant.model import shipped_models
 from pma_gym.plant.plant import Plant
 
 # A period that floats hold exactly, so that sums of it are exact too.
 EXACT_RATE = 128.0
 
 
-@pytest.mark.parametrize("task", ["displacement", "rotation"])
+@pytest.mark.parametrize(
+    ("model", "task"),
+    [*((name, "displacement") for name in sorted(shipped_models())), ("station", "rotation")],
+)
 def test_states_are_those_of_the_plant_under_the_held_voltages(make, task, model):
     env = make(task, model=model, control_rate_hz=EXACT_RATE)
     env.reset(seed=1)

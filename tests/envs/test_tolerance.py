@@ -59,10 +59,10 @@ def test_a_batch_has_the_bits_of_one(make, randomisation):
     both, _ = many.reset(seed=7)
     np.testing.assert_array_equal(first, both[0])
     for action in np.random.default_rng(0).uniform(-1.0, -0.4, (40, 1)).astype(np.float32):
-        alone = one.step(action)
+        single = one.step(action)
         together = many.step(np.tile(action, (5, 1)))
-        np.testing.assert_array_equal(alone[0], together[0][0])
-        assert alone[1] == together[1][0]
+        np.testing.assert_array_equal(single[0], together[0][0])
+        assert single[1] == together[1][0]
 
 
 def test_it_compiles_nothing_anew(make):

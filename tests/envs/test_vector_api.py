@@ -133,12 +133,12 @@ def test_what_is_returned_stays_as_it_was(batch):
 
 
 def test_closed_threads_come_back_when_they_are_needed(batch):
-    envs, alone = batch(40, threads=3), batch(40)
-    for one in (envs, alone):
+    envs, serial = batch(40, threads=3), batch(40)
+    for one in (envs, serial):
         one.reset(seed=0)
     envs.close()
     for _ in range(5):
-        results = [one.step(np.full((40, 1), -0.4)) for one in (envs, alone)]
+        results = [one.step(np.full((40, 1), -0.4)) for one in (envs, serial)]
         np.testing.assert_array_equal(results[0][0], results[1][0])
 
 

@@ -170,20 +170,20 @@ def test_many_trials_are_fitted_to_a_few_of_them_first():
 
 
 def test_what_was_not_measured_counts_for_nothing(fitted, measured):
-    poor = []
+    uninformative = []
     for trial in measured:
         load = trial.measurements["load"].copy()
         load[100:200] = np.nan
         # An amplifier at its end says only that the load lies beyond.
         load[300] = calibration.LOAD_CELL.from_volts(calibration.DAQ_LIMIT - calibration.DAQ_STEP)
         kept = {"contraction": trial.measurements["contraction"], "load": load}
-        poor.append(Trial(trial.time, trial.commands, kept))
-    some = Residuals(OFF, poor, FREE)
+        uninformative.append(Trial(trial.time, trial.commands, kept))
+    some = Residuals(OFF, uninformative, FREE)
     assert some.count == 6 * (2 * 1152 - 101)
     for estimate in some.each(some.start):
         assert np.all(estimate[:, [1, 3]] == 0.0) and np.all(estimate[100:200, 2] == 0.0)
         assert estimate[300, 2] == 0.0
-    estimate = fit(OFF, poor, FREE[:3])
+    estimate = fit(OFF, uninformative, FREE[:3])
     assert estimate.converged
 
 

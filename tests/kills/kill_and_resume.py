@@ -37,7 +37,7 @@ class Losses:
         lost: finished cases that were gone after a kill or at the next one.
         twice: finished cases that were computed again.
         different: results that were not those of the undisturbed run.
-        leftovers: partial files that stayed after a run had ended.
+        partial_files: partial files that stayed after a run had ended.
         failed: runs that ended with an error, with its last line.
     """
 
@@ -47,20 +47,20 @@ class Losses:
     lost: list[str] = field(default_factory=list)
     twice: list[str] = field(default_factory=list)
     different: list[str] = field(default_factory=list)
-    leftovers: list[str] = field(default_factory=list)
+    partial_files: list[str] = field(default_factory=list)
     failed: list[str] = field(default_factory=list)
 
     @property
     def count(self) -> int:
         """How many things went wrong."""
-        lists = (self.lost, self.twice, self.different, self.leftovers, self.failed)
+        lists = (self.lost, self.twice, self.different, self.partial_files, self.failed)
         return sum(map(len, lists))
 
     def __str__(self) -> str:
         return (
             f"{self.kills} kills ({self.terminated} by SIGTERM), {self.rounds} runs ended; lost "
             f"{len(self.lost)}, computed twice {len(self.twice)}, different results "
-            f"{len(self.different)}, leftovers {len(self.leftovers)}, failed {len(self.failed)}"
+            f"{len(self.different)}, leftovers {len(self.partial_files)}, failed {len(self.failed)}"
         )
 
 
@@ -154,7 +154,7 @@ class Killer:
         for name in sorted(final.keys() | self.undisturbed.keys()):
             if final.get(name) != self.undisturbed.get(name):
                 self.losses.different.append(f"{command.folder}: {name}")
-        self.losses.leftovers += map(str, command.folder.rglob("*.partial"))
+        self.losses.partial_files += map(str, command.folder.rglob("*.partial"))
 
 
 def start(command: Command) -> subprocess.Popen[bytes]:

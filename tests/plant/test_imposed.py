@@ -16,13 +16,8 @@ SINE = 0.5 * (1.0 - np.cos(2.0 * np.pi * TIME))
 BACK = (TIME > 1.5) & (TIME < 2.0)
 """Readings of a whole way back, with the motion at its end at 1.5 s."""
 
-FRICTION = {
-    "static_n": 10.0,
-    "dynamic_n": 10.0,
-    "stribeck_speed_mm_per_s": 5.0,
-    "presliding_um": 100.0,
-}
-NEUTRAL = ("constant_force", "pressure_friction", "cogging", "backlash")
+FRICTION = {"force_n": 10.0, "presliding_um": 100.0}
+NEUTRAL = ("contact_friction", "constant_force", "pressure_friction", "cogging", "backlash")
 
 
 def imposed(**tables):
@@ -81,7 +76,7 @@ def test_a_muscle_pulls_by_its_own_laws(pressure):
 
 @pytest.mark.parametrize("stroke", [0.005, 0.02])
 def test_a_loop_of_dry_friction_has_its_area(stroke):
-    got = force(imposed(coulomb_friction=FRICTION), stroke)
+    got = force(imposed(contact_friction=FRICTION), stroke)
     last = slice(500, 750)
     area = -np.trapezoid(got[last], stroke * SINE[last])
     # A corner at either end: the integral of 1 - z over a turn, 2.015 presliding distances.
@@ -90,7 +85,7 @@ def test_a_loop_of_dry_friction_has_its_area(stroke):
 
 @pytest.mark.parametrize("stroke", [0.01, 0.02])
 def test_backlash_is_the_same_way_without_force_at_every_amplitude(stroke):
-    got = force(imposed(coulomb_friction=FRICTION, backlash={"width_mm": 3.0}), stroke)
+    got = force(imposed(contact_friction=FRICTION, backlash={"width_mm": 3.0}), stroke)
     way = stroke * (1.0 - SINE)
     free = np.abs(got) < 1e-6
     lost = way[BACK & free]
@@ -102,7 +97,7 @@ def test_backlash_is_the_same_way_without_force_at_every_amplitude(stroke):
 @pytest.mark.parametrize("pressure", [0.0, 100e3, 700e3])
 def test_half_the_loop_grows_with_pressure(pressure):
     seal = {"slope_n_per_kpa": 0.0055, "presliding_um": 100.0}
-    got = force(imposed(coulomb_friction=FRICTION, pressure_friction=seal), 0.02, pressure)
+    got = force(imposed(contact_friction=FRICTION, pressure_friction=seal), 0.02, pressure)
     half = 0.5 * (got[BACK & (SINE < 0.9)].mean() - got[(TIME < 0.45) & (TIME > 0.1)].mean())
     assert half == pytest.approx(10.0 + 0.0055e-3 * pressure, rel=1e-3)
 
@@ -115,7 +110,7 @@ def test_forces_of_position_and_of_nothing_add():
 
 
 def test_neutral_effects_are_absent_to_the_last_bit():
-    bare = imposed(coulomb_friction=FRICTION)
+    bare = imposed(contractile_force={"slope_n_per_kpa": 0.49, "intercept_n": 3.0})
     neutral = {name: CATALOGUE[name].neutral for name in NEUTRAL}
     whole = Model("imposed", "", "imposed", {**bare.parameters, **neutral})
     np.testing.assert_array_equal(force(bare, 0.02, 3e5), force(whole, 0.02, 3e5))
@@ -151,18 +146,17 @@ def test_a_log_without_a_motion_is_refused_with_its_column():
 
 def test_a_fit_gives_back_what_a_seal_does():
     true = imposed(
-        coulomb_friction=FRICTION,
+        contact_friction=FRICTION,
         contractile_force={"slope_n_per_kpa": 0.49, "intercept_n": 3.0},
         force_sensor={"bandwidth_hz": 1000.0, "noise_n": 0.2},
     )
     measured = [Plant(true).simulate(trial(0.02, p), seed=1) for p in (100e3, 300e3)]
     off = {
-        "coulomb_friction.dynamic_n": 6.0,
+        "contact_friction.force_n": 6.0,
         "contractile_force.slope_n_per_kpa": 0.3,
         "contractile_force.intercept_n": 0.0,
     }
-    tied = {"coulomb_friction.static_n": 10.0}
-    values = fit(true.replace({**off, **tied}), measured, list(off)).values
-    assert values["coulomb_friction.dynamic_n"] == pytest.approx(10.0, rel=0.01)
+    values = fit(true.replace(off), measured, list(off)).values
+    assert values["contact_friction.force_n"] == pytest.approx(10.0, rel=0.01)
     assert values["contractile_force.slope_n_per_kpa"] == pytest.approx(0.49, rel=0.005)
     assert values["contractile_force.intercept_n"] == pytest.approx(3.0, abs=0.2)

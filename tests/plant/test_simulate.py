@@ -68,8 +68,8 @@ def test_uneven_times_lie_on_the_same_trajectory(plant):
 def test_held_commands_come_later_than_joined_ones(plant):
     coarse = np.linspace(0.0, 1.0, 6)
     ramp = trial(coarse, motor_voltage=1.0 + 3.0 * coarse, regulator_voltage=6.0)
-    joined, held = (plant.simulate(ramp, noise=False, interpolation=how) for how in ("foh", "zoh"))
-    assert np.all(held.truth["extension"][1:] < joined.truth["extension"][1:])
+    linear, held = (plant.simulate(ramp, noise=False, interpolation=how) for how in ("foh", "zoh"))
+    assert np.all(held.truth["extension"][1:] < linear.truth["extension"][1:])
     staircase = 1.0 + 3.0 * np.floor(np.linspace(0.0, 0.9999, 2001) * 5.0) / 5.0
     fine = np.linspace(0.0, 1.0, 2001)
     stepped = plant.simulate(

@@ -20,7 +20,7 @@ import numpy as np
 
 from benchmarks.exercise.lag.causal import Causal, causal_bounds
 from benchmarks.exercise.lag.foreknown import foreknown_course, retimed
-from benchmarks.exercise.lag.rehearsal import LAG, NO_LAG, Course, Exertion, own_floor
+from benchmarks.exercise.lag.repeated_exercise import LAG, NO_LAG, Course, Exertion, own_floor
 from benchmarks.exercise.lag.swing import Swing, swings
 from pma_gym.engine.option_checks import Pressure
 from pma_gym.plant.model import Model, load_model

@@ -33,7 +33,7 @@ from scipy.linalg import block_diag, expm, solve_discrete_are, solve_discrete_ly
 from scipy.optimize import brentq
 
 from benchmarks.exercise.lag.points import Point, Rates, points, rates
-from benchmarks.exercise.lag.rehearsal import LAG, NO_LAG, RATE_HZ
+from benchmarks.exercise.lag.repeated_exercise import LAG, NO_LAG, RATE_HZ
 from pma_gym.plant.model import Model
 from pma_gym.tasks import EVERY_TASK, Operator
 from pma_gym.tasks.operator import WANDER_S

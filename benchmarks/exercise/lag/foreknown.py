@@ -1,7 +1,7 @@
 """How closely an exercise can be done by who knows the operator's whole course beforehand.
 
-The regulator's voltages of all control steps, v in 0-10 V, are rehearsed with the very operator
-and the very station (`benchmarks.exercise.lag.rehearsal`), and improved by Gauss and Newton's way:
+The regulator's voltages of all control steps, v in 0-10 V, are tried with the very operator
+and the very station (`benchmarks.exercise.lag.repeated_exercise`), and improved by Gauss-Newton:
 
     d = argmin |e + J d|^2 + mu |d|^2,   0 <= v + d <= 10
 
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from scipy.linalg import solve
 from scipy.signal import lfilter
 
-from benchmarks.exercise.lag.rehearsal import RATE_HZ, Course, Exertion, Rehearsals
+from benchmarks.exercise.lag.repeated_exercise import RATE_HZ, Course, Exertion, RepeatedExercise
 from pma_gym.engine.actions import HIGHEST_VOLTAGE
 from pma_gym.engine.reset.operators import ANGLES
 from pma_gym.plant.exercise_device.device import own_device
@@ -68,7 +68,7 @@ def foreknown_course(
     Raises:
         ValueError: a limit ends the exercise with each of them.
     """
-    few = Rehearsals(exertion, len(DAMPINGS) * len(SHARES))
+    few = RepeatedExercise(exertion, len(DAMPINGS) * len(SHARES))
     tried = [few.course(voltages) for voltages in (*prescribed(few), *starts)]
     best = min(tried, key=lambda course: course.cost)
     if not np.isfinite(best.cost):
@@ -78,11 +78,11 @@ def foreknown_course(
             "give others as starts"
         )
     for block in blocks:
-        best = _polished(best, few, Rehearsals(exertion, -(-few.steps // block)), block)
+        best = _polished(best, few, RepeatedExercise(exertion, -(-few.steps // block)), block)
     return best
 
 
-def prescribed(few: Rehearsals) -> list[NDArray[np.float64]]:
+def prescribed(few: RepeatedExercise) -> list[NDArray[np.float64]]:
     """Voltages that any search may begin with (V), shape (steps,) each.
 
     The one that holds the pressure that the exercise begins at; and where a moment is prescribed
@@ -102,7 +102,7 @@ def prescribed(few: Rehearsals) -> list[NDArray[np.float64]]:
     return [constant, np.clip((pressures - line.offset) / line.gain, 0.0, HIGHEST_VOLTAGE)]
 
 
-def _polished(best: Course, few: Rehearsals, many: Rehearsals, block: int) -> Course:
+def _polished(best: Course, few: RepeatedExercise, many: RepeatedExercise, block: int) -> Course:
     """Improved until no phase gets better any more."""
     for _ in range(MOST_ITERATIONS):
         before, best = best, _improved(best, few, many, block)
@@ -112,7 +112,7 @@ def _polished(best: Course, few: Rehearsals, many: Rehearsals, block: int) -> Co
     return best
 
 
-def _improved(best: Course, few: Rehearsals, many: Rehearsals, block: int) -> Course:
+def _improved(best: Course, few: RepeatedExercise, many: RepeatedExercise, block: int) -> Course:
     """The best of several changes of the voltages, or what there was."""
     slope = _slope(best, many, block)
     tried = [
@@ -128,7 +128,7 @@ def _improved(best: Course, few: Rehearsals, many: Rehearsals, block: int) -> Co
     return Course(tried[chosen], runs.error[:, chosen], by_phase, best.iterations + 1)
 
 
-def _slope(best: Course, many: Rehearsals, block: int) -> NDArray[np.float64]:
+def _slope(best: Course, many: RepeatedExercise, block: int) -> NDArray[np.float64]:
     """J: change of the error by every block's voltage, shape (steps, blocks); 0 beyond an end."""
     columns = np.arange(many.steps) // block
     signs = np.where(best.voltages[::block] > 0.5 * HIGHEST_VOLTAGE, -PROBE_V, PROBE_V)

@@ -1,1 +1,1 @@
-"""How often wild commands hurt an operator, with the safety layer and without."""
+"""How often adversarial commands hurt an operator, with the safety layer and without."""

@@ -42,8 +42,8 @@ def _end(generator: np.random.Generator, steps: int, period: float) -> Volts:
 
 
 def _wandering(generator: np.random.Generator, steps: int, period: float) -> Volts:
-    ways = generator.normal(0.0, WANDER_V * np.sqrt(period), steps)
-    return np.clip(generator.uniform(0.0, HIGHEST_V) + np.cumsum(ways), 0.0, HIGHEST_V)
+    moves = generator.normal(0.0, WANDER_V * np.sqrt(period), steps)
+    return np.clip(generator.uniform(0.0, HIGHEST_V) + np.cumsum(moves), 0.0, HIGHEST_V)
 
 
 PLANNED: dict[str, Callable[[np.random.Generator, int, float], Volts]] = {

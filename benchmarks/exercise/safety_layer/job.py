@@ -54,9 +54,9 @@ def run_safety(
     safety = Safety(seed, tallies)
     shown = safety_table(safety)
     console.print(terminal_table(shown), "")
-    console.print(safety_words(safety), highlight=False)
+    console.print(safety_text(safety), highlight=False)
     write_text(out / FIGURES, json.dumps(safety.to_json(), indent=1) + "\n")
-    write_text(out / "safety.md", f"{to_markdown([shown], {}, '')}\n{safety_words(safety)}\n")
+    write_text(out / "safety.md", f"{to_markdown([shown], {}, '')}\n{safety_text(safety)}\n")
     console.print(f"Figures: {out / FIGURES}", highlight=False)
     return safety
 
@@ -90,7 +90,7 @@ def _cells(tally: Tally) -> list[str]:
     return [name, tally.stations, tally.agent, f"{tally.episodes}", f"{tally.violations}", *peaks]
 
 
-def safety_words(safety: Safety) -> str:
+def safety_text(safety: Safety) -> str:
     """The whole in a sentence or two."""
     episodes, violations, most = safety.total(True)
     bare, broken, _ = safety.total(False)

@@ -19,28 +19,37 @@ TRAINING_SEED = 7001
 """Of the cases that the forest learns from; no set that is judged has it."""
 
 
+def _old_name(names: str) -> str:
+    """Warn of an option that has another name now."""
+    if names:
+        typer.echo("warning: --ways is now --baselines; use that name", err=True)
+    return names
+
+
 @app.command()
 def run(
     cases: Annotated[Path, typer.Option(help="Folder that `draw` or `take` wrote.", exists=True)],
-    ways: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
+    baselines: Annotated[str, typer.Option(help="By commas; all if empty.")] = "",
+    old_baselines: Annotated[str, typer.Option("--ways", hidden=True, callback=_old_name)] = "",
     jobs: Jobs = 1,
-    seed: Annotated[int, typer.Option(help="Of the ways' own chance.")] = 0,
+    seed: Annotated[int, typer.Option(help="Of what a baseline draws.")] = 0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Figures to a file.")] = None,
 ) -> None:
-    """Ask the ways about every case that they have not answered, and print one table."""
+    """Run the baselines on every case that they have not answered, and print one table."""
     import json
 
     from benchmarks.hidden_effects.baselines import forest
     from benchmarks.hidden_effects.baselines.answers import ask_all
     from benchmarks.hidden_effects.baselines.comparison import compared, table
-    from benchmarks.hidden_effects.baselines.registry import WAYS
+    from benchmarks.hidden_effects.baselines.registry import BASELINES
     from pma_gym.files import replace_file
 
-    chosen = [name for name in ways.split(",") if name] or list(WAYS)
+    chosen = [name for name in (baselines or old_baselines).split(",") if name] or list(BASELINES)
     for name in chosen:
-        if name not in WAYS:
-            raise typer.BadParameter(f"{name!r} is none of {', '.join(WAYS)}", param_hint="--ways")
-    left_out = {name: WAYS[name].absence for name in chosen if WAYS[name].absence}
+        if name not in BASELINES:
+            known = ", ".join(BASELINES)
+            raise typer.BadParameter(f"{name!r} is none of {known}", param_hint="--baselines")
+    left_out = {name: BASELINES[name].absence for name in chosen if BASELINES[name].absence}
     chosen = [name for name in chosen if name not in left_out]
     if "random_forest" in chosen:
         try:
@@ -50,7 +59,7 @@ def run(
     ask_all(cases, chosen, jobs, seed)
     document = compared(cases, chosen)
     if json_file is not None:
-        text = json.dumps({"ways": document, "left_out": left_out}, indent=1) + "\n"
+        text = json.dumps({"baselines": document, "left_out": left_out}, indent=1) + "\n"
         replace_file(json_file, text.encode())
     typer.echo(table(document, left_out))
 

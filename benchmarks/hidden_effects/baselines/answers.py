@@ -1,4 +1,4 @@
-"""Drawn cases through every way; an answer that is there is kept, so that a run goes on."""
+"""Drawn cases through every baseline; an answer that is there is kept, so that a run goes on."""
 
 import itertools
 import json
@@ -13,52 +13,52 @@ from typing import Any
 
 from benchmarks.executors.choice import local
 from benchmarks.executors.executor import run_or_raise
-from benchmarks.hidden_effects.baselines.registry import WAYS
+from benchmarks.hidden_effects.baselines.registry import BASELINES
 from pma_gym.data.datasets.dataset import read_dataset
 from pma_gym.files import replace_file
 
 
 @dataclass(frozen=True)
 class Question:
-    """One case for one way.
+    """One case for one baseline.
 
     Attributes:
-        way: name of the way.
+        baseline: name of the baseline.
         case: folder of the case's trials.
         file: where the answer goes.
     """
 
-    way: str
+    baseline: str
     case: Path
     file: Path
 
 
-def open_questions(folder: Path, ways: Sequence[str]) -> tuple[list[Question], int]:
+def open_questions(folder: Path, baselines: Sequence[str]) -> tuple[list[Question], int]:
     """What has no answer yet in a folder that `draw` wrote, and how many questions there are."""
     cases = sorted((folder / "cases").glob("case_*"))
-    every = [Question(way, case, answer_file(folder, way, case.name))
-             for case in cases for way in ways]  # fmt: skip
+    every = [Question(baseline, case, answer_file(folder, baseline, case.name))
+             for case in cases for baseline in baselines]  # fmt: skip
     return [each for each in every if not each.file.is_file()], len(every)
 
 
-def answer_file(folder: Path, way: str, case: str) -> Path:
-    """Where a way's answer about a case is kept."""
-    return folder / "answers" / way / f"{case}.json"
+def answer_file(folder: Path, baseline: str, case: str) -> Path:
+    """Where a baseline's answer about a case is kept."""
+    return folder / "answers" / baseline / f"{case}.json"
 
 
-def ask_all(folder: Path, ways: Sequence[str], jobs: int, seed: int = 0) -> None:
-    """Ask every way about every case that it has not answered; answers go to folder/answers/WAY.
+def ask_all(folder: Path, baselines: Sequence[str], jobs: int, seed: int = 0) -> None:
+    """Run each baseline on the cases that it has not answered; answers go to folder/answers/NAME.
 
     Args:
         folder: what `draw` wrote.
-        ways: names of ways that are installed.
+        baselines: names of baselines that are installed.
         jobs: processes.
-        seed: of the ways' own chance.
+        seed: of what a baseline draws.
     """
-    missing, count = open_questions(folder, ways)
+    missing, count = open_questions(folder, baselines)
     print(f"{count - len(missing)} of {count} answers are there already", file=sys.stderr)
-    for way in ways:
-        (folder / "answers" / way).mkdir(parents=True, exist_ok=True)
+    for baseline in baselines:
+        (folder / "answers" / baseline).mkdir(parents=True, exist_ok=True)
     begun, done = time.monotonic(), itertools.count(1)
 
     def tell(_: int, words: str) -> None:
@@ -74,13 +74,13 @@ def ask(question: Question, seed: int) -> str:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            answer = dict(WAYS[question.way].ask(read_dataset(question.case), seed, 1))
+            answer = dict(BASELINES[question.baseline].ask(read_dataset(question.case), seed, 1))
     except Exception as error:
-        # A way that fails has no answer, and that counts.
+        # A baseline that fails has no answer, and that counts.
         answer = {"error": f"{type(error).__name__}: {error}"}
     answer["seconds"] = round(time.perf_counter() - begun, 3)
     replace_file(question.file, (json.dumps(answer, indent=1) + "\n").encode())
-    return f"{question.case.name} {question.way}: {_said(answer)}"
+    return f"{question.case.name} {question.baseline}: {_said(answer)}"
 
 
 def _said(answer: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""The table of all ways: rates on the same cases, with Wilson's intervals."""
+"""The table of all baselines: rates on the same cases, with Wilson's intervals."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.hidden_effects.baselines.answers import answer_file
-from benchmarks.hidden_effects.baselines.registry import WAYS
+from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.evaluation.scoring import rate
 from benchmarks.hidden_effects.evaluation.verdicts import Outcome, compare
 from pma_gym.documents import read_json
@@ -27,16 +27,16 @@ COLUMNS = (
 that hide one which no catalogue has."""
 
 
-def compared(folder: Path, ways: Sequence[str]) -> dict[str, Any]:
-    """Figures of each way that has answered, over the cases of a folder."""
-    return {way: figures(*outcomes(folder, way)) for way in ways}
+def compared(folder: Path, baselines: Sequence[str]) -> dict[str, Any]:
+    """Figures of each baseline that has answered, over the cases of a folder."""
+    return {baseline: figures(*outcomes(folder, baseline)) for baseline in baselines}
 
 
-def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
-    """A way's outcomes, and the cases about which it has said nothing."""
+def outcomes(folder: Path, baseline: str) -> tuple[list[Outcome], list[str]]:
+    """A baseline's outcomes, and the cases about which it has said nothing."""
     answered, silent = [], []
     for path in sorted((folder / "truth").glob("case_*.json")):
-        file = answer_file(folder, way, path.stem)
+        file = answer_file(folder, baseline, path.stem)
         answer: dict[str, Any] = (
             read_json(file, "journal_mib", own=True, finite=False)
             if file.is_file()
@@ -52,7 +52,7 @@ def outcomes(folder: Path, way: str) -> tuple[list[Outcome], list[str]]:
 
 
 def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:
-    """Rates of one way."""
+    """Rates of one baseline."""
     single = [each for each in some if each.block.startswith("single")]
     nothing = [each for each in some if each.block == "nothing"]
     parameters = [each for each in some if each.block == "parameters"]
@@ -77,20 +77,22 @@ def figures(some: Sequence[Outcome], silent: Sequence[str]) -> dict[str, Any]:
 
 
 def table(document: dict[str, Any], left_out: dict[str, str]) -> str:
-    """The figures as text: a block a column of rates, a line a way."""
+    """The figures as text: a block a column of rates, a line a baseline."""
     lines = []
     for column in COLUMNS:
-        some = {way: each["rates"][column] for way, each in document.items()}
+        some = {baseline: each["rates"][column] for baseline, each in document.items()}
         if not any(figure["n"] for figure in some.values()):
             continue
-        lines += [column, *(f"  {WAYS[way].title:34s}{_shown(f)}" for way, f in some.items()), ""]
+        rows = (f"  {BASELINES[name].title:34s}{_shown(f)}" for name, f in some.items())
+        lines += [column, *rows, ""]
     lines.append("median seconds a case")
-    for way, each in document.items():
+    for baseline, each in document.items():
         seconds = "no answer" if each["seconds"] is None else f"{each['seconds']:.1f}"
-        lines.append(f"  {WAYS[way].title:34s}{seconds}")
-    for way, each in document.items():
-        lines += [f"{WAYS[way].title}: no answer to {words}" for words in each["unanswered"]]
-    lines += [f"{WAYS[way].title}: left out, {words}" for way, words in left_out.items()]
+        lines.append(f"  {BASELINES[baseline].title:34s}{seconds}")
+    for baseline, each in document.items():
+        title = BASELINES[baseline].title
+        lines += [f"{title}: no answer to {words}" for words in each["unanswered"]]
+    lines += [f"{BASELINES[name].title}: left out, {words}" for name, words in left_out.items()]
     return "\n".join(lines)
 
 

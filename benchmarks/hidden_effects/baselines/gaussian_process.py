@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.baselines.preparation import answer, moved, prepare
-from benchmarks.hidden_effects.baselines.signatures import courses, means, ticks, within
+from benchmarks.hidden_effects.baselines.signatures import courses, means, time_bins, within
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.plant.rigs import RIGS
 
@@ -31,7 +31,7 @@ CONDITIONS = (
 )
 """What the residual may depend on; names of `signatures.courses`."""
 
-MOST_TICKS = 200
+MOST_BINS = 200
 """Ticks that a process learns from, evenly out of all: its cost grows with the cube."""
 
 EXPLAINED = 0.05
@@ -41,7 +41,7 @@ EXPLAINED = 0.05
 def gaussian_process(dataset: Dataset, seed: int, jobs: int) -> Mapping[str, Any]:
     """`unknown` where a signal's residual can be foretold."""
     ready = prepare(dataset, jobs)
-    some = ticks(ready)
+    some = time_bins(ready)
     along = courses(some)
     conditions = np.stack([along[name] for name in CONDITIONS] + [some.pressure], axis=1)
     spread = conditions.std(axis=0)
@@ -74,7 +74,7 @@ def explained(conditions: Array, left: Array, trial: Array, seed: int) -> float:
     if scale == 0.0:
         return 0.0
     every = left / scale
-    few = np.linspace(0, len(left) - 1, min(MOST_TICKS, len(left))).astype(int)
+    few = np.linspace(0, len(left) - 1, min(MOST_BINS, len(left))).astype(int)
     width = 2.0 * np.ones(conditions.shape[1])
     # Scikit-learn takes a width a column and no optimizer, as it says, but not as its types do.
     smooth = RBF(width, (0.2, 1e2))  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What every way starts from: a data set beside its model, whose own parameters are refitted."""
+"""What baselines start from: a data set beside its model, whose own parameters are refitted."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

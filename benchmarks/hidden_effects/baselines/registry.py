@@ -1,4 +1,4 @@
-"""The ways by name."""
+"""The baselines by name."""
 
 import importlib.util
 from collections.abc import Callable, Mapping
@@ -15,8 +15,8 @@ _HERE = "benchmarks.hidden_effects.baselines"
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way to diagnose.
+class Baseline:
+    """A diagnosis that ours is compared with.
 
     Attributes:
         title: for readers.
@@ -43,17 +43,19 @@ class Way:
         return getattr(import_module(f"{_HERE}.{module}"), name)
 
 
-WAYS: dict[str, Way] = {
-    "ours": Way("ours", "ablations:ours"),
-    "no_whitening": Way("ours without whitening", "ablations:no_whitening"),
-    "no_refit": Way("ours without parameter refit", "ablations:no_refit"),
-    "no_gate": Way("ours without the resampled gate", "ablations:no_gate"),
-    "bic_stepwise": Way("plain BIC stepwise", "stepwise:bic_stepwise"),
-    "sparse_regression": Way("PySINDy on the residual", "sparse:sparse_regression", ("pysindy",)),
-    "gaussian_process": Way(
+BASELINES: dict[str, Baseline] = {
+    "ours": Baseline("ours", "ablations:ours"),
+    "no_whitening": Baseline("ours without whitening", "ablations:no_whitening"),
+    "no_refit": Baseline("ours without parameter refit", "ablations:no_refit"),
+    "no_gate": Baseline("ours without the resampled gate", "ablations:no_gate"),
+    "bic_stepwise": Baseline("plain BIC stepwise", "stepwise:bic_stepwise"),
+    "sparse_regression": Baseline(
+        "PySINDy on the residual", "sparse:sparse_regression", ("pysindy",)
+    ),
+    "gaussian_process": Baseline(
         "a Gaussian process only", "gaussian_process:gaussian_process", ("sklearn",)
     ),
-    "random_forest": Way(
+    "random_forest": Baseline(
         "a random forest on signatures", "forest:random_forest", ("sklearn",)
     ),
 }  # fmt: skip

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects.baselines.preparation import Prepared
-from pma_gym.discovery.screening.time_bins import BIN_S, TimeBins, time_bins
+from pma_gym.discovery.screening.time_bins import BIN_S, TimeBins
+from pma_gym.discovery.screening.time_bins import time_bins as padded_bins
 from pma_gym.plant.rigs import RIGS
 
 Array = NDArray[np.float64]
@@ -24,15 +25,15 @@ FAST_MM_S, HIGH_KPA = 10.0, 372.0
 """A speed above which motion is fast, and the pressure at which the muscle's damping changes."""
 
 
-def ticks(ready: Prepared) -> TimeBins:
-    """All trials in ticks of 50 ms, without padding."""
-    bins = time_bins(ready.whitened.logged, ready.readings, ready.left)
+def time_bins(ready: Prepared) -> TimeBins:
+    """All trials in bins of 50 ms, without padding."""
+    bins = padded_bins(ready.whitened.logged, ready.readings, ready.left)
     there = np.isfinite(bins.order)
     return TimeBins(**{name: each[..., there] for name, each in vars(bins).items()})
 
 
 def means(some: TimeBins) -> Array:
-    """Mean residual of each signal in each tick, in units of the noise, shape (4, n)."""
+    """Mean residual of each signal in each bin, in units of the noise, shape (4, n)."""
     return some.total / np.maximum(some.counts, 1.0)
 
 
@@ -85,7 +86,7 @@ def courses(some: TimeBins) -> dict[str, Array]:
 
 def signature(ready: Prepared) -> dict[str, float]:
     """The numbers, by name; the same names for every data set."""
-    some = ticks(ready)
+    some = time_bins(ready)
     values = {f"step of {name}": step for name, step in _steps(ready).items()}
     across, along = regions(some), courses(some)
     left = means(some)

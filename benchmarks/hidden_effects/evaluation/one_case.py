@@ -31,7 +31,7 @@ class Work:
     code: str = ""
     judge: Judge = diagnosed
 
-    def __call__(self) -> records.Record:
+    def __call__(self) -> records.CaseRecord:
         """Do it."""
         begun = time.perf_counter()
         case = self.block.draw(self.seed, self.number)
@@ -49,7 +49,7 @@ class Work:
             rounds = follow(case, answer, self.block.rounds, self.judge)
         ends = {"draw": drawn - begun, "diagnose": answered - drawn}
         ends["rounds"] = time.perf_counter() - answered
-        return records.Record(
+        return records.CaseRecord(
             self.number,
             case.truth,
             answer.document and records.essentials(answer.document),

@@ -20,7 +20,7 @@ ESSENTIALS = ("verdict", "sentence", "effects", "gap", "not_identifiable", "blin
 
 
 @dataclass(frozen=True)
-class Record:
+class CaseRecord:
     """A case that was drawn and judged.
 
     Attributes:
@@ -44,7 +44,7 @@ class Record:
     most_rounds: int = 0
 
 
-_SHAPE = shape_of(Record)
+_SHAPE = shape_of(CaseRecord)
 
 
 def essentials(document: Mapping[str, Any]) -> dict[str, Any]:
@@ -57,19 +57,19 @@ def essentials(document: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def write(record: Record, folder: Path) -> None:
+def write(record: CaseRecord, folder: Path) -> None:
     """Keep a record in a folder; its file appears whole or not at all."""
     text = json.dumps(asdict(record), indent=1, allow_nan=False) + "\n"
     write_text(path_of(folder, record.number), text)
 
 
-def read(folder: Path, count: int | None = None) -> list[Record]:
+def read(folder: Path, count: int | None = None) -> list[CaseRecord]:
     """Records of a folder, cases 1 to `count`, all if not given, by number."""
     if count is None:
         paths = sorted((folder / "cases").glob("case_*.json"))
     else:
         paths = [path_of(folder, number) for number in range(1, count + 1)]
-    records, damaged = list[Record](), list[str]()
+    records, damaged = list[CaseRecord](), list[str]()
     for path in paths:
         if not path.is_file():
             continue
@@ -78,7 +78,7 @@ def read(folder: Path, count: int | None = None) -> list[Record]:
             check_shape(entry, _SHAPE)
             if path != path_of(folder, entry["number"]):
                 raise ValueError(f"it is of case {entry['number']}")
-            records.append(Record(**entry))
+            records.append(CaseRecord(**entry))
         except (ValueError, TypeError) as error:
             why = f"{error}".replace(f"{path} ", "").removesuffix("; write it anew")
             damaged.append(f"{path.name}: {why}")

@@ -1,7 +1,7 @@
 """Experiments that follow: what the diagnosis proposes, or a random one as long, on the same rig.
 
 A round carries the experiment out on the case's rig, with new noise of the same kind, adds the
-trial to the data set and asks again. A way ends when an effect is named, rightly or not, or when
+trial to the data set and asks again. It ends when an effect is named, rightly or not, or when
 the diagnosis no longer asks for an experiment.
 """
 
@@ -17,14 +17,14 @@ from benchmarks.hidden_effects.generation.cases import Case, measure
 from benchmarks.hidden_effects.generation.experiment_library import Volts, random_experiment
 from benchmarks.hidden_effects.physics.simulation import RATE
 
-WAYS = ("proposed", "random")
+CHOOSERS = ("proposed", "random")
 """Who chooses the experiment. The random one's length is that of the first proposal."""
 
 Round = dict[str, Any]
 
 
 def follow(case: Case, first: Answer, rounds: int, judge: Judge) -> dict[str, list[Round]]:
-    """Results of the rounds by each way; nothing where the first answer asks for none.
+    """Results of the rounds by each chooser; nothing where the first answer asks for none.
 
     Args:
         case: its truth tells the rig.
@@ -34,7 +34,7 @@ def follow(case: Case, first: Answer, rounds: int, judge: Judge) -> dict[str, li
     """
     if first.following is None or named(case, first):
         return {}
-    return {way: _way(way, case, first, rounds, judge) for way in WAYS}
+    return {chooser: _chosen(chooser, case, first, rounds, judge) for chooser in CHOOSERS}
 
 
 def named(case: Case, answer: Answer) -> bool:
@@ -42,16 +42,16 @@ def named(case: Case, answer: Answer) -> bool:
     return answer.document is not None and compare(case.truth, answer.document).verdict == "effect"
 
 
-def _way(way: str, case: Case, answer: Answer, rounds: int, judge: Judge) -> list[Round]:
+def _chosen(chooser: str, case: Case, answer: Answer, rounds: int, judge: Judge) -> list[Round]:
     assert answer.following is not None
     rows, done = len(answer.following[0]), list[Round]()
     for k in range(rounds):
         if answer.following is None or named(case, answer):
             break
-        seed = [case.truth["seed"], case.truth["number"], 1 + k, WAYS.index(way)]
+        seed = [case.truth["seed"], case.truth["number"], 1 + k, CHOOSERS.index(chooser)]
         g = np.random.default_rng(seed)
         words, volts = "", answer.following
-        if way == "random":
+        if chooser == "random":
             words, volts = random_experiment(g, rows)
         elif answer.document is not None:
             words = answer.document["next_experiment"]["protocol"]

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects.evaluation.records import Record
+from benchmarks.hidden_effects.evaluation.records import CaseRecord
 from benchmarks.hidden_effects.evaluation.tables import table
 from benchmarks.hidden_effects.evaluation.targets import (
     COVERAGE,
@@ -32,7 +32,7 @@ SIZES = (0.0, 0.25, 0.4, 0.7, 1.0, 1.5, 2.5, 100.0)
 """Edges of the ranges of r that rates are counted in."""
 
 LEAST_ROUNDS = 2
-"""Rounds that a mean counts to, at least: a way that ended before did not settle later."""
+"""Rounds that a mean counts to, at least: one that ended before did not settle later."""
 
 
 def score(folder: Path) -> str:
@@ -62,7 +62,7 @@ def read(folder: Path) -> list[Outcome]:
     return outcomes
 
 
-def outcome_of(record: Record) -> Outcome:
+def outcome_of(record: CaseRecord) -> Outcome:
     """The outcome of a case that the job kept."""
     if record.answer is None:
         outcome = unanswered(record.truth, record.message)
@@ -70,8 +70,8 @@ def outcome_of(record: Record) -> Outcome:
         outcome = compare(record.truth, record.answer)
     outcome.number = record.number
     outcome.rounds = {
-        way: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
-        for way, rounds in record.rounds.items()
+        chooser: [{**each, **judged(each["said"], outcome.truth)} for each in rounds]
+        for chooser, rounds in record.rounds.items()
     }
     outcome.seconds = record.seconds.get("diagnose")
     return outcome
@@ -234,11 +234,11 @@ def _rounds(some: Sequence[Outcome]) -> dict[str, Any]:
     asked = [outcome for outcome in some if outcome.rounds]
     most = max([LEAST_ROUNDS, *(len(r) for o in asked for r in o.rounds.values())])
     figures: dict[str, Any] = {"asked": rate(bool(outcome.rounds) for outcome in some)}
-    for way in sorted({way for outcome in asked for way in outcome.rounds}):
-        needed = [outcome.rounds_of(way, most) for outcome in asked]
-        figures[way] = {
+    for chooser in sorted({chooser for outcome in asked for chooser in outcome.rounds}):
+        needed = [outcome.rounds_of(chooser, most) for outcome in asked]
+        figures[chooser] = {
             "settled": {k: rate(n <= k for n in needed) for k in range(1, most + 1)},
-            "wrong": rate(any(each["wrong"] for each in o.rounds[way]) for o in asked),
+            "wrong": rate(any(each["wrong"] for each in o.rounds[chooser]) for o in asked),
             "mean_rounds": float(np.mean(needed)),
         }
     if asked:

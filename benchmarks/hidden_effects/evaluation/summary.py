@@ -184,12 +184,12 @@ def _rounds(rounds: dict[str, Any]) -> TextTable:
     counted = list(rounds["proposed"]["settled"])
     rows = [
         [
-            way,
-            *(percent(rounds[way]["settled"][k]) for k in counted),
-            f"{rounds[way]['mean_rounds']:.2f}",
-            percent(rounds[way]["wrong"]),
+            chooser,
+            *(percent(rounds[chooser]["settled"][k]) for k in counted),
+            f"{rounds[chooser]['mean_rounds']:.2f}",
+            percent(rounds[chooser]["wrong"]),
         ]
-        for way in ("proposed", "random")
+        for chooser in ("proposed", "random")
     ]
     header = [
         "experiment",

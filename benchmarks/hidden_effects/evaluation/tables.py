@@ -99,15 +99,15 @@ def _kinds(kinds: dict[str, Any]) -> list[str]:
 
 
 def _rounds(rounds: dict[str, Any]) -> list[str]:
-    ways = [way for way in ("proposed", "random") if way in rounds]
-    lines = [f"  an experiment was asked for: {percent(rounds['asked'])}"] if ways else []
-    for way in ways:
-        figures = rounds[way]
+    choosers = [chooser for chooser in ("proposed", "random") if chooser in rounds]
+    lines = [f"  an experiment was asked for: {percent(rounds['asked'])}"] if choosers else []
+    for chooser in choosers:
+        figures = rounds[chooser]
         settled = "; ".join(f"{k}: {percent(each)}" for k, each in figures["settled"].items())
-        lines.append(f"  {way}, of these settled within rounds {settled}")
+        lines.append(f"  {chooser}, of these settled within rounds {settled}")
         words = f"    mean rounds {figures['mean_rounds']:.2f}, an effect named wrongly "
         lines.append(words + percent(figures["wrong"]))
-    if ways:
+    if choosers:
         lines.append(
             f"  proposed in fewer rounds than random {percent(rounds['faster'])}, in more "
             f"{percent(rounds['slower'])}"

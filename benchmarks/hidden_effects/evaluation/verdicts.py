@@ -65,7 +65,7 @@ class Outcome:
         hits: how many hidden effects it names.
         spurious: whether it names more effects than there are.
         parameters: whether each base parameter that was off is named, None without such.
-        parameters_told: the same, where it also counts to say that the data do not tell it.
+        parameters_reported: the same, where it also counts to say that the data do not tell it.
         parameters_tellable: whether the data tell each at all, by the generator's own ruler.
         parameters_spurious: whether one is named that was right, None outside such a block.
         closed: shares of the gap closed on held-out trials.
@@ -98,7 +98,7 @@ class Outcome:
     hits: int
     spurious: bool
     parameters: bool | None = None
-    parameters_told: bool | None = None
+    parameters_reported: bool | None = None
     parameters_tellable: bool | None = None
     parameters_spurious: bool | None = None
     closed: list[float] = field(default_factory=list)
@@ -149,15 +149,15 @@ class Outcome:
         """Base parameters that were off and are not named."""
         return tuple(name for name in self.off if not _begun(self.moved, PATHS[name]))
 
-    def settled_by(self, way: str, most: int) -> bool:
+    def settled_by(self, chooser: str, most: int) -> bool:
         """Whether the truth or its group was named within so many rounds of a way, or at once."""
         if self.verdict == "effect" and self.near:
             return True
-        return any(each["settled"] for each in self.rounds.get(way, ())[:most])
+        return any(each["settled"] for each in self.rounds.get(chooser, ())[:most])
 
-    def rounds_of(self, way: str, most: int) -> int:
+    def rounds_of(self, chooser: str, most: int) -> int:
         """In which round the truth or its group was named; one more than most if in none."""
-        return next((k for k in range(most + 1) if self.settled_by(way, k)), most + 1)
+        return next((k for k in range(most + 1) if self.settled_by(chooser, k)), most + 1)
 
 
 def compare(truth: Mapping[str, Any], answer: Mapping[str, Any]) -> Outcome:
@@ -212,7 +212,7 @@ def unanswered(truth: Mapping[str, Any], message: str) -> Outcome:
         hits=0,
         spurious=False,
         parameters=False if off else None,
-        parameters_told=False if off else None,
+        parameters_reported=False if off else None,
         answered=False,
         sentence=message,
     )
@@ -271,7 +271,7 @@ def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str,
     named = [*moved, *answer.get("not_identifiable", {})]
     outcome.moved = tuple(moved)
     outcome.parameters = not outcome.missing
-    outcome.parameters_told = all(_begun(named, PATHS[name]) for name in off)
+    outcome.parameters_reported = all(_begun(named, PATHS[name]) for name in off)
     outcome.parameters_spurious = bool(outcome.beyond)
 
 

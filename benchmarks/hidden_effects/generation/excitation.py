@@ -82,9 +82,9 @@ def _stairs(g: Generator, time: Array, low: float, high: float, gap: tuple[float
 
 def _zigzag(time: Array, levels: Array, pace: float) -> Array:
     """Straight lines from level to level, so fast that all fit in; `pace` a unit per s at least."""
-    ways = np.abs(np.diff(levels)) + 1e-9
+    distances = np.abs(np.diff(levels)) + 1e-9
     span = time[-1] - HOLD_S - START_S
-    times = START_S + np.cumsum(ways) * min(1.0 / pace, span / ways.sum())
+    times = START_S + np.cumsum(distances) * min(1.0 / pace, span / distances.sum())
     return np.interp(time, np.r_[START_S, times], levels)
 
 

@@ -15,10 +15,10 @@ Asked = list[tuple[Array, Array]]
 """Pressure (Pa) and load (N) of each trial, shape (rows,)."""
 
 
-def draw_poor(generator: Generator, kind: str) -> tuple[Array, Array]:
-    """Motor and regulator voltages of a kind of `POOR`, shape (trials, rows) each."""
+def draw_low_excitation(generator: Generator, kind: str) -> tuple[Array, Array]:
+    """Motor and regulator voltages of a kind of `LOW_EXCITATION`, shape (trials, rows) each."""
     time = np.arange(round(SECONDS * RATE)) / RATE
-    sent = [volts(pressure, load) for pressure, load in POOR[kind](generator, time)]
+    sent = [volts(pressure, load) for pressure, load in LOW_EXCITATION[kind](generator, time)]
     return np.array([motor for motor, _ in sent]), np.array([regulator for _, regulator in sent])
 
 
@@ -70,7 +70,7 @@ def _one_pressure(g: Generator, time: Array) -> Asked:
     return [(still, fast), (still, slow), (still, step)]
 
 
-POOR: dict[str, Callable[[Generator, Array], Asked]] = {
+LOW_EXCITATION: dict[str, Callable[[Generator, Array], Asked]] = {
     "held commands": _held,
     "one slow ramp": _slow_ramp,
     "small moves": _small_moves,

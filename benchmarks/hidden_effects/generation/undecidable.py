@@ -27,7 +27,7 @@ from benchmarks.hidden_effects.generation.effects import ALL, KINDS, Values
 from benchmarks.hidden_effects.generation.experiment_library import named
 from benchmarks.hidden_effects.generation.groups import group
 from benchmarks.hidden_effects.generation.likelihood_ratios import SEEN, UNTOLD, Behind
-from benchmarks.hidden_effects.generation.low_excitation import POOR, draw_poor
+from benchmarks.hidden_effects.generation.low_excitation import LOW_EXCITATION, draw_low_excitation
 from benchmarks.hidden_effects.generation.rigs import RigsBlock
 from benchmarks.hidden_effects.physics import rig as rigs
 from benchmarks.hidden_effects.physics.rig import SENSORS, Array
@@ -76,7 +76,7 @@ WITNESS: dict[str, str] = {
 
 
 @dataclass(frozen=True)
-class PoorBlock(Block):
+class LowExcitationBlock(Block):
     """The block of too little excitation."""
 
     def draw(self, seed: int, number: int) -> Case:
@@ -133,8 +133,8 @@ def draw_undecidable(seed: int, number: int, effect: str) -> Case:
         shown = shown_by_library(g, rig, effect)
         if shown is None:
             continue
-        for kind in g.permutation(list(POOR)).tolist():
-            motor, regulator = draw_poor(g, kind)
+        for kind in g.permutation(list(LOW_EXCITATION)).tolist():
+            motor, regulator = draw_low_excitation(g, kind)
             case = decided_case(g, rig.experiment(motor, regulator), rig.numbers, effect, shown)
             if case["untold"]:
                 hidden = {**shown, "r": max(case["ratios"].values()), "ratios": case["ratios"]}
@@ -230,7 +230,7 @@ def _rivals(
 
 
 BLOCKS: dict[str, Block] = USUAL | {
-    "undecidable": PoorBlock("undecidable", tuple(WITNESS), rounds=2),
+    "undecidable": LowExcitationBlock("undecidable", tuple(WITNESS), rounds=2),
     "rigs": RigsBlock("rigs"),
 }
 """All blocks by name, in the order of the table."""

@@ -60,7 +60,7 @@ class MaxwellSlip(Hidden):
         heights /= heights[-1]
         slopes = np.diff(np.r_[0.0, heights]) / np.diff(np.r_[0.0, knots])
         self.springs = slopes - np.r_[slopes[1:], 0.0]
-        self.ways = knots[:, None]
+        self.distances = knots[:, None]
         self.stretched = np.zeros((self.ELEMENTS, 0))
 
     def begin(self, moment: Moment) -> None:
@@ -70,5 +70,5 @@ class MaxwellSlip(Hidden):
     def force(self, moment: Moment) -> Array:
         """What the elements hold the slide back with."""
         moved = self.stretched + moment.step * moment.velocity
-        self.stretched = np.clip(moved, -self.ways, self.ways)
+        self.stretched = np.clip(moved, -self.distances, self.distances)
         return -self.scale * (self.springs @ self.stretched)

@@ -58,7 +58,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
     """
     lanes, rows = commands.motor.shape
     step = 1.0 / (RATE * SUBSTEPS)
-    moment = at_rest(commands, rig, hidden, step)
+    moment = equilibrium(commands, rig, hidden, step)
     sensors = _Sensors(moment, hidden, lanes)
     readings = np.empty((lanes, rows, 4))
     readings[:, 0] = sensors.held
@@ -75,7 +75,7 @@ def simulate(commands: Commands, rig: Numbers, hidden: Sequence[Hidden] = ()) ->
     return readings
 
 
-def at_rest(commands: Commands, rig: Numbers, hidden: Sequence[Hidden], step: float) -> Moment:
+def equilibrium(commands: Commands, rig: Numbers, hidden: Sequence[Hidden], step: float) -> Moment:
     """The rig at rest under its first commands, all memories empty."""
     start = np.zeros(1)
     load = _loads(commands, rig, hidden, start, step, once=True)[0]
@@ -183,7 +183,7 @@ def _loads(
 ) -> Array:
     """Loads (N) that the drive gives, shape (times, lanes); `once` leaves memories out."""
     late = _total((effect.motor_delay() for effect in hidden), np.zeros(len(commands.order)))
-    volts = _joined(commands.motor, times, late)
+    volts = _interpolated(commands.motor, times, late)
     loads = np.maximum(rig["drive_gain"] * volts + rig["drive_offset"], 0.0)
     for effect in hidden:
         loads = effect.loads(loads, 0.0 if once else step)
@@ -200,14 +200,14 @@ def _pressures(
 ) -> Array:
     """Pressures (Pa) asked for, shape (times, lanes)."""
     late = _total((effect.regulator_delay() for effect in hidden), np.zeros(len(commands.order)))
-    volts = _joined(commands.regulator, times, late)
+    volts = _interpolated(commands.regulator, times, late)
     asked = np.maximum(rig["regulator_gain"] * volts + rig["regulator_offset"], 0.0)
     for effect in hidden:
         asked = effect.pressures(asked, 0.0 if once else step)
     return asked
 
 
-def _joined(columns: Array, times: Array, late: Array) -> Array:
+def _interpolated(columns: Array, times: Array, late: Array) -> Array:
     rows = np.arange(columns.shape[1]) / RATE
     pairs = zip(columns, late, strict=True)
     return np.stack([np.interp(times - delay, rows, column) for column, delay in pairs], axis=1)
@@ -227,7 +227,7 @@ def _balance(moment: Moment, load: Array, hidden: Sequence[Hidden]) -> Array:
     return moment.contraction
 
 
-def _total(values: Iterable[Array | float], beginning: Array) -> Array:
+def _total(values: Iterable[Array | float], total: Array) -> Array:
     for value in values:
-        beginning = beginning + value
-    return beginning
+        total = total + value
+    return total

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.hidden_effects.rigs.driven_campaign import draw_driven
 from benchmarks.hidden_effects.rigs.laws import CoulombFriction, HiddenEffect
-from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, OUTSIDE, group
+from benchmarks.hidden_effects.rigs.offers import KNOWN, OFFERS, OUTSIDE, catalogue_name, group
 from benchmarks.hidden_effects.rigs.rig import log_uniform
 
 KINDS = ("one effect", "nothing", "two effects", "one effect", "nothing", "outside")
@@ -115,19 +115,20 @@ def _sized(campaign: Campaign, most: HiddenEffect, wanted: float) -> HiddenEffec
 
 
 def _described(campaign: Campaign, effect: HiddenEffect) -> dict[str, Any]:
+    name = catalogue_name(campaign.rig.kind, effect.name)
     return {
-        "name": effect.name,
-        "group": group(effect.name),
+        "name": name,
+        "group": group(name),
         "parameters": effect.values(),
-        "expected": expected(effect),
+        "expected": expected(campaign.rig.kind, effect),
         "r": campaign.ratio(effect),
     }
 
 
-def expected(effect: HiddenEffect) -> dict[str, float]:
+def expected(kind: str, effect: HiddenEffect) -> dict[str, float]:
     """Values in file units, by the catalogue's parameter, that describe a hidden effect."""
     if isinstance(effect, CoulombFriction):
-        return {"dynamic_n": effect.size}
+        return {"dynamic_n_m" if kind == "joint" else "dynamic_n": effect.size}
     return {
         "drive_delay": {"delay_ms": 1e3 * effect.size},
         "drive_lag": {"time_constant_ms": 1e3 * effect.size},

@@ -29,7 +29,7 @@ FARTHEST = 3.0
 
 COLUMNS = {
     "slide": ("load_command_n", "contraction_mm", 1e3),
-    "joint": ("torque_n_m", "angle_rad", 1.0),
+    "joint": ("torque_command_n_m", "angle_deg", math.degrees(1.0)),
 }
 """Command, position, and the position's unit in SI units, by kind of rig."""
 

@@ -99,7 +99,43 @@ velocity_mm_per_s = 0.0
 """
 
 
-MODELS = {"slide": _slide}
+def _joint(rig: Rig, limit: float) -> str:
+    """Of a joint under a torque, with a weight and a spring where the lab knows of them."""
+    del limit
+    text = f"""schema = 1
+name = "lab"
+title = "What the lab believes"
+plant = "joint"
+
+[torque_drive]
+gain = 1
+
+[inertia]
+inertia_kg_m2 = {_number(rig.inertia)}
+
+[joint_damping]
+coefficient_n_m_s = {_number(rig.damping)}
+
+[joint_start]
+angle_deg = 0.0
+spin_deg_per_s = 0.0
+"""
+    if rig.gravity:
+        text += f"""
+[joint_weight]
+moment_n_m = {_number(rig.gravity)}
+offset_deg = {_number(math.degrees(rig.gravity_angle))}
+"""
+    if rig.stiffness:
+        text += f"""
+[joint_spring]
+stiffness_n_m_per_rad = {_number(rig.stiffness)}
+rest_deg = 0.0
+"""
+    return text
+
+
+MODELS = {"slide": _slide, "joint": _joint}
 """Text of a model by kind of rig."""
 
 

@@ -21,8 +21,8 @@ class Noise:
         drift: rms of what changes over minutes.
         colour: standard deviation of an autoregression of order 1.
         memory: time in which that falls to 1/e (s).
-        wild: share of readings that are outliers.
-        wildness: their size over `white`.
+        outlier_share: share of readings that are outliers.
+        outlier_size: their size over `white`.
         tails: degrees of freedom of Student's t in place of a Gaussian; 0 for a Gaussian.
     """
 
@@ -33,8 +33,8 @@ class Noise:
     drift: float = 0.0
     colour: float = 0.0
     memory: float = 0.01
-    wild: float = 0.0
-    wildness: float = 10.0
+    outlier_share: float = 0.0
+    outlier_size: float = 10.0
     tails: float = 0.0
     names: tuple[str, ...] = field(default=())
 
@@ -52,9 +52,9 @@ class Noise:
         else:
             noise = self.white * rng.standard_normal(rows)
         noise += self._humming(rng, time) + self._drifting(rng, time) + self._coloured(rng, time)
-        wild = rng.random(rows) < self.wild
-        sizes = self.white * self.wildness * rng.choice((-1.0, 1.0), rows)
-        return noise + np.where(wild, sizes * rng.uniform(0.6, 1.4, rows), 0.0)
+        is_outlier = rng.random(rows) < self.outlier_share
+        sizes = self.white * self.outlier_size * rng.choice((-1.0, 1.0), rows)
+        return noise + np.where(is_outlier, sizes * rng.uniform(0.6, 1.4, rows), 0.0)
 
     def _humming(self, rng: np.random.Generator, time: Array) -> Array:
         shape = np.array([1.0, *self.harmonics])
@@ -94,8 +94,8 @@ def draw_noise(rng: np.random.Generator, white: float) -> Noise:
         options["colour"] = white * rng.uniform(0.4, 1.2)
         options["memory"] = rng.uniform(0.005, 0.05)
     if "outliers" in names:
-        options["wild"] = rng.uniform(2e-4, 3e-3)
-        options["wildness"] = rng.uniform(6.0, 20.0)
+        options["outlier_share"] = rng.uniform(2e-4, 3e-3)
+        options["outlier_size"] = rng.uniform(6.0, 20.0)
     if "tails" in names:
         options["tails"] = rng.uniform(3.0, 5.0)
     return Noise(white, names=tuple(str(name) for name in names), **options)  # pyright: ignore[reportArgumentType]

@@ -113,13 +113,54 @@ OUTSIDE: tuple[Offer, ...] = (Offer(_bumper), Offer(_detent), Offer(_brake))
 """What no catalogue has."""
 
 KNOWN: dict[str, tuple[str, ...]] = {
-    "slide": ("coulomb_friction", "drive_delay", "drive_lag"),
+    "slide": (
+        "coulomb_friction",
+        "load_dependent_friction",
+        "spring",
+        "hardening_spring",
+        "quadratic_drag",
+        "directional_damping",
+        "directional_gain",
+        "drive_delay",
+        "drive_lag",
+    ),
+    "joint": (
+        "coulomb_friction",
+        "load_dependent_friction",
+        "gravity",
+        "spring",
+        "hardening_spring",
+        "quadratic_drag",
+        "directional_damping",
+        "directional_gain",
+        "drive_delay",
+        "drive_lag",
+    ),
 }
 """What the catalogue has for each kind of rig."""
 
+JOINT_NAMES: dict[str, str] = {
+    "coulomb_friction": "joint_friction",
+    "load_dependent_friction": "joint_load_friction",
+    "gravity": "joint_weight",
+    "spring": "joint_spring",
+    "hardening_spring": "joint_hardening_spring",
+    "quadratic_drag": "joint_drag",
+    "directional_damping": "joint_directional_damping",
+}
+"""What the catalogue calls effects of a joint, where a slide's has another name there."""
+
+
+def catalogue_name(kind: str, name: str) -> str:
+    """Name that the catalogue has for an effect of a kind of rig."""
+    return JOINT_NAMES.get(name, name) if kind == "joint" else name
+
+
 GROUPS: tuple[frozenset[str], ...] = (
-    frozenset({"drive_delay", "drive_lag", "lvdt_lag"}),
+    frozenset({"drive_delay", "drive_lag", "lvdt_lag", "encoder_lag"}),
     frozenset({"coulomb_friction", "load_dependent_friction", "position_dependent_friction"}),
+    frozenset({"joint_friction", "joint_load_friction"}),
+    frozenset({"joint_weight", "joint_spring", "joint_hardening_spring"}),
 )
 """Effects that usual logs cannot always tell apart; fixed before any held-out seed is run."""
 

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from benchmarks.comparison.job import run_comparison
 from benchmarks.executors.executor import Executor
-from benchmarks.report.errors import Measure, Record, measures
+from benchmarks.report.errors import Measure, SuiteRecord, measures
 from benchmarks.runner.controller_spec import parse_controllers
 from benchmarks.runner.journal import JOURNAL, case_rows
 from benchmarks.suites.frozen import frozen_suite
@@ -109,7 +109,7 @@ def pools(results: Path, suite: str, seeds: Sequence[str]) -> dict[str, Pool]:
     """
     frozen = frozen_suite(suite)
     rows = case_rows(results / JOURNAL)
-    record = Record.of(frozen, [row for row in rows if row["controller"] in seeds])
+    record = SuiteRecord.of(frozen, [row for row in rows if row["controller"] in seeds])
     by_measure: dict[str, Pool] = {}
     for measure in measures(frozen.tasks):
         if _complete(record, measure, seeds):
@@ -117,6 +117,6 @@ def pools(results: Path, suite: str, seeds: Sequence[str]) -> dict[str, Pool]:
     return by_measure
 
 
-def _complete(record: Record, measure: Measure, seeds: Sequence[str]) -> bool:
+def _complete(record: SuiteRecord, measure: Measure, seeds: Sequence[str]) -> bool:
     whole = {entry.spec.name for entry in record.whole(measure.tasks)}
     return set(seeds) <= whole

@@ -12,7 +12,7 @@ from pma_gym.data.datasets.dataset_toml import DESCRIPTION, Description, read_de
 from pma_gym.data.datasets.lab_sensors import LabSensor, without_ends
 from pma_gym.data.files.trial_files import TrialWarning, trial_of
 from pma_gym.data.files.trial_hints import strange_columns
-from pma_gym.data.quality.wild_readings import wild_readings
+from pma_gym.data.quality.outliers import outliers
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.trial import Trial
 from pma_gym.data.trial_columns import BY_QUANTITY, ColumnMap, TrialError
@@ -142,7 +142,7 @@ def _named(
     words = [strange if each.startswith(_UNKNOWN) else each for each in words]
     doubts += [
         (path.name, each)
-        for each in (*words, *empty_runs(path, trial, table), *_wild(trial, table))
+        for each in (*words, *empty_runs(path, trial, table), *_outliers(trial, table))
     ]
     trial = without_ends(
         trial, description.sensors, lambda words: doubts.append((path.name, words))
@@ -152,13 +152,13 @@ def _named(
     return NamedTrial(path.name, replace(trial, memory_at_start=begun), **about)
 
 
-def _wild(trial: Trial, table: Table) -> Iterator[str]:
-    """Words on wild readings of a trial."""
+def _outliers(trial: Trial, table: Table) -> Iterator[str]:
+    """Messages about outliers of a trial."""
     values = {
         name: readings / SI_FACTORS[BY_QUANTITY[name].unit]
         for name, readings in trial.measurements.items()
     }
-    return wild_readings(values, table.place)
+    return outliers(values, table.place)
 
 
 def _gathered(doubts: list[tuple[str, str]], count: int) -> Iterator[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.files.trial_files import place_in_file, read_header
 from pma_gym.data.files.trial_hints import mapping_line
-from pma_gym.data.quality.wild_readings import check_possible
+from pma_gym.data.quality.outliers import check_possible
 from pma_gym.data.readers.table import FileFormat, Table
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
@@ -75,7 +75,7 @@ def check_signals(
     for find in (_contraction, _pressure, _load, _rotation):
         slip = find(door)
         if slip:
-            raise TrialError(_slip_words(path, slip, door[slip.quantity], columns, form))
+            raise TrialError(_slip_text(path, slip, door[slip.quantity], columns, form))
     place = partial(place_in_file, path, columns=columns, form=form)
     for quantity in ("contraction", "pressure", "pressure_command"):
         # A slide without a muscle goes as far as it likes.
@@ -115,7 +115,7 @@ def _span(values: Array | None) -> float:
 
 
 _BULK = 0.99
-"""Share of the readings that a unit is guessed from: one wild reading is no unit."""
+"""Share of the readings that a unit is guessed from: one outlier is no unit."""
 
 
 def _largest(values: Array | None) -> float:
@@ -232,7 +232,7 @@ def _change(door: dict[str, Array], command: str) -> str:
     return f"{column.name} goes from {low:.4g} to {high:.4g} {column.unit}"
 
 
-def _slip_words(
+def _slip_text(
     path: Path, slip: _Slip, values: Array, columns: ColumnMap, form: FileFormat | None
 ) -> str:
     """The message on a column in another unit."""

@@ -22,7 +22,7 @@ _VERY_FAR = 10.0
 """The same for any other whole number that comes more than once."""
 _LEAST = 90.0
 """Smallest magnitude of such a number."""
-_FEWEST = 10
+_LEAST = 10
 """Cells from which a column tells its bulk from a mark."""
 _SHOWN = 5
 
@@ -63,7 +63,7 @@ def sentinel(values: NDArray[np.float64]) -> float | None:
         -999.0
     """
     finite = values[np.isfinite(values)]
-    if finite.size < _FEWEST:
+    if finite.size < _LEAST:
         return None
     for extreme in (float(finite.min()), float(finite.max())):
         others = finite[finite != extreme]

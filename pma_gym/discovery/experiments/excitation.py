@@ -185,7 +185,7 @@ def _of_pressure(
 ) -> tuple[str, Trial]:
     """Pressure changes about a share of its range; the load stands at a share of its."""
     span, held = Range.of(model), Range.of(model).load(load, size)
-    pressures = span.pressure(np.clip(centre + _joined(knots), 0.0, 1.0))
+    pressures = span.pressure(np.clip(centre + _interpolated(knots), 0.0, 1.0))
     low, high = np.min(pressures) / 1e3, np.max(pressures) / 1e3
     name = f"{words}, {low:.0f} to {high:.0f} kPa at {held:.0f} N"
     return name, _trial(model, np.full(len(pressures), held), pressures)
@@ -216,11 +216,14 @@ def _trial(model: Model, loads: Array, pressures: Array) -> Trial:
 
 def _load_shapes(seed: int) -> Iterator[tuple[str, Array]]:
     """Shapes of the load: words, and shares of its range."""
-    yield "slow load triangle, once in 20 s", _joined([(0, 0), (1, 0), (11, 1), (21, 0), (22, 0)])
+    yield (
+        "slow load triangle, once in 20 s",
+        _interpolated([(0, 0), (1, 0), (11, 1), (21, 0), (22, 0)]),
+    )
     peaks = [(1 + 0.5 * k, k % 2) for k in range(17)]
-    yield "fast load triangle, 8 times in 8 s", _joined([(0, 0), *peaks, (10, 0)])
+    yield "fast load triangle, 8 times in 8 s", _interpolated([(0, 0), *peaks, (10, 0)])
     yield "load step, held for 5 s, and back", _steps([(1, LOW), (5, 1), (5, LOW)])
-    yield "reversal staircase, growing amplitudes in 15 s", _joined(_staircase())
+    yield "reversal staircase, growing amplitudes in 15 s", _interpolated(_staircase())
     yield "multisine of load, 0.2 to 5 Hz in 12 s", _multisine(seed)
     swaps = [(0.8, 0.15 if k % 2 else 0.85) for k in range(10)]
     yield "load swaps every 0.8 s", _steps([(1, 0.15), *swaps, (1, 0.15)])
@@ -247,15 +250,15 @@ def _both_shapes(seed: int) -> Iterator[tuple[str, Array, Array]]:
     Who does not know what is missing wants one experiment that hides little: each change of load
     and of pressure that the other protocols have, in one trial.
     """
-    slow = _joined([(0, 0.05), (1, 0.05), (5, 0.95), (9, 0.05)])
-    fast = _joined([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(9)]])
+    slow = _interpolated([(0, 0.05), (1, 0.05), (5, 0.95), (9, 0.05)])
+    fast = _interpolated([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(9)]])
     swaps = _steps([(1, 0.15), *[(0.8, 0.8 if k % 2 == 0 else 0.15) for k in range(5)]])
     hold = _steps([(4, 0.8), (2, 0.2)])
     # Large ones and small ones, for limits of speed and for dead bands.
     steps = _steps([(1, 0.5), (2, 0.95), (2, 0.05), (2, 0.5), (1, 0.55), (1, 0.5)])
     still = np.full(len(swaps) + len(hold), 0.5)
     # From where the triangle ends to where the pressure stands.
-    rise = _joined([(0, 0.05), (1, 0.5), (2, 0.5)])
+    rise = _interpolated([(0, 0.05), (1, 0.5), (2, 0.5)])
     yield (
         "load triangles on one of pressure, load swaps, a hold, then steps of pressure",
         np.concatenate([fast, np.full(len(rise), LOW), swaps, hold, np.full(len(steps), LOADS[1])]),
@@ -264,8 +267,8 @@ def _both_shapes(seed: int) -> Iterator[tuple[str, Array, Array]]:
     wave = _multisine(seed)
     steps = _steps([(2, 0.5), (2, 0.9), (2, 0.1), (2, 0.5), (2, 0.55), (2, 0.5)])
     yield "multisine of load during steps of pressure", 0.1 + 0.75 * wave, _held(steps, len(wave))
-    slow = _joined([(0, 0.05), (1, 0.05), (9, 0.95), (17, 0.05), (18, 0.05)])
-    fast = _joined([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(17)], (18, LOW)])
+    slow = _interpolated([(0, 0.05), (1, 0.05), (9, 0.95), (17, 0.05), (18, 0.05)])
+    fast = _interpolated([(0, LOW), *[(1 + k, LOW + 0.7 * (k % 2)) for k in range(17)], (18, LOW)])
     yield "load triangles, 8 in 16 s, during one of pressure", fast, slow
 
 
@@ -300,10 +303,10 @@ def _steps(levels: Knots) -> Array:
     for held, level in levels:
         knots += [(start + 1.0 / RATE_HZ if start else 0.0, level), (start + held, level)]
         start += held
-    return _joined(knots)
+    return _interpolated(knots)
 
 
-def _joined(knots: Knots) -> Array:
+def _interpolated(knots: Knots) -> Array:
     """Knots of time (s) and value, joined linearly, at every row."""
     times, values = np.array(knots, float).T
     return np.interp(np.arange(round(times[-1] * RATE_HZ) + 1) / RATE_HZ, times, values)

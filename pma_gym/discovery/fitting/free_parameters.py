@@ -99,7 +99,7 @@ def _is_own(model: Model, path: str) -> bool:
     stem = law.names_at_the_door()[door]
     if law.port == "part" and effect in ("limits", "validity"):
         return False
-    if stem in law.rows or model.rig.holds(law, stem) or effect in sensors.SENSORS:
+    if stem in law.rows or stem in law.held or effect in sensors.SENSORS:
         return False
     if effect == "drive" and "hanging_load" in model.parameters:
         # Weights have been weighed.

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.datasets.dataset import NamedTrial
-from pma_gym.discovery.preparation.noise import at_rest, step_between
+from pma_gym.discovery.preparation.noise import rest_readings, step_between
 from pma_gym.estimation.logged import Logged
 
 Array = NDArray[np.float64]
@@ -101,7 +101,7 @@ def is_summary(parts: Sequence[Array]) -> bool:
 
 def _rest(logged: Sequence[Logged], channel: int) -> float | None:
     """Noise in rest segments (SI); None where there are few readings, or where they stand still."""
-    segments = [part[np.isfinite(part)] for part in at_rest(logged, channel)]
+    segments = [part[np.isfinite(part)] for part in rest_readings(logged, channel)]
     count = sum(len(part) for part in segments)
     if count < ENOUGH:
         return None

@@ -18,10 +18,10 @@ from pma_gym.data.quality.daq_levels import read_by_daq
 from pma_gym.data.signals import Signal
 from pma_gym.discovery.preparation.acceptance_floors import difference
 from pma_gym.discovery.preparation.noise import (
-    at_rest,
     distinct_readings,
     level_at_rest,
     level_of_neighbours,
+    rest_readings,
     sparse,
     step_between,
 )
@@ -101,7 +101,7 @@ def _floor(
     expected = _expected_step(signal, parts, stated)
     rounding = (step or expected) / np.sqrt(12.0)
     sources = _sources(parts, assumed, rounding, stated)
-    rest = level_at_rest(at_rest(logged, channel))
+    rest = level_at_rest(rest_readings(logged, channel))
     if rest is not None:
         sources[REST] = rest
     repeats = _between_repeats(logged, named, channel)

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.discovery.preparation.acceptance_floors import difference, repeats
-from pma_gym.discovery.preparation.noise import Whitening, at_rest, autoregression
+from pma_gym.discovery.preparation.noise import Whitening, autoregression, rest_readings
 from pma_gym.discovery.preparation.nuisance_projection import drift_cosines
 from pma_gym.estimation.logged import Logged
 
@@ -74,7 +74,7 @@ def _coloured(
     parts = [_noise_of_pair(logged, i, j, channel, before.lines) for i, j in pairs]
     parts = [part for part in parts if part.size]
     if sum(map(len, parts)) < ENOUGH_ALIKE:
-        parts = at_rest(logged, channel)
+        parts = rest_readings(logged, channel)
         if before.lines or sum(int(np.isfinite(part).sum()) for part in parts) < ENOUGH_ALIKE:
             return before
     return replace(autoregression(parts, before.level), lines=before.lines)

@@ -98,7 +98,7 @@ def rest_segments(logged: Logged) -> list[slice]:
     return segments
 
 
-def at_rest(trials: Sequence[Logged], channel: int) -> list[Array]:
+def rest_readings(trials: Sequence[Logged], channel: int) -> list[Array]:
     """What a signal reads in rest segments, each less its straight line.
 
     A line, for what still creeps does so slowly.

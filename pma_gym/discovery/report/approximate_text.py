@@ -9,7 +9,7 @@ MANY = 10.0
 """Times itself from which on the scatter of a size is no longer given in numbers."""
 
 
-def left_words(known: Approximate) -> str:
+def left_text(known: Approximate) -> str:
     """How much of the misfit is left: `law approximate, 11 % of the misfit ... is left`."""
     laws = "law" if len(known.effects) == 1 else "laws"
     unseen = " in trials left out" if known.held_out else ""

@@ -46,7 +46,7 @@ def nuisances(findings: Findings) -> tuple[Nuisance, ...]:
     return (*listed_lines, *(Nuisance(kind, sizes) for kind, sizes in others if sizes))
 
 
-def nuisance_words(known: Sequence[Nuisance], signals: int) -> str:
+def nuisance_text(known: Sequence[Nuisance], signals: int) -> str:
     """In words: `50 Hz in all four sensors, 1.2 sd; slow drift of pressure, 0.4 sd`.
 
     Args:

@@ -8,7 +8,7 @@ from pma_gym.discovery.report.text import (
     effect_name,
     effect_names,
     figure,
-    undetermined_words,
+    undetermined_text,
 )
 from pma_gym.units import suffix, with_unit
 
@@ -32,7 +32,7 @@ def effect_sizes(effect: NamedEffect) -> str:
         for parameter, each in effect.parameters.items()
     ]
     left = [
-        f"{_stem(parameter, each.unit)} {undetermined_words(each)}"
+        f"{_stem(parameter, each.unit)} {undetermined_text(each)}"
         for parameter, each in effect.undetermined.items()
     ]
     return ", ".join([*known, *left])

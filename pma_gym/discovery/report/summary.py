@@ -14,7 +14,7 @@ from pma_gym.discovery.report.text import (
     effect_name,
     effect_names,
     estimate,
-    estimate_words,
+    estimate_text,
     figure,
     gap_closed,
     interval,
@@ -22,7 +22,7 @@ from pma_gym.discovery.report.text import (
     readable,
     signal_name,
     signal_unit,
-    undetermined_words,
+    undetermined_text,
     unit_cell,
     what_to_do,
 )
@@ -64,8 +64,8 @@ def _effects(diagnosis: Diagnosis) -> Iterator[str]:
     for effect in diagnosis.effects:
         sizes = ", ".join(
             [
-                *(f"{name} {estimate_words(known)}" for name, known in effect.parameters.items()),
-                *(f"{name} {undetermined_words(e)}" for name, e in effect.undetermined.items()),
+                *(f"{name} {estimate_text(known)}" for name, known in effect.parameters.items()),
+                *(f"{name} {undetermined_text(e)}" for name, e in effect.undetermined.items()),
             ]
         )
         yield f"{effect_name(effect.name)}: {sizes}"
@@ -76,7 +76,7 @@ def _effects(diagnosis: Diagnosis) -> Iterator[str]:
 def _parameters(diagnosis: Diagnosis) -> Iterator[str]:
     moved = {path: each for path, each in diagnosis.parameters.items() if each.significant}
     for path, each in list(moved.items())[:_MOST_PARAMETERS]:
-        yield f"{path} from {figure(each.start, 4)} to {estimate_words(each.now)}"
+        yield f"{path} from {figure(each.start, 4)} to {estimate_text(each.now)}"
     if len(moved) > _MOST_PARAMETERS:
         yield f"and {len(moved) - _MOST_PARAMETERS} more"
 

@@ -24,7 +24,7 @@ from pma_gym.discovery.report.text import (
     readable,
     signal_name,
     signal_unit,
-    undetermined_words,
+    undetermined_text,
     unit_cell,
 )
 from pma_gym.discovery.verdict.adequacy import MOST_EXPLAINED, MOST_FLOORS
@@ -107,7 +107,7 @@ def effect_table(effect: NamedEffect) -> TextTable:
         for name, known in effect.parameters.items()
     ]
     rows += [
-        [f"`{name}`", "–", undetermined_words(left), unit_cell(left.unit)]
+        [f"`{name}`", "–", undetermined_text(left), unit_cell(left.unit)]
         for name, left in effect.undetermined.items()
     ]
     title = f"Size of the effect: {effect_name(effect.name)}"

@@ -149,13 +149,13 @@ def interval(known: Estimate) -> str:
     return f"{estimate(low, low, high)} to {estimate(high, low, high)}"
 
 
-def estimate_words(known: Estimate) -> str:
+def estimate_text(known: Estimate) -> str:
     """`14.2 N (95 %: 13.1 to 15.4)`."""
     value = with_unit(estimate(known.value, known.low, known.high), known.unit)
     return f"{value}{at_its_limit(known)} (95 %: {interval(known)})"
 
 
-def undetermined_words(known: Undetermined) -> str:
+def undetermined_text(known: Undetermined) -> str:
     """`not determined, above 20 mm/s`."""
     if known.above is None and known.below is None:
         return "not determined"

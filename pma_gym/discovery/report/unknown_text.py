@@ -1,7 +1,7 @@
 """The verdict `unknown` in words: what the best effects leave, and the figure beyond its limit."""
 
 from pma_gym.discovery.diagnosis import Diagnosis
-from pma_gym.discovery.report.approximate_text import left_words
+from pma_gym.discovery.report.approximate_text import left_text
 from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.text import effect_name, effect_names, figure, percent, signal_name
 from pma_gym.discovery.verdict.residual_laws import LAWS
@@ -13,7 +13,7 @@ MANY = 10.0
 _WHAT = "what is slow in"
 
 
-def unknown_words(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
+def unknown_sentence(diagnosis: Diagnosis, reason: Reason, trials: str) -> str:
     """That no effect carries what is missing and why; one more sentence for an oscillation.
 
     Args:
@@ -58,7 +58,7 @@ def _candidate(diagnosis: Diagnosis) -> str:
     closed = percent(1.0 - max(known.left, 0.0))
     return (
         f" The best candidate is {sized_effects(known.effects)}: it closes {closed} of the misfit "
-        f"beyond noise; {left_words(known)}."
+        f"beyond noise; {left_text(known)}."
     )
 
 

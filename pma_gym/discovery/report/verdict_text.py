@@ -6,8 +6,8 @@ from pma_gym.discovery.diagnosis import ADDED, Diagnosis, Verdict
 from pma_gym.discovery.fitting.fit_problem import Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.adequacy_text import agreement, remainder, undecided
-from pma_gym.discovery.report.approximate_text import left_words
-from pma_gym.discovery.report.noise_text import nuisance_words
+from pma_gym.discovery.report.approximate_text import left_text
+from pma_gym.discovery.report.noise_text import nuisance_text
 from pma_gym.discovery.report.size_text import sized_effects
 from pma_gym.discovery.report.text import (
     at_its_limit,
@@ -20,7 +20,7 @@ from pma_gym.discovery.report.text import (
     signal_name,
     signal_unit,
 )
-from pma_gym.discovery.report.unknown_text import unknown_words
+from pma_gym.discovery.report.unknown_text import unknown_sentence
 from pma_gym.discovery.selection.backward_elimination import ODDS
 from pma_gym.discovery.verdict.adequacy import OPEN
 from pma_gym.discovery.verdict.decision import MOST_RIVALS, MOVED_CHANGE, UNDETECTABLE_SHARE
@@ -40,7 +40,7 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
         diagnosis: the diagnosis.
         unknown: why its verdict is `unknown`; None where it is another.
     """
-    trials = trials_words(diagnosis)
+    trials = trials_text(diagnosis)
     name = diagnosis.given.name
     if diagnosis.verdict == "effect":
         return (
@@ -61,7 +61,7 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
             f"{remainder(diagnosis)}."
         )
     if unknown is not None:
-        return unknown_words(diagnosis, unknown, trials)
+        return unknown_sentence(diagnosis, unknown, trials)
     if diagnosis.candidates and diagnosis.candidates[0].why == ADDED:
         equal = [each.name for each in diagnosis.candidates if "as well as" in each.why]
         if len(equal) <= MOST_RIVALS:
@@ -96,7 +96,7 @@ def sentence(diagnosis: Diagnosis, unknown: Reason | None = None) -> str:
     ) + _propose(diagnosis)
 
 
-def trials_words(diagnosis: Diagnosis) -> str:
+def trials_text(diagnosis: Diagnosis) -> str:
     """The trials in words: pieces of one log are not taken for trials."""
     count = len(diagnosis.trials)
     files = len({record.file for record in diagnosis.trials})
@@ -112,7 +112,7 @@ def _propose(diagnosis: Diagnosis) -> str:
 
 def _approximately(diagnosis: Diagnosis) -> str:
     known = diagnosis.approximate
-    return "" if known is None else f" ({left_words(known)})"
+    return "" if known is None else f" ({left_text(known)})"
 
 
 def _unsure(diagnosis: Diagnosis) -> str:
@@ -211,7 +211,7 @@ def _freed(findings: Findings) -> str:
 def steps(findings: Findings, diagnosis: Diagnosis, left: ResidualFraction) -> tuple[str, ...]:
     """What was done, a sentence each."""
     problem, selection = findings.problem, findings.selection
-    beside = nuisance_words(diagnosis.nuisances, len(diagnosis.floors))
+    beside = nuisance_text(diagnosis.nuisances, len(diagnosis.floors))
     said = [
         f"Noise: {', '.join(_floor(diagnosis, signal) for signal in diagnosis.floors)}."
         + (f" Fitted together with every candidate: {beside}." if beside else ""),

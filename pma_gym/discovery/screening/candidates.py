@@ -12,8 +12,10 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, ModelError
@@ -40,22 +42,29 @@ PERIODS = tuple(range(1, 21))
 """How many eighths of its usual number of periods a ripple is looked for at: a trial of a quarter
 turn tells no finer."""
 
-RELEASED = (6.0, 36.0, 216.0)
-"""How many times its usual value a shape is looked for at as well that the rig does not hold."""
+PRESLIDINGS = (0.1, 0.4, 1.0, 2.5, 10.0, 40.0)
+"""How many times its usual value a presliding distance is looked for at: a seal's is a hundred
+times that of a rolling guide."""
 
 SLOWER = (0.5, 0.2, 0.08, 0.03)
 """Bandwidths of a sensor that are probed, as a share of what the model says."""
 
 
-def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> list[CandidateEffect]:
+def candidate_effects(
+    model: Model,
+    orders: Sequence[float] | None = None,
+    trials: Sequence[Trial] = (),
+) -> list[CandidateEffect]:
     """Every effect that a model lacks, in the order of the catalogue.
 
     Args:
         model: the model.
         orders: which repeat each trial is, 0 for the first; None where that is not known.
+        trials: the trials, by whose sizes effects of a free rig are looked for.
     """
+    usual = sizes(model, trials) if trials else None
     candidates = [
-        *(_lacking(model, effect, orders) for effect in CATALOGUE.values()),
+        *(_lacking(model, effect, orders, usual) for effect in CATALOGUE.values()),
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
@@ -63,7 +72,7 @@ def candidate_effects(model: Model, orders: Sequence[float] | None = None) -> li
 
 
 def _lacking(
-    model: Model, effect: Effect, orders: Sequence[float] | None
+    model: Model, effect: Effect, orders: Sequence[float] | None, sizes: Sizes | None
 ) -> "CandidateEffect | None":
     """An effect that the model has not."""
     if effect.name in model.parameters or effect.replaces or effect.neutral is None:
@@ -79,17 +88,21 @@ def _lacking(
     if needed and all(each.port != needed for each in model.effects.values()):
         return None
     doors = {stem: door for door, stem in effect.names_at_the_door().items()}
+    quantities = {
+        stem: quantity if sizes is None or stem in effect.held else sizes.scaled(quantity)
+        for stem, quantity in effect.quantities.items()
+    }
     shown = {
         stem: quantity
-        for stem, quantity in effect.quantities.items()
-        if (not model.rig.holds(effect, stem) or quantity.neutral is not None)
+        for stem, quantity in quantities.items()
+        if (stem not in effect.held or quantity.neutral is not None)
         and stem not in effect.rows
         # Free in every trial already, as `estimation.residuals` has it.
         and stem not in ("repeat", effect.memory_start)
     }
     if any(quantity.usual is None for quantity in shown.values()):
         return None
-    usual = {doors[stem]: q.usual for stem, q in effect.quantities.items() if q.usual is not None}
+    usual = {doors[stem]: q.usual for stem, q in quantities.items() if q.usual is not None}
     neutral = {
         doors[stem]: quantity.neutral
         for stem, quantity in shown.items()
@@ -117,16 +130,16 @@ def _candidate(
     shapes = [stem for stem in stems if shown[stem].neutral is None]
     absent = np.array([_neutral_or_usual(shown[stem]) for stem in stems])
     probes, signs = [], []
-    for sizes in _sizes(amplitudes, switches, shown):
-        for shape in _shapes(shapes, bool(switches), shown, effect.held):
+    for size in _sizes(amplitudes, switches, shown):
+        for shape in _shapes(shapes, bool(switches), shown):
             row = dict(zip(stems, absent, strict=True))
-            row.update(sizes)
+            row.update(size)
             row.update(shape)
             probes.append([float(np.clip(row[s], shown[s].lower, shown[s].upper)) for s in stems])
             signs.append(
                 "phase" in shapes
-                or all(shown[s].lower < _neutral_or_usual(shown[s]) < shown[s].upper for s in sizes)
-                and not any(_is_limit(shown[s]) for s in sizes)
+                or all(shown[s].lower < _neutral_or_usual(shown[s]) < shown[s].upper for s in size)
+                and not any(_is_limit(shown[s]) for s in size)
             )
     kept = [k for k, row in enumerate(probes) if row not in probes[:k]]
     times = [stem in shapes for stem in stems] if switches else [False] * len(stems)
@@ -146,21 +159,17 @@ def _candidate(
 
 
 def _shapes(
-    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity], held: Sequence[str]
+    shapes: Sequence[str], timed: bool, shown: Mapping[str, Quantity]
 ) -> Iterator[dict[str, float]]:
-    """Shapes at which an effect is looked for: the first in some steps, the others as usual.
-
-    What other rigs hold may be of any size on one that shows it.
-    """
+    """Shapes at which an effect is looked for: the first in some steps, the others as usual."""
     usual = {stem: _usual(shown[stem]) for stem in shapes}
     if "phase" in shapes:
         for periods, phase in product(PERIODS, (0.0, 90.0)):
             yield usual | {"periods": usual["periods"] * periods / 8.0, "phase": phase}
         return
-    for factor in (DELAYS if timed else SHAPES) if shapes else (1.0,):
+    steps = PRESLIDINGS if "presliding" in shapes else DELAYS if timed else SHAPES
+    for factor in steps if shapes else (1.0,):
         yield usual | {stem: factor * usual[stem] for stem in shapes[:1]}
-    for stem, factor in product([stem for stem in shapes if stem in held], RELEASED):
-        yield usual | {stem: factor * usual[stem]}
 
 
 def _sizes(
@@ -199,7 +208,7 @@ def _at_neutral(model: Model) -> Iterator[CandidateEffect]:
                 quantity.neutral is None
                 or quantity.usual is None
                 or stem in effect.rows
-                or model.rig.holds(effect, stem)
+                or stem in effect.held
                 or here != quantity.to_si(quantity.neutral)
             ):
                 continue

@@ -19,11 +19,19 @@ FAR = 10.0
 """Residual (root mean square), in standard deviations of a signal's noise, from which on it is no
 noise whatever its form."""
 
+STRUCTURE = 3.0
+"""The same of a fit with effects, from which on what is left has no memory that is a noise's."""
+
 
 def reestimated_noise(
     problem: FitProblem, fit: Fitted, chosen: Sequence[CandidateEffect]
 ) -> tuple[Whitening, ...]:
-    """Whitening of what a fit leaves, never of less than is seen at rest."""
+    """Whitening of what a fit leaves, never of less than is seen at rest.
+
+    What is left beyond `STRUCTURE` times the noise is structure: no law carries it, and its memory
+    is no noise's. Taken for one, it would weigh the instants at which something changes alone,
+    where an approximate law is most wrong; so every reading of such a signal counts alike.
+    """
     whitened = problem.whitened_residuals(fit.model, chosen)
     left = residuals(whitened, fit)
     filters = []
@@ -31,6 +39,8 @@ def reestimated_noise(
         parts = [part[channel] for part in left]
         known = [part for part in parts if np.isfinite(part).any()]
         learnt = autoregression(known, before.level) if known else before
+        if known and learnt.level > STRUCTURE * before.level:
+            learnt = replace(learnt, coefficients=(), innovation=learnt.level)
         filters.append(replace(learnt, lines=before.lines, drift=before.drift))
     return tuple(filters)
 

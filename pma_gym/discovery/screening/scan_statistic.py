@@ -29,11 +29,11 @@ CHANCE = 2.5e-5
 """Chance, at most, that noise alone makes a burst anywhere in a signal's residual: with four
 signals, one data set in ten thousand."""
 
-WILD = 3.5
-"""Standard deviations beyond which a reading is wild."""
+OUTLIER = 3.5
+"""Standard deviations beyond which a reading is an outlier."""
 
 BY_CHANCE = 0.01
-"""Chance, over all pieces of a signal, that as many wild readings fall into one of them as there
+"""Chance, over all pieces of a signal, that as many outliers fall into one of them as there
 are, where they come one by one: a sensor may throw readings, at any rate, without structure."""
 
 HALVINGS = 60
@@ -88,7 +88,7 @@ def scan_statistic(
         size = len(beyond[k])
         if size not in weights:
             weights[size] = eigvalsh(toeplitz(colour[:size]))
-        # Less the largest: one wild reading is no structure.
+        # Less the largest: one outlier is no structure.
         power = float(beyond[k] @ beyond[k] - np.max(beyond[k]) ** 2)
         chance = tail(power, weights[size]) * len(pieces)
         least = min(least, chance)
@@ -107,18 +107,18 @@ def noise_of(parts: Sequence[Array], level: float) -> Whitening:
     """
     noise = white_noise(level)
     for _ in range(2):
-        # Wild readings are cut: of noise that costs a thousandth of its level.
-        most = WILD * noise.level
+        # Outliers are cut: of noise that costs a thousandth of its level.
+        most = OUTLIER * noise.level
         noise = autoregression([np.clip(part, -most, most) for part in parts], noise.level)
     return noise
 
 
 def _together(beyond: Sequence[Array]) -> NDArray[np.bool_]:
-    """Pieces in which more readings are wild than come together by chance, by all the others."""
-    wild = np.array([np.count_nonzero(piece > WILD) for piece in beyond])
+    """Pieces in which more outliers lie than come together by chance, by all the others."""
+    outliers = np.array([np.count_nonzero(piece > OUTLIER) for piece in beyond])
     sizes = np.array([len(piece) for piece in beyond])
-    rate = (wild.sum() - wild + 1.0) / (sizes.sum() - sizes + 1.0)
-    return binom.sf(wild - 1, sizes, rate) * len(beyond) <= BY_CHANCE
+    rate = (outliers.sum() - outliers + 1.0) / (sizes.sum() - sizes + 1.0)
+    return binom.sf(outliers - 1, sizes, rate) * len(beyond) <= BY_CHANCE
 
 
 def autocorrelation(noise: Whitening, count: int) -> Array:

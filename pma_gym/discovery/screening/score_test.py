@@ -182,7 +182,7 @@ def _probe(
         baseline.whitened.logged, baseline.columns, changes, strict=True
     ):
         flat = theirs.reshape(len(theirs), -1)
-        across += ours[1:].reshape(size - 1, -1) @ flat.T
+        across += ours[1:].reshape(size - 1, flat.shape[1]) @ flat.T
         whole += np.einsum("ij,ij->i", flat, flat, dtype=np.float64)
         edges = baseline.whitened.edges(logged)[:-1]
         for slopes_by_trial, part in ((along, theirs), (own, ours[1:])):

@@ -78,10 +78,10 @@ def backward_elimination(problem: FitProblem, fit: Fitted) -> Elimination | None
         given = as_given(problem)
         return given if given.fit.chi_square <= most else None
     begun = np.clip(whitened.centre[kept] + moves, whitened.lower[kept], whitened.upper[kept])
-    fewest = narrow.fit(problem.given.replace(dict(zip(paths, map(float, begun), strict=True))))
-    if fewest is None or not fewest.chi_square <= most:
+    reduced = narrow.fit(problem.given.replace(dict(zip(paths, map(float, begun), strict=True))))
+    if reduced is None or not reduced.chi_square <= most:
         return None
-    return Elimination(narrow, replace(fewest, covariance=covariance(narrow, fewest, ())))
+    return Elimination(narrow, replace(reduced, covariance=covariance(narrow, reduced, ())))
 
 
 def as_given(problem: FitProblem) -> Elimination:

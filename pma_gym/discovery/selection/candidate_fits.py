@@ -9,6 +9,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import values
 from pma_gym.discovery.fitting.journal import Journal
+from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
 from pma_gym.discovery.screening.score_test import (
     Baseline,
     ScannedRange,
@@ -17,6 +18,7 @@ from pma_gym.discovery.screening.score_test import (
     starting_points,
 )
 from pma_gym.document_shape import ANY, ListOf, Real, check_shape
+from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 
 BEGUN, ALL_BEGUN = 2, 8
@@ -47,6 +49,16 @@ def stripped(problem: FitProblem, before: Fitted) -> Model:
     return problem.given.replace(own)
 
 
+def probed(problem: FitProblem, before: Fitted, candidate: CandidateEffect) -> WhitenedResiduals:
+    """Trials beside the model in which a candidate is looked for.
+
+    It is without the effects that were added, whose changes add up, but for a candidate that only
+    changes what those do.
+    """
+    through = CATALOGUE[candidate.effect].port in problem.given.rig.modifying_ports
+    return problem.probed(before.model if through else stripped(problem, before), candidate)
+
+
 def fitted(
     problem: FitProblem,
     baseline: Baseline,
@@ -64,7 +76,7 @@ def fitted(
     if kept is not None:
         return kept
     best: Fitted | None = None
-    whitened = problem.probed(stripped(problem, before), each.candidate)
+    whitened = probed(problem, before, each.candidate)
     for begun in starting_points(baseline, whitened, each)[: ALL_BEGUN if caught else BEGUN]:
         fit = problem.fit(before.model, extra, {each.candidate.name: begun})
         if fit is not None and caught:
@@ -115,7 +127,7 @@ def unfitted(
     names = []
     for each in scores:
         if falls_short(each, each.gain):
-            whitened = problem.probed(stripped(problem, before), each.candidate)
+            whitened = probed(problem, before, each.candidate)
             scan = scanned_range(baseline, whitened, each)
             kept = _kept_share(problem, before, chosen, each.candidate, scan)
             if kept >= LEAST_FITTED and falls_short(each, min(each.gain, scan.most)):

@@ -30,13 +30,12 @@ from pma_gym.discovery.selection.candidate_fits import (
     better,
     cost,
     fitted,
+    probed,
     refit,
     restarted,
-    stripped,
     unfitted,
     without_idle,
 )
-from pma_gym.plant.model import Model
 
 ALARM = 0.005
 """Family-wise rate of false alarms that the gate lets through."""
@@ -178,12 +177,11 @@ def _stage(
     baseline = Baseline.at(
         problem.whitened_residuals(before.model, chosen), before.values, before.steps
     )
-    plain = stripped(problem, before)
     scores = screen(
         baseline,
         rest,
         seed + len(chosen),
-        lambda candidate: problem.probed(plain, candidate),
+        lambda candidate: probed(problem, before, candidate),
         lambda done: progress(step, done, len(rest)),
     )
     scores.sort(key=lambda each: -each.gain)
@@ -197,7 +195,7 @@ def _stage(
         rows = sum(len(trial.time) for trial in problem.trials)
         # As large as a change must be (`LEAST_CHANGE`), were it all in one signal.
         least = max(CARRIED * scan.excess, LEAST_CHANGE**2 * rows)
-        scores = _refined_scores(problem, baseline, plain, scores, scan.chance, least)
+        scores = _refined_scores(problem, baseline, before, scores, scan.chance, least)
         gate = tuple(each for each in scores if each.starts)
     fits: dict[str, Fitted] = {}
     failed: tuple[str, ...] = ()
@@ -218,7 +216,7 @@ def _stage(
 def _refined_scores(
     problem: FitProblem,
     baseline: Baseline,
-    plain: Model,
+    before: Fitted,
     scores: Sequence[ScreeningScore],
     chance: float,
     least: float,
@@ -228,13 +226,13 @@ def _refined_scores(
     Args:
         problem: the trials.
         baseline: the refitted model.
-        plain: the same, as candidates are put into it.
+        before: its fit.
         scores: the looks so far.
         chance: that noise bursts so.
         least: chi-square that explains bursts.
     """
     refined = [
-        refined_score(baseline, problem.probed(plain, each.candidate), each) for each in scores
+        refined_score(baseline, probed(problem, before, each.candidate), each) for each in scores
     ]
     refined = [
         replace(each, p_value=min(each.p_value, chance)) if each.gain >= least else each

@@ -17,7 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.discovery.preparation.acceptance_floors import REST, AcceptanceFloor, is_summary
-from pma_gym.discovery.preparation.noise import Whitening, at_rest, autoregression, white_noise
+from pma_gym.discovery.preparation.noise import (
+    Whitening,
+    autoregression,
+    rest_readings,
+    white_noise,
+)
 from pma_gym.discovery.verdict.flexible_regression import explained, variables
 from pma_gym.estimation.logged import Logged
 
@@ -227,7 +232,7 @@ def _noise(logged: Sequence[Logged], channel: int, level: float) -> Whitening:
 
     At rest alone: an autoregression of the residual would take missing structure for noise.
     """
-    segments = at_rest(logged, channel)
+    segments = rest_readings(logged, channel)
     learnt = autoregression(segments, 0.0) if segments else white_noise(1.0)
     share = learnt.innovation / learnt.level if learnt.level > 0.0 else 1.0
     return Whitening(learnt.coefficients, share * level, level)

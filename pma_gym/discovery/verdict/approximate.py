@@ -77,13 +77,12 @@ def closing(gaps: Mapping[str, Gap], effects: Sequence[str]) -> Closing | None:
 
 def _laws(names: Sequence[str]) -> int:
     """How many laws effects have."""
-    known = [CATALOGUE.get(name) for name in names]
-    return len(
-        {
-            effect.rate_independent_law if effect and effect.rate_independent_law else name
-            for effect, name in zip(known, names, strict=True)
-        }
-    )
+    laws: list[str] = []
+    for name in names:
+        known = [CATALOGUE[other] for other in laws if other in CATALOGUE]
+        if name not in CATALOGUE or not any(CATALOGUE[name].shares_law(each) for each in known):
+            laws.append(name)
+    return len(laws)
 
 
 def _beyond(misfit: float, floor: float) -> float:

@@ -47,7 +47,7 @@ CONSTANT_FORCE = Effect(
 )
 CONSTANT_TORQUE = Effect(
     name="constant_torque",
-    port="joint_torque",
+    port="joint_load",
     parameters=ConstantTorque,
     law=constant_force,
     signature="the same torque at every angle, speed and direction",

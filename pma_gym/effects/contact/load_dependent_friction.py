@@ -30,13 +30,15 @@ class JointLoadFriction(NamedTuple):
     ]
 
 
-def load_friction(drive_force, memory, p):
-    """Force of the bristles, in proportion to the force that the drive passes on.
+def load_friction(drive_force, carried_force, memory, p):
+    """Force of the bristles, in proportion to what presses the teeth on both sides of the gears.
 
-        F = -share |F_drive| z
+        F = -share (|F_drive| + |F_carried|) / 2 z
 
     Args:
         drive_force: force or torque of the drive F_drive (N, N m).
+        carried_force: force or torque that the rig carries F_carried, of weight, springs and what
+            is constant (N, N m).
         memory: deflection z of the bristles, between -1 and 1; see `friction_path`.
         p: LoadDependentFriction or JointLoadFriction: share, presliding (m, rad).
     Returns:
@@ -45,7 +47,7 @@ def load_friction(drive_force, memory, p):
         Coulomb's law for teeth that the drive presses on each other; what rubs without a load is
         dry friction beside it.
     """
-    return -p.share * abs(drive_force) * memory
+    return -0.5 * p.share * (abs(drive_force) + abs(carried_force)) * memory
 
 
 def load_friction_bend(memory, direction, p):

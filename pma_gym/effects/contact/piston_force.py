@@ -32,7 +32,7 @@ def piston_force(pressure, p):
 
 PISTON_FORCE = Effect(
     name="piston_force",
-    port="contact_force",
+    port="rod_force",
     parameters=PistonForce,
     law=piston_force,
     signature="force in proportion to the pressure, the same at every position and speed",

@@ -76,7 +76,7 @@ SPRING = Effect(
 )
 JOINT_SPRING = Effect(
     name="joint_spring",
-    port="joint_torque",
+    port="joint_load",
     parameters=JointSpring,
     law=linear_spring,
     signature="torque in proportion to the angle",
@@ -90,7 +90,7 @@ HARDENING_SPRING = Effect(
 )
 JOINT_HARDENING_SPRING = Effect(
     name="joint_hardening_spring",
-    port="joint_torque",
+    port="joint_load",
     parameters=JointHardeningSpring,
     law=cubic_spring,
     signature=_CUBIC,

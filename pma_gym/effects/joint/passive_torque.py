@@ -76,7 +76,7 @@ class JointFriction(NamedTuple):
 
 JOINT_WEIGHT = Effect(
     name="joint_weight",
-    port="joint_torque",
+    port="joint_load",
     parameters=JointWeight,
     law=weight_torque,
     signature="torque that depends on the angle, as its sine",

@@ -18,13 +18,13 @@ beyond."""
 class CoulombFriction(NamedTuple):
     """Parameters of `friction_force`."""
 
-    static: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.96", 0.0, usual=1.96)]
-    dynamic: Annotated[float, Quantity("N", 0, 200, "Serres 2008, 2.1.1.1: 1.47", 0.0, usual=1.47)]
+    static: Annotated[float, Quantity("N", 0, 1e5, "Serres 2008, 2.1.1.1: 1.96", 0.0, usual=1.96)]
+    dynamic: Annotated[float, Quantity("N", 0, 1e5, "Serres 2008, 2.1.1.1: 1.47", 0.0, usual=1.47)]
     stribeck_speed: Annotated[
         float, Quantity("mm/s", 0.01, 1000, "assumption: 5 mm/s, ball slides 1-10", usual=5)
     ]
     presliding: Annotated[
-        float, Quantity("um", 0.1, 20000, "assumption: 10 um at full static force", usual=10)
+        float, Quantity("um", 0.1, 1000, "assumption: 10 um at full static force", usual=10)
     ]
 
 
@@ -138,7 +138,6 @@ COULOMB_FRICTION = Effect(
     law=friction_force,
     rate_independent_law=friction_path,
     path_breakpoint=friction_breakpoint,
-    release_path=release_path,
     breakpoint=stribeck_breakpoint,
     signature=(
         "odd step of force at zero speed, the same at every load and pressure; the slide sticks "

@@ -80,15 +80,15 @@ def _refusal(task: Task, model: Model, miss: Miss, pressure: float) -> str:
     """What an exercise cannot have that begins at a pressure (Pa), and what it can."""
     between = constant_moments(model, own_device(model), pressure)
     can = "where no one moment can be held from 0 to 90 deg"
-    mend = "begin"
+    fix = "begin"
     if between is not None:
         low, high = between
         can = f"where one moment can be held from 0 to 90 deg from {low:g} to {high:g} N m"
-        mend = "prescribe one of these, or begin"
+        fix = "prescribe one of these, or begin"
     lowest, highest = (1e-3 * start for start in task.starts)
     return (
         f"task {task.name}: {miss.wanted:g} N m at {math.degrees(miss.angle):.3g} deg cannot be "
-        f"had, beginning at {1e-3 * pressure:.4g} kPa, {can}; {mend} at another pressure_kpa "
+        f"had, beginning at {1e-3 * pressure:.4g} kPa, {can}; {fix} at another pressure_kpa "
         f"(the task's: {lowest:g}-{highest:g})"
     )
 

@@ -22,10 +22,10 @@ from pma_gym.plant.rigs.station import TURNING_M
 PORTS: dict[str, Port] = {
     "imposed_motion": Port("acceleration of what the drive moves (m/s^2)", least=1, most=1),
     "muscle_force": Port("force of the muscle (N), added; positive shortens it"),
-    "slide_force": Port("force on what moves (N), added; positive in the direction of contraction"),
     "contact_force": Port(
         "force on what moves (N), added; positive in the direction of contraction"
     ),
+    "rod_force": Port("force of piston, seal and guide (N), added; positive likewise"),
     "lost_motion": Port("way that is lost before what rubs (m)", most=1),
     **{name: STATION_PORTS[name] for name in ("muscle_damping", "damping_factor", "chamber")},
     "regulator_line": Port("pressure that the regulator settles at (Pa)", most=1),
@@ -36,7 +36,6 @@ PORTS: dict[str, Port] = {
 """Ports of the rig: how many effects each takes, and what becomes of their results."""
 
 REFUSED_EFFECTS: dict[str, str] = {
-    "hand_push": "the motion is imposed, whoever pulls; [constant_force] is a force beside it",
     "load_dependent_damping": "there is no cable; take [damping] or [symmetric_damping]",
     "residual_load": "there is no load beside the force that is measured",
 }
@@ -67,7 +66,7 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("regulator_time_constant", lag.time_constant if lag else 1.0 / corner)
     eq.let("regulator_pace", eq.product("regulator_pace"))
     at_once = corner * eq["pressure_command"], corner
-    force = eq.total("muscle_force") + eq.total("slide_force") + eq.total("contact_force")
+    force = eq.total("muscle_force") + eq.total("contact_force") + eq.total("rod_force")
     resistance = eq.total("muscle_damping") * eq.product("damping_factor")
     eq.outputs = {
         "contraction": eq["contraction"],
@@ -114,12 +113,12 @@ IMPOSED = Rig(
     has_muscle=False,
     is_diagnosable=True,
     imposes_motion=True,
+    modifying_ports=("lost_motion",),
     needed_ports={
         "muscle_force": "muscle_force",
         **dict.fromkeys(
             ("regulator_delay", "regulator_lag", "regulator_pace", "chamber"), "regulator_line"
         ),
     },
-    shown_shapes=("presliding",),
     direct_commands={"imposed_motion": "contraction_command"},
 )

@@ -21,6 +21,7 @@ PORTS: dict[str, Port] = {
     "drive_lag": Port("command that arrives at the joint (N m, V)", most=1),
     "drive_gain": Port("torque of the drive besides (N m), added"),
     "joint_drive_loss": Port("torque that the drive loses on its way (N m), added"),
+    "joint_load": Port("torque that the joint carries at rest (N m), added; positive likewise"),
     "joint_torque": Port("torque on the joint (N m), added; positive as the angle grows"),
 }
 """Ports of the joint: how many effects each takes, and what becomes of their results."""
@@ -48,7 +49,9 @@ def write_equations(equations: PlantEquations) -> None:
     eq.let("command", eq.passed("drive_lag", "load_command"))
     eq.let("drive_force", eq.one("joint_drive"))
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
-    torque = eq["drive_force"] + eq.total("joint_drive_loss") + eq.total("joint_torque")
+    eq.let("carried_force", eq.total("joint_load"))
+    torque = eq["drive_force"] + eq["carried_force"]
+    torque = torque + eq.total("joint_drive_loss") + eq.total("joint_torque")
     eq.outputs = {"angle": eq["angle"], "speed": eq["spin"]}
     eq.add_state("angle", eq["spin"], SCALES["angle"])
     eq.add_state("spin", torque / eq.parameters["inertia"].inertia, SCALES["spin"])
@@ -84,6 +87,7 @@ JOINT = Rig(
     start_paths={"angle": "joint_start.angle_deg", "spin": "joint_start.spin_deg_per_s"},
     has_muscle=False,
     is_diagnosable=True,
+    drive_port="joint_drive",
     moving_lags={"lag_encoder": "spin"},
     direct_commands={"torque_drive": "torque_command", "dc_motor": "winding_voltage"},
 )

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from pma_gym.data.signals import Signal
-from pma_gym.effects.effect import Effect, Parameters
+from pma_gym.effects.effect import Parameters
 from pma_gym.effects.ports import Port
 from pma_gym.plant.composition import PlantEquations
 from pma_gym.plant.equilibrium.problem import EquilibriumProblem
@@ -36,12 +36,12 @@ class Rig:
         is_diagnosable: it is a balance of forces that effects add to, as a diagnosis needs.
         needed_ports: port at which a model must have an effect for one to be missing at another,
             by that other: a rig without a regulator misses no lag of one.
-        shown_shapes: parameters (field names) that this rig shows although effects hold them, such
-            as a presliding distance, of which a slide shows nothing.
+        modifying_ports: ports whose effects do nothing but change what others do.
         moving_lags: states of sensors' lags whose quantity moves where a trial begins, and the
             state that is its rate.
         start_paths: parameters of a free rig that say where a trial begins, by the state that is
             there then: its position, then its speed.
+        drive_port: port of the drive whose force moves a free rig.
         imposes_motion: its drive takes a record of positions, and forces follow from the motion.
         direct_commands: command that each of its drives takes as it comes, without a line of volts.
     """
@@ -61,16 +61,13 @@ class Rig:
     is_free: bool = False
     has_muscle: bool = True
     is_diagnosable: bool = False
+    drive_port: str = ""
     imposes_motion: bool = False
     needed_ports: Mapping[str, str] = field(default_factory=dict)
-    shown_shapes: tuple[str, ...] = ()
+    modifying_ports: tuple[str, ...] = ()
     moving_lags: Mapping[str, str] = field(default_factory=dict)
     start_paths: Mapping[str, str] = field(default_factory=dict)
     direct_commands: Mapping[str, str] = field(default_factory=dict)
-
-    def holds(self, effect: Effect, stem: str) -> bool:
-        """Whether a parameter (field name) of an effect stays at its value in fits of this rig."""
-        return stem in effect.held and stem not in self.shown_shapes
 
     @property
     def outputs(self) -> tuple[str, ...]:

@@ -57,7 +57,8 @@ def write_equations(equations: PlantEquations) -> None:
     # What pulls the slide out counts as backwards.
     eq.let("drive_force", -eq["load_arriving"])
     eq.let("drive_force", eq["drive_force"] + eq.total("drive_gain"))
-    eq.let("slide_force", eq.total("slide_force") + eq.total("contact_force"))
+    eq.let("carried_force", eq.total("contact_force"))
+    eq.let("slide_force", eq.total("slide_force") + eq["carried_force"])
     eq.let("resistance", eq.total("muscle_damping"))
     eq.outputs = {"contraction": eq["contraction"]}
     pushed = eq["drive_force"] + eq.total("drive_loss")
@@ -103,5 +104,6 @@ SLIDE = Rig(
     },
     has_muscle=False,
     is_diagnosable=True,
+    drive_port="two_way_drive",
     moving_lags={"lag_lvdt": "velocity"},
 )

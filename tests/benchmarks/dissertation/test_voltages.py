@@ -51,7 +51,7 @@ def test_pma_gym_simulates_the_file(tmp_path):
     path, out = tmp_path / "volts.csv", tmp_path / "log.csv"
     assert voltages(path, "improved_feedforward", "displacement", 300).exit_code == 0
     done = CliRunner().invoke(
-        pma_gym, ["simulate", str(path), "--out", str(out), "--hold", "zero", "--no-noise"]
+        pma_gym, ["simulate", str(path), "--out", str(out), "--interpolation", "zoh", "--no-noise"]
     )
     assert done.exit_code == 0, done.output
     log = read_trial(out)

@@ -10,7 +10,13 @@ from benchmarks.exercise.lag.causal import DEVIATIONS, PERIOD, Loop, causal_boun
 from benchmarks.exercise.lag.foreknown import foreknown_course, retimed
 from benchmarks.exercise.lag.plots import bound_plot
 from benchmarks.exercise.lag.points import points, rates
-from benchmarks.exercise.lag.rehearsal import LAG, NO_LAG, Exertion, Rehearsals, own_floor
+from benchmarks.exercise.lag.repeated_exercise import (
+    LAG,
+    NO_LAG,
+    Exertion,
+    RepeatedExercise,
+    own_floor,
+)
 from benchmarks.exercise.lag.swing import swings, unhindered
 from benchmarks.exercise.lag.tables import bound_tables
 from pma_gym.envs import PMAVectorEnv
@@ -60,13 +66,13 @@ def test_more_lag_is_never_better_and_costs_who_can_plan_hardly_anything(forekno
 def test_voltages_stay_within_what_a_regulator_takes_and_are_what_was_run(foreknown):
     course = foreknown[NO_LAG]
     assert course.voltages.min() >= 0.0 and course.voltages.max() <= 10.0
-    again = Rehearsals(exertion(NO_LAG, pressure_kpa=300.0), 1).course(course.voltages)
+    again = RepeatedExercise(exertion(NO_LAG, pressure_kpa=300.0), 1).course(course.voltages)
     assert again.by_phase == course.by_phase
 
 
 def test_a_moment_is_held_by_who_knows_the_course():
     task = "isotonic_exercise"
-    start = Rehearsals(exertion(0.055, task=task), 1)
+    start = RepeatedExercise(exertion(0.055, task=task), 1)
     before = start.course(np.full(start.steps, start.start_voltage()))
     course = foreknown_course(exertion(0.055, task=task), blocks=(16,))
     assert max(course.by_phase.values()) < 0.05 * max(before.by_phase.values())

@@ -1,4 +1,4 @@
-"""`python -m benchmarks safety`: wild agents, and what they do to operators."""
+"""`python -m benchmarks safety`: adversarial agents, and what they do to operators."""
 
 import io
 
@@ -12,7 +12,7 @@ from benchmarks.executors.choice import local
 from benchmarks.executors.executor import ThisProcess
 from benchmarks.exercise.safety_layer.adversarial import KINDS, PUMPING, kind_of, planned, pumped
 from benchmarks.exercise.safety_layer.episodes import SETS, measure
-from benchmarks.exercise.safety_layer.job import read_safety, run_safety, safety_words
+from benchmarks.exercise.safety_layer.job import read_safety, run_safety, safety_text
 from pma_gym.tasks import EXERCISES, PACED, PACING
 from pma_gym.tasks.exercise import SAFE_MOMENT
 from pma_gym.tasks.safety_filter import FILTER_PACED, FILTER_PACING, filtered_pressure
@@ -53,7 +53,7 @@ def test_the_layer_saves_operators_from_wild_commands(tmp_path):
             assert tally.peak_moment_nm <= SAFE_MOMENT
     assert read_safety(tmp_path / "safety.json") == safety
     assert "0 of 42 episodes were unsafe" in said.getvalue()
-    assert safety_words(safety) in (tmp_path / "safety.md").read_text()
+    assert safety_text(safety) in (tmp_path / "safety.md").read_text()
 
 
 def test_what_comes_of_an_episode_does_not_depend_on_how_many_there_are():

@@ -1,6 +1,7 @@
 import importlib.util
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from benchmarks.hidden_effects.baselines import (
     stepwise,
 )
 from benchmarks.hidden_effects.baselines.preparation import prepare
-from benchmarks.hidden_effects.baselines.registry import WAYS
+from benchmarks.hidden_effects.baselines.registry import BASELINES
 from benchmarks.hidden_effects.baselines.signatures import signature
 from benchmarks.hidden_effects.evaluation.verdicts import compare
 from benchmarks.hidden_effects.generation import files
@@ -95,12 +96,12 @@ def test_sparse_regression_recovers_a_planted_law():
 
 
 def test_balances_of_a_true_model_leave_little(ready):
-    slide, drive, pressure, way = balances.balances(ready)
-    rms = [float(np.sqrt(np.mean(each.residual**2))) for each in (slide, drive, pressure, way)]
+    slide, drive, pressure, baseline = balances.balances(ready)
+    rms = [float(np.sqrt(np.mean(each.residual**2))) for each in (slide, drive, pressure, baseline)]
     loads = np.concatenate([part[2] for part in ready.readings])
     # Forces of hundreds of N, of which creep is some.
     assert rms[0] < 0.1 * np.std(loads) and rms[1] < 0.03 * np.std(loads)
-    for each in (slide, drive, pressure, way):
+    for each in (slide, drive, pressure, baseline):
         lengths = {len(term) for term in each.terms.values()} | {each.base.shape[1]}
         assert lengths == {len(each.residual)}
         assert abs(float(each.residual.mean())) < 1e-9 * rms[0] + 1e-9
@@ -142,13 +143,13 @@ CHEAP = ("bic_stepwise", "sparse_regression", "gaussian_process", "random_forest
 
 
 @pytest.mark.parametrize(
-    "way",
+    "baseline",
     [
-        pytest.param(way, marks=() if way == "sparse_regression" else pytest.mark.campaign)
-        for way in CHEAP
+        pytest.param(name, marks=() if name == "sparse_regression" else pytest.mark.campaign)
+        for name in CHEAP
     ],
 )
-def test_every_way_sees_much_creep(way, folder, dataset, monkeypatch):
+def test_every_baseline_sees_much_creep(baseline, folder, dataset, monkeypatch):
     # The whole catalogue, pair by pair, would take a minute to compile and fit.
     few = [
         each
@@ -156,16 +157,16 @@ def test_every_way_sees_much_creep(way, folder, dataset, monkeypatch):
         if each.name in FEW
     ]
     monkeypatch.setattr(preparation, "candidate_effects", lambda model, orders: few)
-    monkeypatch.setattr(gaussian_process, "MOST_TICKS", 60)
-    for name in WAYS[way].needs:
+    monkeypatch.setattr(gaussian_process, "MOST_BINS", 60)
+    for name in BASELINES[baseline].needs:
         pytest.importorskip(name)
-    answer = WAYS[way].ask(dataset, 0, 1)
+    answer = BASELINES[baseline].ask(dataset, 0, 1)
     truth = json.loads((folder / "truth" / "case_0001.json").read_text("utf-8"))
     outcome = compare(truth, json.loads(json.dumps(answer)))
     assert outcome.detected
-    if way == "gaussian_process":
+    if baseline == "gaussian_process":
         assert outcome.verdict == "unknown" and not outcome.named
-    if way == "bic_stepwise":
+    if baseline == "bic_stepwise":
         assert outcome.hits == 1 and outcome.named[0] == "creep"
 
 
@@ -213,10 +214,12 @@ def test_a_run_goes_on_and_counts_what_failed(folder, monkeypatch, tmp_path):
     def bad(dataset, seed, jobs):
         raise RuntimeError("out of luck")
 
-    ways = {name: type("Way", (), {"ask": staticmethod(ask), "title": name, "absence": ""})
-            for name, ask in (("good", good), ("bad", bad))}  # fmt: skip
+    baselines = {
+        name: SimpleNamespace(ask=ask, title=name, absence="")
+        for name, ask in (("good", good), ("bad", bad))
+    }
     for module in (answers, comparison):
-        monkeypatch.setattr(module, "WAYS", ways)
+        monkeypatch.setattr(module, "BASELINES", baselines)
     for _ in range(2):
         answers.ask_all(folder, ("good", "bad"), 1)
     assert len(asked) == 1
@@ -229,10 +232,10 @@ def test_a_run_goes_on_and_counts_what_failed(folder, monkeypatch, tmp_path):
 
 
 def test_a_way_names_what_it_lacks():
-    for way in WAYS.values():
-        lacking = [name for name in way.needs if importlib.util.find_spec(name) is None]
-        assert bool(way.absence) == bool(lacking)
-        assert all(name in way.absence for name in lacking)
+    for baseline in BASELINES.values():
+        lacking = [name for name in baseline.needs if importlib.util.find_spec(name) is None]
+        assert bool(baseline.absence) == bool(lacking)
+        assert all(name in baseline.absence for name in lacking)
 
 
 def test_the_true_noise_is_whitened():

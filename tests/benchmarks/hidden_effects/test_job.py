@@ -185,7 +185,7 @@ def test_parameters_count_as_named_only_where_they_moved():
     first, second, third = (compare(off, each) for each in (named, other, answer))
     assert first.parameters and not first.parameters_spurious
     assert second.parameters is False and second.parameters_spurious
-    assert third.parameters is False and third.parameters_told
+    assert third.parameters is False and third.parameters_reported
 
 
 def test_every_block_has_its_rates_and_effects_take_turns():
@@ -194,18 +194,18 @@ def test_every_block_has_its_rates_and_effects_take_turns():
 
 
 @pytest.fixture(scope="module")
-def poor():
+def case():
     """A case of three trials at one pressure each, which cannot tell that its regulator is late."""
     return draw_undecidable(90003, 1, "regulator_delay")
 
 
-def test_an_undecidable_case_keeps_what_the_ruler_promised(poor):
-    (hidden,) = poor.truth["effects"]
-    assert poor.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN
-    motor, regulator = np.array(poor.motor), np.array(poor.regulator)
+def test_an_undecidable_case_keeps_what_the_ruler_promised(case):
+    (hidden,) = case.truth["effects"]
+    assert case.truth["why"]["nothing"] <= UNTOLD and hidden["witness"]["r"] >= SHOWN
+    motor, regulator = np.array(case.motor), np.array(case.regulator)
     assert np.all(np.ptp(regulator, axis=1) == 0.0) and np.ptp(motor) > 1.0
     commands = Commands(motor, regulator, np.arange(len(motor), dtype=float))
-    rig, with_it = poor.truth["base"], {"regulator_delay": hidden["parameters"]}
+    rig, with_it = case.truth["base"], {"regulator_delay": hidden["parameters"]}
     plain, late = simulate_variants(commands, [(rig, {}), (rig, with_it)])
     # Without any refit, so that nothing rests on what a refit may absorb.
     assert np.sum(((late - plain) / noise_levels(np.full(4, 0.7))) ** 2) < 2.0
@@ -221,16 +221,16 @@ def asking(folder):
     raise ValueError(f"a trial of {rows} rows")
 
 
-def test_what_is_proposed_is_carried_out_on_the_same_rig(poor):
-    assert follow(poor, Answer(document("undecidable")), 2, asking) == {}
+def test_what_is_proposed_is_carried_out_on_the_same_rig(case):
+    assert follow(case, Answer(document("undecidable")), 2, asking) == {}
     said = document("undecidable") | {"next_experiment": {"protocol": "a short hold"}}
     first = Answer(said, following=(np.full(150, 3.0), np.full(150, 5.0)))
-    rounds = follow(poor, first, 2, asking)
+    rounds = follow(case, first, 2, asking)
     assert [len(rounds[way]) for way in ("proposed", "random")] == [1, 1]
     assert rounds["proposed"][0]["protocol"] == "a short hold"
     assert rounds["proposed"][0]["said"] == "hysteresis" and rounds["proposed"][0]["wrong"]
-    more = with_trial(poor, (np.full(150, 3.0), np.full(150, 5.0)), np.random.default_rng(3))
-    assert len(more.readings) == len(poor.readings) + 1 and more.readings[-1].shape == (150, 4)
+    more = with_trial(case, (np.full(150, 3.0), np.full(150, 5.0)), np.random.default_rng(3))
+    assert len(more.readings) == len(case.readings) + 1 and more.readings[-1].shape == (150, 4)
     # 3 V: 97.84 N/V, give or take a tenth; 5 V: 59.9 kPa/V.
     assert more.readings[-1][:, 2].mean() == pytest.approx(291.5, rel=0.12)
     assert more.readings[-1][:, 3].mean() == pytest.approx(279.1, rel=0.02)

@@ -27,7 +27,7 @@ from benchmarks.measured.rounds import Round, rounds
 from benchmarks.measured.smooth import smooth_errors
 from benchmarks.measured.stages import Stages
 from benchmarks.measured.steps import Step
-from benchmarks.measured.tables import COLUMNS, print_measured, reverse_words
+from benchmarks.measured.tables import COLUMNS, print_measured, reverse_text
 from benchmarks.measured.trials import measured_dataset
 from benchmarks.measured.triangles import TRIANGLES, Held
 from pma_gym.data.datasets.dataset import read_dataset
@@ -305,7 +305,7 @@ def test_the_page_and_the_tables_say_what_was_found():
         folds={key: 0.8 for key, _ in COLUMNS},
         floors={key: 0.6 for key, _ in COLUMNS},
         smooth={key: 0.7 for key, _ in COLUMNS},
-        blind=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
+        not_detectable=[Undecidable("regulator_delay", "regulator_delay", None, 1)],
         proposals=[Proposal("pressure steps", ("regulator_delay",), 0.2)],
         reverse=[explained],
         held=[Held(28, "station", 17.2, (11.1, 11.8), 1.7, 1.94)],
@@ -320,6 +320,6 @@ def test_the_page_and_the_tables_say_what_was_found():
         assert "regulator delay" in text
         assert "undecidable" in text
         assert "hysteresis" in text
-    words = " ".join(reverse_words(result))
+    words = " ".join(reverse_text(result))
     assert "rotor.radius mm leaves 1.10 mm" in words
     assert "creep (but worse in displacement)" in words

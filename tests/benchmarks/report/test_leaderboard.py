@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from benchmarks.__main__ import app
 from benchmarks.bounds import cache as module
-from benchmarks.report.errors import Measure, Record, is_bound, measures, pooled_measure
+from benchmarks.report.errors import Measure, SuiteRecord, is_bound, measures, pooled_measure
 from benchmarks.report.leaderboard import Leaderboard, read_leaderboard
 from benchmarks.report.page import page_blocks
 from benchmarks.report.plot_style import styles_of
@@ -54,7 +54,7 @@ def bounds(monkeypatch):
 
 
 def board(suite, rows):
-    return Leaderboard(Record.of(suite, rows), INFO)
+    return Leaderboard(SuiteRecord.of(suite, rows), INFO)
 
 
 def test_measures_keep_the_way_back_and_unseen_references_apart():
@@ -162,8 +162,8 @@ def test_rows_of_other_versions_and_unknown_episodes_do_not_count():
     suite = simulated_suite()
     rows = simulated_rows(suite)
     other = [row | {"version": 2} for row in rows] + [row | {"repeat": 7} for row in rows]
-    assert not Record.of(suite, other).rows
-    assert len(Record.of(suite, rows + other).rows) == len(rows)
+    assert not SuiteRecord.of(suite, other).rows
+    assert len(SuiteRecord.of(suite, rows + other).rows) == len(rows)
 
 
 def test_somebody_s_own_controller_is_ranked_with_the_others():
@@ -229,7 +229,7 @@ def test_spending_leaves_failed_cases_out_and_counts_them():
     first = next(row for row in ours if row["task"] == "displacement")
     first["failure"] = "it broke"
     first["act_us"] = 1e9
-    (spent,) = spending(Record.of(suite, rows), Measure("", ("displacement",), "mm"), ["pid"])
+    (spent,) = spending(SuiteRecord.of(suite, rows), Measure("", ("displacement",), "mm"), ["pid"])
     assert spent.failures == 1
     assert spent.act_us == 10.0
     # 10 ms of control period, 20 us of computing.

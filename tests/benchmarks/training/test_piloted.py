@@ -38,7 +38,7 @@ def batch(view, form, options, task="displacement", **more):
     return PilotedVecEnv(COUNT, task, view, form, nominal, **more, **options)
 
 
-def alone(view, form, options, name=DISPLACEMENT):
+def single(view, form, options, name=DISPLACEMENT):
     form = {key: value for key, value in form.to_json().items() if value is not None}
     return PilotedEnv(gym.make(name), view.to_json(), form, options=options)
 
@@ -46,7 +46,7 @@ def alone(view, form, options, name=DISPLACEMENT):
 @pytest.mark.parametrize("case", CASES)
 def test_the_batch_is_the_one_environment(case):
     view, form, options = CASES[case]
-    envs, singles = batch(view, form, options), [alone(view, form, options) for _ in range(COUNT)]
+    envs, singles = batch(view, form, options), [single(view, form, options) for _ in range(COUNT)]
     actions = np.random.default_rng(1).uniform(-1.5, 1.5, (150, COUNT, 1)).astype(np.float32)
     envs.seed(5)
     seen = envs.reset()
@@ -72,7 +72,7 @@ def test_the_batch_is_the_one_environment(case):
 def test_rotation_too():
     view, form, options = CASES["increment"]
     envs = batch(view, form, options, "rotation")
-    one = alone(view, form, options, "pma_gym/IsokineticRotation-v0")
+    one = single(view, form, options, "pma_gym/IsokineticRotation-v0")
     envs.seed(5)
     np.testing.assert_array_equal(envs.reset()[0], one.reset(seed=5)[0])
     for action in np.linspace(-0.3, 1.0, 30, dtype=np.float32):

@@ -29,15 +29,15 @@ def wrapped(env, preset):
 @pytest.mark.parametrize(("preset", "steps"), [("increment", 501), ("increment-late", 251)])
 def test_wrappers_stay_around_the_environment_made_anew(preset, steps):
     monitored = wrapped(Monitor(gym.make(DISPLACEMENT)), preset)
-    alone = wrapped(PMAEnv("displacement"), preset)
+    single = wrapped(PMAEnv("displacement"), preset)
     assert monitored.unwrapped is monitored.rig
     first, _ = monitored.reset(seed=3)
-    assert np.array_equal(first, alone.reset(seed=3)[0])
+    assert np.array_equal(first, single.reset(seed=3)[0])
     rng, total, ended = np.random.default_rng(1), 0.0, False
     while not ended:
         action = rng.uniform(-1.0, 1.0, 1).astype(np.float32)
         seen, reward, terminated, truncated, info = monitored.step(action)
-        same, *others = alone.step(action)
+        same, *others = single.step(action)
         assert np.array_equal(seen, same) and others[:3] == [reward, terminated, truncated]
         total, ended = total + reward, terminated or truncated
     assert info["episode"]["l"] == steps

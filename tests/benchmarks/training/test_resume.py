@@ -124,7 +124,7 @@ print(sums.hexdigest())
 
 def test_another_process_gives_the_same_policy(preset, tmp_path):
     # Another hash seed: no order of a set may matter.
-    told_of = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROCESS, str(tmp_path / "there")],
         stdout=subprocess.PIPE,
         check=True,
@@ -134,7 +134,7 @@ def test_another_process_gives_the_same_policy(preset, tmp_path):
     sums = hashlib.sha256()
     for tensor in weights(trained(Order(preset(steps=480), 3), tmp_path / "here").model).values():
         sums.update(tensor.numpy().tobytes())
-    assert told_of.stdout.strip() == sums.hexdigest()
+    assert process.stdout.strip() == sums.hexdigest()
 
 
 # -- refused ---------------------------------------------------------------------------------------

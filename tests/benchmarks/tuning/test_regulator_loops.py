@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from benchmarks.report.errors import Record
+from benchmarks.report.errors import SuiteRecord
 from benchmarks.report.leaderboard import Leaderboard
 from benchmarks.report.loop_plots import loop_plot, margin_table
 from benchmarks.report.margins import load_step, loops
@@ -100,7 +100,7 @@ def test_regulator_takes_a_load_away():
 def test_report_of_suite_pressure_has_every_loop_at_low_middle_and_high_pressure():
     suite = frozen_suite("pressure")
     two = tuple(e for e in suite.entries if e.spec.name in ("pid", "improved_feedforward"))
-    leaderboard = Leaderboard(Record.of(replace(suite, entries=two), []), {})
+    leaderboard = Leaderboard(SuiteRecord.of(replace(suite, entries=two), []), {})
     loops_there = leaderboard.loops
     pressures = {task: [each.pressure_kpa for each in row] for task, row in loops_there.items()}
     assert pressures == {

@@ -26,7 +26,7 @@ def rmse(name, task, seed, **options):
 
 
 @pytest.fixture(scope="module")
-def exercised():
+def station():
     env = PMAEnv("isokinetic_exercise")
     env.reset(seed=0)
     return env.station
@@ -63,30 +63,30 @@ def test_a_task_that_is_no_exercise_is_refused():
         ExerciseMPC().reset(env.reference, env.station)
 
 
-def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(exercised):
-    observer = LegObserver(exercised, ProcessNoise())
-    radius = exercised.model.parameters["rotor"].radius
+def test_at_rest_the_operator_gives_the_moment_of_the_load_cell(station):
+    observer = LegObserver(station, ProcessNoise())
+    radius = station.model.parameters["rotor"].radius
     load, moment = 250.0, 250.0 * radius
-    wound = 0.4 * radius - load / exercised.model.parameters["cable"].stiffness
+    wound = 0.4 * radius - load / station.model.parameters["cable"].stiffness
     for i in range(1000):
-        observer.update(Measurement(exercised.period * i, wound, 0.4, load, exercised.pressure))
+        observer.update(Measurement(station.period * i, wound, 0.4, load, station.pressure))
     np.testing.assert_allclose(observer.state, [0.4, 0.0, moment, 0.0, 0.0], atol=1e-3)
 
 
-def test_what_the_operator_gives_beyond_the_load_turns_the_leg(exercised):
-    observer, (inertia, damping) = LegObserver(exercised, ProcessNoise()), leg_of(exercised)
-    radius = exercised.model.parameters["rotor"].radius
+def test_what_the_operator_gives_beyond_the_load_turns_the_leg(station):
+    observer, (inertia, damping) = LegObserver(station, ProcessNoise()), leg_of(station)
+    radius = station.model.parameters["rotor"].radius
     speed, moment = 0.3, damping * 0.3
     for i in range(1000):
-        angle = speed * exercised.period * (i + 1)
-        observer.update(Measurement(0.0, radius * angle, angle, 0.0, exercised.pressure))
+        angle = speed * station.period * (i + 1)
+        observer.update(Measurement(0.0, radius * angle, angle, 0.0, station.pressure))
     assert inertia > 0.45
     np.testing.assert_allclose(observer.state[1:3], [speed, moment], rtol=1e-3)
 
 
-def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(exercised):
+def test_a_regulator_that_gives_less_is_found_out_and_a_held_one_is_not_taken_for_it(station):
     for off, estimated in ((-5e3, -5e3), (-200e3, -AWAY_PA)):
-        observer = PressureObserver(exercised, ProcessNoise())
+        observer = PressureObserver(station, ProcessNoise())
         for _ in range(500):
             observer.update(300e3 + off, 300e3)
         assert observer.offset == pytest.approx(estimated, abs=1.0)

@@ -38,16 +38,16 @@ def test_a_record_of_positions_is_no_voltage():
 
 
 def test_what_may_be_missing_is_what_the_rig_has():
-    bare = {each.name for each in candidate_effects(imposed(coulomb_friction=FRICTION))}
+    bare = {each.name for each in candidate_effects(imposed(contact_friction=FRICTION))}
     muscle = {each.name for each in candidate_effects(imposed(**MUSCLE))}
     assert {"backlash", "pressure_friction", "constant_force", "cogging"} <= bare
     assert not {"hysteresis", "creep", "filling", "regulator_delay"} & bare
-    assert {"hysteresis", "creep", "coulomb_friction"} <= muscle
+    assert {"hysteresis", "creep", "contact_friction"} <= muscle
 
 
 def test_the_presliding_that_a_slide_hides_is_looked_for_at_every_size():
-    (friction,) = [c for c in candidate_effects(imposed()) if c.name == "coulomb_friction"]
-    path = "coulomb_friction.presliding_um"
+    (friction,) = [c for c in candidate_effects(imposed()) if c.name == "contact_friction"]
+    path = "contact_friction.presliding_um"
     assert path in friction.fitted_paths
     looked = friction.probes[:, friction.paths.index(path)]
     assert looked.min() <= 10.0 and looked.max() >= 2000.0

@@ -15,9 +15,9 @@ from pma_gym.discovery.preparation.noise import (
     FIRST_REST_S,
     REST_S,
     Whitening,
-    at_rest,
     autoregression,
     level_at_rest,
+    rest_readings,
     rest_segments,
     slow_part,
     step_between,
@@ -125,7 +125,7 @@ def test_noise_at_rest_is_the_sensors():
     readings = measured(STATION, 4, rate=128.0)
     trials = [Logged.of(STATION, i, trial) for i, trial in enumerate(readings)]
     for channel in CHANNELS:
-        level = level_at_rest(at_rest(trials, channel))
+        level = level_at_rest(rest_readings(trials, channel))
         assert level == pytest.approx(LEVELS[channel], rel=0.2)
 
 
@@ -133,9 +133,9 @@ def test_gaps_do_not_leak():
     contraction = 1e-3 + 1e-5 * np.random.default_rng(1).standard_normal(640)
     contraction[::7] = np.nan
     trial = logged(np.ones(640), contraction=contraction)
-    segments = at_rest([trial], 0)
+    segments = rest_readings([trial], 0)
     assert level_at_rest(segments) == pytest.approx(1e-5, rel=0.15)
-    assert at_rest([trial], 2) == []
+    assert rest_readings([trial], 2) == []
     noise_filter = autoregression(segments, 0.0)
     assert np.isfinite(
         [noise_filter.level, noise_filter.innovation, *noise_filter.coefficients]

@@ -11,7 +11,7 @@ from pma_gym.discovery.diagnosis import Estimate, Moved, NamedEffect
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, unit
 from pma_gym.discovery.report.summary import print_fit
 from pma_gym.discovery.report.tables import effect_table, moved_table
-from pma_gym.discovery.report.text import estimate_words
+from pma_gym.discovery.report.text import estimate_text
 from pma_gym.discovery.report.verdict_text import sentence, unidentified
 from pma_gym.units import Quantity
 
@@ -36,7 +36,7 @@ def test_messages_give_a_pure_number_no_unit():
     assert unit(PURE) == "1" and unit(FORCE) == "N"
     assert "hold it to 0.3, hardly less than the 0.4 that" in hardly_held(PURE)
     assert "hold it to 0.3 N, hardly less than the 0.4 that" in hardly_held(FORCE)
-    assert estimate_words(KNOWN) == "1.25 (95 %: 1.05 to 1.45)"
+    assert estimate_text(KNOWN) == "1.25 (95 %: 1.05 to 1.45)"
     assert "must lie in 0 to 2, got 3.0;" in refused(Quantity("1", 0, 2, "test"), 3.0)
     assert "must lie in 0 to 2 N, got 3.0;" in refused(Quantity("N", 0, 2, "test"), 3.0)
     with pytest.raises(ValueError, match="bounds 2 to 1 are reversed"):

@@ -148,8 +148,8 @@ def test_what_no_trial_excites_is_never_resolved(quiet):
     scores = scores_by_name(
         screen(baseline(shared), CANDIDATES, 0, lambda candidate: shared.probed(STATION, candidate))
     )
-    blind = scores["regulator_delay"]
-    assert blind.gain == 0.0 and blind.p_value == 1.0 and blind.resolvable is None
+    undetected = scores["regulator_delay"]
+    assert undetected.gain == 0.0 and undetected.p_value == 1.0 and undetected.resolvable is None
     assert scores["hysteresis"].resolvable is not None
 
 

@@ -8,7 +8,7 @@ from unittest import mock
 import pytest
 
 from pma_gym.discovery.diagnosis import Approximate, Estimate, Gap, NamedEffect
-from pma_gym.discovery.report.approximate_text import left_words, why_approximate
+from pma_gym.discovery.report.approximate_text import left_text, why_approximate
 from pma_gym.discovery.report.summary import diagnosis_summary
 from pma_gym.discovery.report.verdict_text import sentence
 from pma_gym.discovery.verdict import approximate
@@ -64,7 +64,7 @@ def test_neither_several_effects_nor_fitted_readings_name_by_what_they_close():
 
 
 def test_terms_of_one_law_count_as_one():
-    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("coulomb_friction", "pressure_friction"))
+    friction = closing(gaps(11.0**0.5, 2.0**0.5), ("contact_friction", "pressure_friction"))
     assert friction is not None and friction.named
 
 
@@ -124,8 +124,8 @@ def test_every_reason_says_its_figure_and_its_limit(why):
 def test_two_laws_are_both_approximate():
     size = {"force_n": Estimate(8.0, 7.0, 9.0, "N")}
     two = tuple(NamedEffect(name, (), 0.001, size) for name in ("hysteresis", "creep"))
-    assert left_words(Approximate(two, 0.3, True)).startswith("laws approximate, 30 %")
-    assert "left out" not in left_words(Approximate(two, 0.3, False))
+    assert left_text(Approximate(two, 0.3, True)).startswith("laws approximate, 30 %")
+    assert "left out" not in left_text(Approximate(two, 0.3, False))
 
 
 def test_the_summary_says_so_too():

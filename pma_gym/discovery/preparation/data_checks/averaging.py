@@ -72,7 +72,7 @@ def _fewer(trial: Trial, factor: int) -> Trial:
     middles = trial.time[inner].mean(axis=1)
     extra = _bends(trial, middles)
     time = np.unique(np.concatenate([trial.time[:1], middles, trial.time[extra]]))
-    commands = {name: _joined(trial.time, row, time) for name, row in trial.commands.items()}
+    commands = {name: _interpolated(trial.time, row, time) for name, row in trial.commands.items()}
     at = np.searchsorted(time, middles)
     measurements = {}
     for name, row in trial.measurements.items():
@@ -91,7 +91,7 @@ def _weights(count: int) -> Array:
     return np.linalg.pinv(np.stack([np.ones(count), along, along**2], axis=1))[0]
 
 
-def _joined(time: Array, row: Array, at: Array) -> Array:
+def _interpolated(time: Array, row: Array, at: Array) -> Array:
     """A command at other times; an empty cell holds the value before it."""
     given = np.flatnonzero(np.isfinite(row))
     if not given.size:
@@ -104,7 +104,7 @@ def _bends(trial: Trial, times: Array) -> NDArray[np.int64]:
     """Rows that commands need beside some times, so that joining them gives what they were."""
     needed: set[int] = set()
     for row in trial.commands.values():
-        values = _joined(trial.time, row, trial.time)
+        values = _interpolated(trial.time, row, trial.time)
         span = float(np.ptp(values))
         if not span > 0.0:
             continue

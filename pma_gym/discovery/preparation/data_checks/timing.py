@@ -74,7 +74,7 @@ def words(late: dict[str, float]) -> list[str]:
 def _lag(pair: Pair, quantity: str) -> tuple[float, bool] | None:
     """Lag of a signal (s), and whether it is clear; None where the signal hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 20 or np.ptp(simulated) < SIGNALS[quantity].least_span:
+    if time.size < 20 or np.ptp(simulated) <= SIGNALS[quantity].least_span:
         return None
     if abs(float(np.corrcoef(simulated, measured)[0, 1])) < ALIKE / 2.0:
         return None

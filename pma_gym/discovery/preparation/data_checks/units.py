@@ -145,7 +145,8 @@ class Slope:
 def slope_of(pair: Pair, quantity: str) -> Slope | None:
     """Robust slope of a measured signal on the simulated one; None where it hardly moves."""
     time, simulated, measured = pair.signal(quantity)
-    if time.size < 8 or np.ptp(simulated) < SIGNALS[quantity].least_span or np.ptp(measured) == 0.0:
+    least = SIGNALS[quantity].least_span
+    if time.size < 8 or np.ptp(simulated) <= least or np.ptp(measured) == 0.0:
         return None
     best = max(_correlations(time, simulated, measured), key=lambda each: abs(each[0]) + each[2])
     alike, lag, _ = best

@@ -106,8 +106,9 @@ def test_colour_forgets_in_its_time_and_outliers_are_as_many_as_said():
     assert float(np.corrcoef(coloured[:-50], coloured[50:])[0, 1]) == pytest.approx(
         math.exp(-1.0), abs=0.05
     )
-    wild = Noise(1.0, wild=2e-3, wildness=15.0).draw(np.random.default_rng(5), TIME)
-    assert 80 < np.sum(np.abs(wild) > 7.0) < 160
+    noise = Noise(1.0, outlier_share=2e-3, outlier_size=15.0)
+    spoiled = noise.draw(np.random.default_rng(5), TIME)
+    assert 80 < np.sum(np.abs(spoiled) > 7.0) < 160
 
 
 AXIS = Rig("slide", 2.0, 6.0, 0.0, 0.0, 0.0, 0.05, 2.0, 500.0)

@@ -159,8 +159,8 @@ def test_long_logs_are_averaged(tmp_path, monkeypatch):
     (given,), (fewer,) = read_dataset(folder).trials, data.trials
     assert len(fewer.trial) < 1100
     # The commands are the same courses, the jump included.
-    joined = np.interp(given.trial.time, fewer.trial.time, fewer.trial.commands["motor_voltage"])
-    assert np.max(np.abs(joined - given.trial.commands["motor_voltage"])) < 1.1e-4 * 5.0
+    linear = np.interp(given.trial.time, fewer.trial.time, fewer.trial.commands["motor_voltage"])
+    assert np.max(np.abs(linear - given.trial.commands["motor_voltage"])) < 1.1e-4 * 5.0
     row = fewer.trial.measurements["load"]
     there = np.flatnonzero(np.isfinite(row))
     block = given.trial.measurements["load"][4 * 70 : 4 * 71]

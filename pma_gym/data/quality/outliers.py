@@ -11,10 +11,10 @@ LARGEST = {"contraction": 250.0, "pressure": 5000.0, "pressure_command": 5000.0}
 """Magnitude (mm, kPa, kPa) beyond which no muscle of this kind goes."""
 
 _FEW = 0.01
-"""Largest share of readings that are wild."""
+"""Largest share of readings that are outliers."""
 _FAR = 10.0
-"""Spans of the others by which a wild reading lies outside of them."""
-_FEWEST = 20
+"""Spans of the others by which an outlier lies outside of them."""
+_LEAST = 20
 _SHOWN = 5
 
 Values = Mapping[str, NDArray[np.float64]]
@@ -43,11 +43,11 @@ def check_possible(values: Values, quantity: str, place: Callable[[int], str]) -
     )
 
 
-def wild_readings(values: Values, place: Callable[[int], str]) -> Iterator[str]:
+def outliers(values: Values, place: Callable[[int], str]) -> Iterator[str]:
     """Words on readings that lie far from all others of their signal."""
     for quantity, all_values in values.items():
         finite = np.flatnonzero(np.isfinite(all_values))
-        if finite.size < _FEWEST:
+        if finite.size < _LEAST:
             continue
         readings = all_values[finite]
         low, high = np.quantile(readings, [_FEW, 1.0 - _FEW], method="nearest")

@@ -31,7 +31,7 @@ NO_LAG = 0.002
 
 @dataclass(frozen=True)
 class Exertion:
-    """An exercise that can be rehearsed: one operator on one station.
+    """An exercise that can be repeated: one operator on one station.
 
     Attributes:
         task: the exercise.
@@ -80,7 +80,7 @@ class Course:
 
 @dataclass(frozen=True)
 class Runs:
-    """Many rehearsals side by side; shape (steps, runs) or (runs,).
+    """Many runs side by side; shape (steps, runs) or (runs,).
 
     Attributes:
         error: at the steps' ends, NaN from where a limit ended the run.
@@ -102,7 +102,7 @@ def costs(error: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(np.isfinite(total), total, np.inf)
 
 
-class Rehearsals:
+class RepeatedExercise:
     """Runs an exercise by many voltages at once.
 
     Args:

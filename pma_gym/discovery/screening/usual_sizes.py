@@ -1,0 +1,104 @@
+"""How large effects of a free rig usually are: by the forces, ways and speeds of its trials.
+
+A joint of a watch and one of a crane have the same effects. So an effect is looked for at a tenth
+of the drive's force, and at what that makes over the speeds and ways of the trials, in place of
+the sizes that the catalogue has for the station.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from pma_gym.data.trial import Trial
+from pma_gym.effects.effect import signals
+from pma_gym.plant import sensors
+from pma_gym.plant.model import Model
+from pma_gym.units import Quantity
+
+FORCE_SHARE, SPEED_SHARE = 0.1, 0.05
+"""Usual size of a force over that of the drive, and of a speed at which something changes over the
+speed of the trials."""
+
+LARGE = 0.9
+"""Quantile of a quantity's magnitude in the trials that is its size."""
+
+SMOOTH_S = 0.03
+"""Time over which a speed is taken (s): longer than noise, shorter than a motion."""
+
+DIMENSIONS: dict[str, tuple[int, int, int]] = {
+    "N": (1, 0, 0),
+    "N m": (1, 0, 0),
+    "N s/mm": (1, -1, 0),
+    "N m s": (1, -1, 0),
+    "N s^2/mm^2": (1, -2, 0),
+    "N m s^2": (1, -2, 0),
+    "N/mm": (1, 0, -1),
+    "N m/rad": (1, 0, -1),
+    "N/mm^3": (1, 0, -3),
+    "N m/rad^3": (1, 0, -3),
+    "mm/s": (0, 1, 0),
+    "deg/s": (0, 1, 0),
+}
+"""Powers of force, speed and way in a unit, for those that scale with them."""
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Sizes in trials (SI).
+
+    Attributes:
+        force: of the drive, as the model has it at rest.
+        speed: of the position.
+        way: half of the largest.
+    """
+
+    force: float
+    speed: float
+    way: float
+
+    def scaled(self, quantity: Quantity) -> Quantity:
+        """A quantity with the usual value that the sizes make of it, within its bounds."""
+        powers = DIMENSIONS.get(quantity.unit)
+        if powers is None or quantity.usual is None:
+            return quantity
+        force, speed, way = powers
+        share = FORCE_SHARE if force else SPEED_SHARE
+        usual = quantity.from_si(share * self.force**force * self.speed**speed * self.way**way)
+        least = max(quantity.lower, 0.0)
+        return replace(quantity, usual=float(np.clip(usual, least, quantity.upper)))
+
+
+def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
+    """Sizes in a free rig's trials; None where they say nothing, or of another rig."""
+    if not model.rig.drive_port:
+        return None
+    force = _large([_force(model, trial) for trial in trials])
+    position = model.rig.signals[0]
+    measured = [t for t in trials if position.name in t.measurements]
+    read = [(t.time, t.measurements[position.name]) for t in measured]
+    if not read:
+        return None
+    way = 0.5 * max(float(np.ptp(values[np.isfinite(values)], axis=0)) for _, values in read)
+    speed = _large([_speeds(*each) for each in read])
+    return Sizes(force, speed, way) if min(force, speed, way) > 0.0 else None
+
+
+def _large(parts: Sequence[np.ndarray]) -> float:
+    known = np.abs(np.concatenate(parts))
+    known = known[np.isfinite(known)]
+    return float(np.quantile(known, LARGE)) if known.size else 0.0
+
+
+def _force(model: Model, trial: Trial) -> np.ndarray:
+    """Force or torque that the drive gives at rest (SI)."""
+    (drive,) = (each for each in model.effects.values() if each.port == model.rig.drive_port)
+    motor, _ = sensors.voltages(model, trial)
+    assert drive.law is not None
+    known = {"motor_voltage": motor, "command": motor, "p": model.parameters[drive.name]}
+    return np.asarray(drive.law(*(known.get(name, 0.0) for name in signals(drive.law))))
+
+
+def _speeds(time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    rows = max(1, round(SMOOTH_S / float(np.median(np.diff(time)))))
+    return (values[rows:] - values[:-rows]) / (time[rows:] - time[:-rows])

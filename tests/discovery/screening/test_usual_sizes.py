@@ -1,0 +1,38 @@
+"""Effects of a free rig are looked for at the sizes of its trials, of a watch as of a crane."""
+
+import numpy as np
+import pytest
+
+from pma_gym.data.trial import Trial
+from pma_gym.discovery.screening.candidates import candidate_effects
+from pma_gym.discovery.screening.usual_sizes import sizes
+from pma_gym.plant.model import load_model
+from tests.discovery.test_joint import joint
+
+
+def swung(torque, angle, hertz=2.0):
+    """A joint's trial under a sine of torque (N m), whose angle (rad) is a sine too."""
+    time = np.linspace(0.0, 2.0, 801)
+    wave = np.sin(2.0 * np.pi * hertz * time)
+    return Trial(time, {"torque_command": torque * wave}, {"angle": -angle * wave})
+
+
+@pytest.mark.parametrize("factor", [1e-4, 1.0, 1e3])
+def test_probes_grow_with_the_torque_of_the_trials(factor):
+    found = sizes(joint(), [swung(0.5 * factor, 0.3)])
+    assert found is not None
+    assert found.force == pytest.approx(0.49 * factor, rel=0.02)
+    assert found.speed == pytest.approx(0.3 * 4.0 * np.pi, rel=0.05)
+    assert found.way == pytest.approx(0.3, rel=0.01)
+    (drag,) = (
+        each
+        for each in candidate_effects(joint(), None, [swung(0.5 * factor, 0.3)])
+        if each.name == "joint_drag"
+    )
+    # A tenth of the torque at the speed of the trials, times the factors of the probes.
+    usual = 0.1 * found.force / found.speed**2
+    assert drag.probes.max() == pytest.approx(3.0 * usual, rel=1e-6)
+
+
+def test_a_station_keeps_the_sizes_of_the_catalogue():
+    assert sizes(load_model("station"), []) is None

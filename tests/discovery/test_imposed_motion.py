@@ -1,0 +1,78 @@
+"""Imposed motions diagnosed from a model that knows nothing: what rubs, and what is lost before."""
+
+import numpy as np
+import pytest
+
+from pma_gym import Plant
+from pma_gym.data.trial import Trial
+from pma_gym.discovery import diagnose
+from pma_gym.estimation.least_squares import least
+from tests.plant.test_imposed import imposed
+
+SENSOR = {"bandwidth_hz": 1000.0, "noise_n": 0.3}
+TIME = np.arange(0.0, 8.0, 0.01)
+KNOWN = imposed(force_sensor=SENSOR)
+
+
+def trials(pressures=(0.0, 0.0), strokes=(0.02, 0.03), **hidden):
+    """Sines that begin at rest, of a rig with hidden effects."""
+    rig = Plant(imposed(force_sensor=SENSOR, **hidden))
+    made = []
+    for seed, (pressure, stroke) in enumerate(zip(pressures, strokes, strict=True)):
+        swing = np.clip(TIME - 1.0, 0.0, 6.0)
+        commands = {
+            "contraction_command": 0.5 * stroke * (1.0 - np.cos(np.pi * swing)),
+            "pressure_command": np.full(TIME.size, pressure),
+        }
+        made.append(rig.simulate(Trial(TIME, commands), seed=seed))
+    return [Trial(each.time, each.commands, {"force": each.measurements["force"]}) for each in made]
+
+
+def found(diagnosis):
+    """Value by effect and parameter."""
+    return {
+        f"{effect.name}.{name}": estimate.value
+        for effect in diagnosis.effects
+        for name, estimate in effect.parameters.items()
+    }
+
+
+def test_a_model_without_parameters_stays_where_it_is():
+    nothing = np.empty(0)
+    assert least(nothing, np.empty((0, 0)), 0.0, nothing, nothing).shape == (0,)
+
+
+@pytest.mark.campaign
+def test_friction_and_backlash_are_named_with_their_sizes():
+    hidden = {
+        "contact_friction": {"force_n": 40.0, "presliding_um": 300.0},
+        "backlash": {"width_mm": 3.0},
+    }
+    diagnosis = diagnose(trials(**hidden), KNOWN, propose=False)
+    sizes = found(diagnosis)
+    assert {name.partition(".")[0] for name in sizes} == set(hidden), diagnosis.sentence
+    assert sizes["contact_friction.force_n"] == pytest.approx(40.0, rel=0.02)
+    assert sizes["backlash.width_mm"] == pytest.approx(3.0, rel=0.05)
+
+
+@pytest.mark.campaign
+def test_friction_that_grows_with_pressure_is_named_with_its_slope():
+    hidden = {
+        "contact_friction": {"force_n": 3.0, "presliding_um": 100.0},
+        "pressure_friction": {"slope_n_per_kpa": 0.01, "presliding_um": 100.0},
+    }
+    given = trials((100e3, 300e3, 700e3), (0.02, 0.02, 0.02), **hidden)
+    diagnosis = diagnose(given, KNOWN, propose=False)
+    sizes = found(diagnosis)
+    assert {name.partition(".")[0] for name in sizes} == set(hidden), diagnosis.sentence
+    assert sizes["contact_friction.force_n"] == pytest.approx(3.0, rel=0.05)
+    assert sizes["pressure_friction.slope_n_per_kpa"] == pytest.approx(0.01, rel=0.03)
+
+
+@pytest.mark.campaign
+def test_nothing_hidden_names_nothing():
+    spring = {"piston_force": {"area_mm2": 490.0}}
+    given = trials((100e3, 300e3), **spring)
+    diagnosis = diagnose(given, imposed(force_sensor=SENSOR, **spring), propose=False)
+    assert not diagnosis.effects, diagnosis.sentence
+    assert diagnosis.verdict in ("agrees", "parameters", "undecidable")
