@@ -36,7 +36,7 @@ LEAST_SHARE = 0.35
 """Least share of such a deviation that it receives."""
 
 HOLD = 1e-3
-"""Price of moving the reference by itself, as a share of that of the error it would make good."""
+"""Cost of a move of the reference, relative to the cost of the error that it corrects."""
 
 
 class PolicyWithILC:

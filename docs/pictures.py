@@ -9,6 +9,7 @@ from pathlib import Path
 import gymnasium as gym
 import matplotlib.image
 from moving_picture import draw_moving_picture
+from page_plots import first_controller_plot, leaderboard_plot
 from rich.console import Console
 
 import pma_gym  # noqa: F401 - registers the environments
@@ -85,6 +86,8 @@ def draw_exercise() -> None:
 
 
 if __name__ == "__main__":
+    (IMAGES / "first-controller.png").write_bytes(first_controller_plot())
+    (IMAGES / "leaderboards.png").write_bytes(leaderboard_plot())
     draw_station()
     draw_moving_picture(IMAGES / "rotation.gif")
     draw_diagnosis()

@@ -19,7 +19,8 @@ from benchmarks.identification.creep import STUDENT_10, CreepFold, decided, prot
 from benchmarks.identification.measurements import StationLimits, station_limits
 from benchmarks.identification.station import fitted_parameters, identify, leave_out
 from benchmarks.identification.transients import PressureSteps, pressure_steps
-from pma_gym.plant.model import Model, Note, dump_model
+from pma_gym.plant.model import Model, dump_model
+from pma_gym.plant.parameter_rows import Note
 from pma_gym.terminal import SafeConsole
 
 DIGITS = 5

@@ -9,7 +9,8 @@ from benchmarks.identification.creep import CREEP, HELD, protocol_with_creep
 from benchmarks.identification.measurements import StationLimits
 from benchmarks.identification.transients import PressureSteps
 from pma_gym.effects import CATALOGUE
-from pma_gym.plant.model import Model, Note, load_model
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.parameter_rows import Note
 
 TITLE = "The dissertation's station, identified from its tables I2 and I3"
 CABLE_DAMPING_RATIO = 0.02

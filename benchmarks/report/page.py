@@ -171,7 +171,7 @@ def _picture_blocks(leaderboard: Leaderboard) -> list[Block]:
         Picture(
             "profiles",
             "Performance profiles: share of the cases with an error up to that on the axis; the "
-            "higher and further left, the better. Bands: 95 %, of each point by itself.",
+            "higher and further left, the better. Bands: 95 % at each point.",
         ),
         Picture("pressures", "Median error by pressure, on a logarithmic scale."),
         *case_figures(shown_standings(leaderboard, pooled=False), styles_of(leaderboard.labels)),

@@ -19,7 +19,7 @@ from pma_gym.documents import DocumentError, is_file, read_toml
 from pma_gym.engine.options import parse_options
 from pma_gym.engine.renamed_options import first_names, renamed_options
 from pma_gym.limits import LimitError
-from pma_gym.plant.model import is_path, missing_file
+from pma_gym.paths import is_path, missing_file
 from pma_gym.tasks import EVERY_TASK, named_task
 
 SCHEMA = 2

@@ -10,7 +10,8 @@ import numpy as np
 from benchmarks.suites.feasibility import inability
 from benchmarks.suites.recipe import Recipe, RecipeError
 from pma_gym.effects.effect import Value
-from pma_gym.plant.model import Model, Note, load_model
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.parameter_rows import Note
 from pma_gym.tasks import varied_station
 
 DIGITS = 6

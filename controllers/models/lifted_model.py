@@ -28,7 +28,7 @@ from scipy.sparse.linalg import spsolve
 from controllers.models.nominal_motion import NominalMotion
 
 HOLD = 1e-4
-"""Price of a change of voltage by itself, as a share of that of the error it would make good."""
+"""Cost of a change of voltage, relative to the cost of the error that it corrects."""
 
 LOOSE = 1.0
 """The same while the cable is slack."""

@@ -10,7 +10,8 @@ from benchmarks.identification.measurements import station_limits
 from generators.text import code, number, table
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.effect import Value
-from pma_gym.plant.model import Model, Note, load_model, shipped_models
+from pma_gym.plant.model import Model, load_model, shipped_models
+from pma_gym.plant.parameter_rows import Note
 from pma_gym.plant.statics import contraction_at, muscle_force
 
 

@@ -35,7 +35,7 @@ def check_memory_at_start(value: object, owner: str) -> None:
         value: -1 to 1, or None where nobody says.
         owner: what has it.
     Raises:
-        TrialError: names its range and what came.
+        TrialError: a value is out of range; the message names the range and the value.
     """
     number = isinstance(value, int | float | np.number) and not isinstance(value, bool)
     # `not <=`: NaN is out of every range.

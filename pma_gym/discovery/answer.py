@@ -48,7 +48,8 @@ from pma_gym.discovery.verdict.unknown import (
     widest_scatter,
 )
 from pma_gym.discovery.verdict.worsened import worsened
-from pma_gym.plant.model import Model, Note
+from pma_gym.plant.model import Model
+from pma_gym.plant.parameter_rows import Note
 
 AT_LIMIT = 1e-6
 """Distance from an end of a range, as a share of the range, within which a value is at that end."""
@@ -194,6 +195,9 @@ def _estimate(findings: Findings, fit: Fitted, path: str) -> Estimate:
     if not np.isfinite(error):
         return Estimate(value, None, None, unit(path), limit)
     low, high = max(value - 1.96 * error, lower), min(value + 1.96 * error, upper)
+    # A range may be a million times as wide as what a light axis has: what is surely off an end of
+    # it is not at that end.
+    limit = "" if lower < low and high < upper else limit
     return Estimate(value, low, high, unit(path), limit)
 
 

@@ -7,7 +7,8 @@ from typing import Any
 from pma_gym.effects import CATALOGUE
 from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.engine.snapshot import StateError
-from pma_gym.plant.model import Model, Note
+from pma_gym.plant.model import Model
+from pma_gym.plant.parameter_rows import Note
 from pma_gym.units import Quantity
 
 ROUNDING = 1e-9

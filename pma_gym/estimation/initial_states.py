@@ -62,10 +62,19 @@ def meet(states: Array, held: Array, logged: Logged, levels: Array, further: int
 
 
 def _start(logged: Logged) -> tuple[float, float]:
-    there = np.flatnonzero(_there(logged, 0))
+    speed = logged.channel("angular speed", "speed")
+    if not logged.measures[0] and speed is not None and logged.measures[speed]:
+        # A log of speed alone says nothing of where it began: at the position's zero.
+        return 0.0, _first(logged, speed)[0]
+    return _first(logged, 0)
+
+
+def _first(logged: Logged, channel: int) -> tuple[float, float]:
+    """A signal and its rate (SI) where a trial begins, by a parabola through its first readings."""
+    there = np.flatnonzero(_there(logged, channel))
     if len(there) < 3:
         return 0.0, 0.0
-    time, values = logged.time[there] - logged.time[0], logged.measured[0, there]
+    time, values = logged.time[there] - logged.time[0], logged.measured[channel, there]
     count = max(FIRST_ROWS, int(np.searchsorted(time, FIRST_S)))
     order = 2 if min(count, len(there)) > 3 else 1
     fitted = np.polynomial.Polynomial.fit(time[:count], values[:count], order)

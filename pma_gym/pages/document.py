@@ -98,6 +98,12 @@ _GROUP = " | "
 DPI = 120
 """Resolution of the PNGs (1/inch)."""
 
+_MANY = 12
+"""Columns beyond which print breaks words of the header, to fit the page."""
+
+_PANELS_FROM = 800
+"""Width (CSS pixels) beyond which a picture has panels side by side: a phone scrolls over it."""
+
 
 def to_markdown(blocks: Sequence[Block], pictures: Mapping[str, bytes], folder: str) -> str:
     """The blocks as Markdown; pictures are linked, in a folder beside the file.
@@ -199,8 +205,9 @@ def html_block(block: Block, pictures: Mapping[str, bytes]) -> str:
             alt = html.escape(caption)
             width = _shown_width(pictures[name])
             image = f'<img alt="{alt}" width="{width}" src="data:image/png;base64,{data}">'
-            shown = ' class="printed"' if printed else ""
-            return f"<figure{shown}>{image}<figcaption>{_inline(caption)}</figcaption></figure>"
+            shown = "printed" if printed else "panels" if width > _PANELS_FROM else "single"
+            words = f"<figcaption>{_inline(caption)}</figcaption>"
+            return f'<figure class="{shown}">{image}{words}</figure>'
         case InteractiveFigure(name, caption):
             plot = f'<div class="plot" id="figure-{html.escape(name)}"></div>'
             words = f"<figcaption>{_inline(caption)}</figcaption>"
@@ -232,9 +239,10 @@ def _html_table(table: TextTable) -> str:
         body.append(f'<tr class="ruled">{cells}</tr>' if ruled else f"<tr>{cells}</tr>")
         ruled = False
     head = _html_header(table)
-    prose = ' class="prose"' if table.words == columns else ""
+    kind = "prose" if table.words == columns else "many" if columns > _MANY else "few"
     return (
-        f'<div class="wide"><table{prose}><caption><span>{_inline(table.title)}</span></caption>'
+        f'<div class="wide"><table class="{kind}">'
+        f"<caption><span>{_inline(table.title)}</span></caption>"
         f"<thead>{head}</thead><tbody>{''.join(body)}</tbody></table></div>"
     )
 

@@ -82,5 +82,16 @@ def png(figure: Figure) -> bytes:
 
 
 def legend_below(figure: Figure, handles: Sequence[object], columns: int) -> None:
-    """One legend for all panels, under them."""
-    figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)  # type: ignore[call-overload]
+    """One legend for all panels, under them; in fewer columns where the figure is too narrow.
+
+    Args:
+        figure: drawn by Agg.
+        handles: of the entries.
+        columns: the most that there are.
+    """
+    place: dict[str, Any] = {"loc": "outside lower center", "frameon": False}
+    for ncols in range(columns, 0, -1):
+        legend = figure.legend(handles=handles, ncols=ncols, **place)
+        if ncols == 1 or legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()

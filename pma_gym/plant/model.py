@@ -1,7 +1,6 @@
 """Models: which effects a plant has, with which parameters; TOML files in, TOML files out."""
 
 import difflib
-import os
 import reprlib
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
@@ -9,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,8 @@ from pma_gym.effects.effect import Parameters, Value
 from pma_gym.effects.ports import Port
 from pma_gym.effects.renamed_effects import with_present_names
 from pma_gym.limits import LimitError
+from pma_gym.paths import is_path, missing_file
+from pma_gym.plant.parameter_rows import Note, ParameterRow
 from pma_gym.plant.rigs import RIGS, Rig
 from pma_gym.plant.toml import LINE_FORM, toml_text
 
@@ -29,56 +30,6 @@ _HEAD = ("schema", "name", "title", "plant")
 
 class ModelError(ValueError):
     """A model that cannot be used; says what is wrong, where, and how to mend it."""
-
-
-@dataclass(frozen=True)
-class Note:
-    """What is known about a parameter's value, in its unit in files.
-
-    Attributes:
-        source: where the value comes from.
-        low: lower end of its 95 % interval, or None.
-        high: upper end, or None.
-    """
-
-    source: str = ""
-    low: float | None = None
-    high: float | None = None
-
-
-class ParameterRow(NamedTuple):
-    """A parameter as people read it.
-
-    Attributes:
-        effect: that it belongs to.
-        parameter: its name, without unit.
-        value: in `unit`; several numbers of a table.
-        low: lower end of its 95 % interval, or None.
-        high: upper end, or None.
-        unit: in files.
-        source: where the value comes from.
-    """
-
-    effect: str
-    parameter: str
-    value: Value
-    low: float | None
-    high: float | None
-    unit: str
-    source: str
-
-    @property
-    def value_text(self) -> str:
-        """The value in six digits."""
-        values = self.value if isinstance(self.value, tuple) else (self.value,)
-        return ", ".join(f"{value:.6g}" for value in values)
-
-    @property
-    def interval_text(self) -> str:
-        """The interval in four digits; empty where there is none."""
-        if self.low is None or self.high is None:
-            return ""
-        return f"{self.low:.4g} to {self.high:.4g}"
 
 
 @dataclass(frozen=True)
@@ -281,43 +232,6 @@ def load_model(source: "str | Path | Model") -> Model:
         f"no model {str(source)[:200]!r}: give a shipped name ({', '.join(shipped)}) "
         f"or the path of a .toml file{hint}"
     )
-
-
-def is_path(source: str | Path) -> bool:
-    """Whether text names a file, not something shipped: it has a separator or ends in .toml.
-
-    >>> [is_path(text) for text in ("station", "station.toml", "mine/station")]
-    [False, True, True]
-    """
-    text = str(source)
-    separators = {os.sep, os.altsep or os.sep, "/"}
-    return text.endswith(".toml") or any(each in text for each in separators)
-
-
-def missing_file(path: Path, ending: str = ".toml") -> str:
-    """Why a path cannot be read as a file of one ending, and what to do; empty if it can be.
-
-    Args:
-        path: as it was given.
-        ending: how the file's name must end.
-    """
-    if path.is_dir():
-        return f"{path} is a folder; give the path of a {ending} file in it"
-    if path.is_file():
-        return "" if path.suffix == ending else f"{path} must end in {ending}; rename it"
-    if path.exists():
-        return f"{path} is no ordinary file; give the path of a {ending} file"
-    where = "" if path.is_absolute() else f" in {Path.cwd()}"
-    if not path.parent.is_dir():
-        return f"no such file {path}{where}: there is no folder {path.parent}; check the path"
-    stems = [each.stem for each in path.parent.glob(f"*{ending}")]
-    near = difflib.get_close_matches(path.stem, stems, 1)
-    hint = (
-        f"did you mean {path.parent / near[0]}{ending}?"
-        if near
-        else "check the name and the folder"
-    )
-    return f"no such file {path}{where}; {hint}"
 
 
 def _existing(path: Path) -> Path:

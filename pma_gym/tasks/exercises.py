@@ -51,7 +51,7 @@ def moment_exercise(
         start_pressures: range of the pressures that episodes begin at (Pa).
         name: name of the task.
     Raises:
-        ValueError: names the rule, the unit and what came.
+        ValueError: a value breaks a rule; the message names the rule, the unit and the value.
     """
     angles, moments = [float(angle) for angle in angles], [float(moment) for moment in moments]
     _check_knots(angles, moments)

@@ -90,3 +90,17 @@ def test_a_joint_that_hides_nothing_has_no_effect_named():
     assert diagnosis.verdict in ("parameters", "agrees", "undecidable") and not diagnosis.effects
     moved = diagnosis.parameters["inertia.inertia_kg_m2"]
     assert moved.now.value == pytest.approx(INERTIA, rel=2e-3)
+
+
+def test_a_log_of_speed_alone_begins_as_fast_as_its_readings_say():
+    time = np.arange(0.0, 1.0, 5e-3)
+    tables = {"joint_friction": TABLES["joint_friction"]}
+    speedy = joint(**tables).replace({"joint_start.spin_deg_per_s": 200.0})
+    asked = Trial(time, {"torque_command": 0.1 * np.sin(9.0 * time)})
+    exact = Plant(speedy).simulate(asked, noise=False).measurements["speed"]
+    noisy = exact + 0.02 * np.random.default_rng(1).standard_normal(time.size)
+    table = {"bandwidth_hz": 2000.0, "noise_rad_per_s": 0.02}
+    model = joint(**tables, gyroscope=table)
+    residuals = Residuals(model, [Trial(time, asked.commands, {"speed": noisy})], [])
+    left = residuals.each(residuals.start)[0][:, 1]
+    assert float(np.mean(left**2)) == pytest.approx(1.0, abs=0.3)

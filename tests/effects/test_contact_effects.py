@@ -76,11 +76,25 @@ def test_a_slides_gain_by_direction_goes_with_the_side_it_is_pushed_to(load):
 
 
 @pytest.mark.parametrize("torque", [0.2, 1.0])
-def test_friction_by_load_takes_a_share_of_what_presses_the_gears(torque):
-    rubbing = joint(joint_load_friction={"share_percent": 30.0, "presliding_deg": 0.01})
+def test_friction_by_load_takes_a_share_of_the_drives_torque(torque):
+    rubbing = joint(
+        joint_load_friction={
+            "drive_share_percent": 30.0,
+            "carried_share_percent": 0.0,
+            "presliding_deg": 0.01,
+        }
+    )
     time, truth = held(rubbing, "torque_command", torque)
     slope = np.polyfit(time[100:], truth["speed"][100:], 1)[0]
-    assert slope == pytest.approx(0.85 * torque / INERTIA, rel=1e-3)
+    assert slope == pytest.approx(0.7 * torque / INERTIA, rel=1e-3)
+
+
+def test_friction_by_load_takes_a_share_of_what_a_joint_carries():
+    shares = {"drive_share_percent": 0.0, "carried_share_percent": 30.0, "presliding_deg": 0.01}
+    model = joint(joint_load_friction=shares, constant_torque={"torque_n_m": -1.0})
+    time, truth = held(model, "torque_command", 2.0)
+    slope = np.polyfit(time[100:], truth["speed"][100:], 1)[0]
+    assert slope == pytest.approx((2.0 - 1.0 - 0.3) / INERTIA, rel=1e-3)
 
 
 def test_a_hardening_spring_swings_faster_where_it_swings_further():

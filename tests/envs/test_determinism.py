@@ -8,7 +8,8 @@ import pytest
 
 from pma_gym.codegen.machine import native
 from pma_gym.envs import PMAEnv
-from pma_gym.plant.model import Model, Note, load_model
+from pma_gym.plant.model import Model, load_model
+from pma_gym.plant.parameter_rows import Note
 from pma_gym.plant.statics import muscle_force
 from pma_gym.tasks import CORNERS, FORCE_TOLERANCE
 

@@ -13,8 +13,15 @@ ROOT = EXAMPLES.parents[1]
 LIBRARIES = {"policy_to_onnx": "onnx"}
 GALLERY = (
     *("open_and_closed_loop", "pid_from_linear_model", "mpc_with_limits", "many_environments"),
-    *("random_stations", "exercise_device", "hidden_effect", "joint", "tensile_test"),
-    "own_effect",
+    *(
+        "random_stations",
+        "exercise_device",
+        "hidden_effect",
+        "joint",
+        "servo_pendulum",
+        "tensile_test",
+    ),
+    *("cylinder_seal", "own_effect"),
     "policy_to_onnx",
 )
 SECONDS = 400

@@ -11,12 +11,12 @@ from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import (
     Model,
     ModelError,
-    Note,
     dump_model,
     load_model,
     parse_model,
     shipped_models,
 )
+from pma_gym.plant.parameter_rows import Note
 
 SHIPPED = sorted(shipped_models())
 

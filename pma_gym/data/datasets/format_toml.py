@@ -18,7 +18,7 @@ def file_format(table: Mapping[str, object]) -> FileFormat:
             `header_row` (number of the row with the columns' names), `names` (of the columns, where
             no row has them), `missing` (numbers that stand for "not measured").
     Raises:
-        TrialError: an unknown key or a value of another kind; names it, the rule and what came.
+        TrialError: an unknown key or a value of another kind; the message names both and the rule.
     """
     for key in table:
         if key not in _KEYS:

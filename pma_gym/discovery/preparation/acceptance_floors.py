@@ -78,8 +78,11 @@ def acceptance_floors(
         name = signal.name
         if not any(each.measures[channel] for each in logged):
             continue
+        scatter = scatter_of_repeats(logged, named, channel)
+        # What repeats itself is rounded alike each time; no simulation is.
+        rounding = step_between(logged, channel) / np.sqrt(12.0)
         for source, level in (
-            (REPEATS, scatter_of_repeats(logged, named, channel)),
+            (REPEATS, scatter and max(scatter, rounding)),
             (TOLERANCE, stated.tolerance.get(name)),
             (ERRORS, stated.standard_error.get(name)),
             (REST, _rest(logged, channel)),

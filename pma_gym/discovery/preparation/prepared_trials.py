@@ -8,6 +8,7 @@ import numpy as np
 
 from pma_gym.data.datasets.dataset import NamedTrial
 from pma_gym.data.quality import clipping
+from pma_gym.data.quality.lone_readings import without_lone_readings
 from pma_gym.data.signals import SIGNALS
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.preparation.splits import FOLDS, stretches
@@ -20,7 +21,7 @@ and what starts anew forgets it."""
 
 
 def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial], tuple[str, ...]]:
-    """Trials without what their sensors read at an end of their range; a free rig's in pieces.
+    """Trials without outliers and what sensors read at an end of their range; free ones in pieces.
 
     Args:
         named: the trials as they were given.
@@ -31,10 +32,9 @@ def prepared(named: Sequence[NamedTrial], model: Model) -> tuple[list[NamedTrial
     trials = [each.trial for each in named]
     clipped = clipping.ends(trials)
     words = [end.words([each.name for each in named], trials) for end in clipped]
-    kept = [
-        replace(each, trial=trial)
-        for each, trial in zip(named, clipping.without(trials, clipped), strict=True)
-    ]
+    within, slips = without_lone_readings(clipping.without(trials, clipped))
+    words += slips
+    kept = [replace(each, trial=trial) for each, trial in zip(named, within, strict=True)]
     # By the model as it was given: a line that is fitted later says what such volts give.
     kept = [replace(each, trial=_in_volts(each.trial, model)) for each in kept]
     if model.rig.is_free:

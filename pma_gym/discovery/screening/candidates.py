@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
-from pma_gym.discovery.fitting.free_parameters import values
+from pma_gym.discovery.fitting.free_parameters import unit, values
 from pma_gym.discovery.screening.usual_sizes import Sizes, sizes
 from pma_gym.effects import CATALOGUE, Effect
 from pma_gym.plant import sensors
@@ -68,7 +68,15 @@ def candidate_effects(
         *_at_neutral(model),
         *_slow_sensors(model),
     ]
-    return [candidate for candidate in candidates if candidate is not None]
+    return [each for each in candidates if each is not None and _can_act(model, each)]
+
+
+def _can_act(model: Model, candidate: CandidateEffect) -> bool:
+    """Whether a rig has what an effect grows with: one without a pressure shows no part of it."""
+    if model.rig.has_muscle or any(signal.is_pressure for signal in model.rig.signals):
+        return True
+    units = [unit(path) for path in candidate.fitted_paths]
+    return not all("kPa" in each or "bar" in each for each in units)
 
 
 def _lacking(

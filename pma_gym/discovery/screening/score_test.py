@@ -45,6 +45,9 @@ probes."""
 MILD = 0.05
 """Share of the largest promise over a range that a value must make to be worth a refit."""
 
+FINER = 0.005
+"""Share of the smallest probe whose being seen for certain asks for smaller probes."""
+
 LEAST_PART = 1e-6
 """Share of a probe's change that parameters must leave, or it is one of theirs."""
 
@@ -142,12 +145,18 @@ def screen(
         progress: called with the number of candidates that are done.
     """
     size = len(baseline.columns[0])
-    probed = []
+    looked_at, probed = [], []
     for number, candidate in enumerate(candidates):
-        probed.append(_probe(baseline, whitened_of(candidate), candidate, size))
+        whitened = whitened_of(candidate)
+        scores = _probe(baseline, whitened, candidate, size)
+        finer = _finer(candidate, scores)
+        if finer is not candidate:
+            scores = _probe(baseline, whitened, finer, size)
+        looked_at.append(finer)
+        probed.append(scores)
         if progress is not None:
             progress(number + 1)
-    return _judged(probed, candidates, seed)
+    return _judged(probed, looked_at, seed)
 
 
 @dataclass(frozen=True)
@@ -195,6 +204,34 @@ def _probe(
     joined = np.concatenate(along, axis=1)
     slopes = joined - weights.T @ np.concatenate(own, axis=1)
     return _Probed(slopes, strengths, _changes(baseline, changes, weights), joined.sum(axis=1))
+
+
+def _finer(candidate: CandidateEffect, scores: _Probed) -> CandidateEffect:
+    """A candidate with smaller probes where far smaller ones than it has would be seen.
+
+    Usual sizes are those of a station; what an encoder of 50 nm sees of a light axis is less.
+    """
+    if not candidate.amplitudes.any() or not scores.strengths.any():
+        return candidate
+    usual = int(np.argmax(scores.strengths))
+    away = np.abs(candidate.probes - candidate.absent)[:, candidate.amplitudes]
+    sizes = away.max(axis=1) / away[usual].max()
+    seen = float(np.sqrt(SHOWN_GAIN / scores.strengths[usual]))
+    least = float(sizes.min())
+    if seen > FINER * least:
+        return candidate
+    count = int(np.ceil(np.log10(least / seen)))
+    alike = np.flatnonzero(sizes > 1.0 - 1e-9)
+    added = [
+        (candidate.grown(int(probe), float(factor)), candidate.signs[probe])
+        for factor in np.geomspace(seen, least, count, endpoint=False)
+        for probe in alike
+    ]
+    return replace(
+        candidate,
+        probes=np.concatenate([candidate.probes, [values for values, _ in added]]),
+        signs=np.concatenate([candidate.signs, [sign for _, sign in added]]),
+    )
 
 
 def _balanced(whitened: WhitenedResiduals, tried: Array) -> list[Any]:

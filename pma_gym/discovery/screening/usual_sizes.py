@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from pma_gym.data.trial import Trial
 from pma_gym.effects.effect import signals
@@ -25,6 +26,9 @@ LARGE = 0.9
 
 SMOOTH_S = 0.03
 """Time over which a speed is taken (s): longer than noise, shorter than a motion."""
+
+LEAST_ROWS = 8
+"""Fewest readings of a trial that say how far it goes."""
 
 DIMENSIONS: dict[str, tuple[int, int, int]] = {
     "N": (1, 0, 0),
@@ -74,14 +78,25 @@ def sizes(model: Model, trials: Sequence[Trial]) -> Sizes | None:
     if not model.rig.drive_port:
         return None
     force = _large([_force(model, trial) for trial in trials])
-    position = model.rig.signals[0]
-    measured = [t for t in trials if position.name in t.measurements]
-    read = [(t.time, t.measurements[position.name]) for t in measured]
+    read = [path for trial in trials if (path := _path(model, trial)) is not None]
     if not read:
         return None
-    way = 0.5 * max(float(np.ptp(values[np.isfinite(values)], axis=0)) for _, values in read)
+    way = 0.5 * max(float(np.ptp(values)) for _, values in read)
     speed = _large([_speeds(*each) for each in read])
     return Sizes(force, speed, way) if min(force, speed, way) > 0.0 else None
+
+
+def _path(model: Model, trial: Trial) -> tuple[np.ndarray, np.ndarray] | None:
+    """Times and positions (SI) of a trial, from its speed where it has no position."""
+    for signal in model.rig.signals:
+        values = trial.measurements.get(signal.name)
+        if values is None or np.isfinite(values).sum() < LEAST_ROWS:
+            continue
+        time, values = trial.time[np.isfinite(values)], values[np.isfinite(values)]
+        if signal.is_position:
+            return time, values
+        return time, cumulative_trapezoid(values, time, initial=0.0)
+    return None
 
 
 def _large(parts: Sequence[np.ndarray]) -> float:

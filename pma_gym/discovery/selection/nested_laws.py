@@ -5,7 +5,7 @@ stays within `FLAT` of its least up to a limit of the law (a Stribeck speed far 
 the parameter is not determined: it is held at that limit, the fit is repeated without it, and no
 value is given for it, only the bound that the profile has on the other side. An effect may also
 say that a simpler law of its own sets one parameter equal to another (`Effect.ties`); the whole law
-stays where it explains more than its further parameters cost.
+stays where it explains more than its further parameters cost, of readings left out too.
 """
 
 from collections.abc import Mapping
@@ -18,6 +18,7 @@ from pma_gym.discovery.fitting.candidate_effect import CandidateEffect
 from pma_gym.discovery.fitting.covariance import covariance
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import unit, values
+from pma_gym.discovery.fitting.held_out import held_out_misfit
 from pma_gym.discovery.selection.candidate_fits import cost
 from pma_gym.discovery.selection.profile_limits import limits
 from pma_gym.effects import CATALOGUE
@@ -163,10 +164,23 @@ def _tied(problem: FitProblem, state: Nested, place: int) -> Nested | None:
         rest = [stems[stem] for stem in idle if stem in stems]
         equal = _equal(problem, state, place, (path, twin), rest)
         # What the whole law explains more must be worth its parameters, as anywhere.
-        if equal is not None and cost(equal.fit) < cost(state.fit):
+        if equal is not None and (
+            cost(equal.fit) < cost(state.fit) or not _asked_for(problem, state, equal)
+        ):
             known = {each: Undetermined(None, None, unit(each)) for each in (path, *rest)}
             return replace(equal, undetermined={**state.undetermined, **known})
     return None
+
+
+def _asked_for(problem: FitProblem, whole: Nested, simpler: Nested) -> bool:
+    """Whether most trials ask for the whole law when left out; yes where none can be left out.
+
+    They are counted, not added up: one trial that a fit of the others runs away in outweighs all.
+    """
+    theirs, others = (held_out_misfit(problem, each.fit, each.chosen) for each in (whole, simpler))
+    if theirs is None or others is None:
+        return True
+    return bool(np.mean(theirs.chi_square < others.chi_square) > 0.5)
 
 
 def _equal(

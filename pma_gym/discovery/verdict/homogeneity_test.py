@@ -38,7 +38,8 @@ def homogeneity_test(
         chosen: the effects.
         place: of the one that is asked about.
     Returns:
-        The scatter over trials, and over quarters of the pieces by contraction, load and pressure
+        The scatter over trials (over files where trials are pieces of them), and over quarters of
+        the pieces by contraction, load and pressure
         as simulated, by name; 0 where fewer than three groups show the effect, or where chance
         would scatter as much. Empty where the model cannot be simulated.
     """
@@ -55,7 +56,7 @@ def homogeneity_test(
     slopes = pieces.products[:, 1:, 0] @ direction + across @ _last_step(whitened, fit, pieces)
     return {
         name: _scatter(slopes, across, direction, own, group)
-        for name, group in _groups(whitened, fit, pieces).items()
+        for name, group in _groups(problem, whitened, fit, pieces).items()
     }
 
 
@@ -103,10 +104,17 @@ def _direction(fit: Fitted, candidate: CandidateEffect) -> Array:
 
 
 def _groups(
-    whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces
+    problem: FitProblem, whitened: WhitenedResiduals, fit: Fitted, pieces: Pieces
 ) -> dict[str, NDArray[np.int64]]:
-    """Group of every piece, by trial and by conditions."""
-    groups: dict[str, NDArray[np.int64]] = {"trial": pieces.trial}
+    """Group of every piece, by file and by conditions.
+
+    A trial that is a second of a file has a start of its own, which its few readings hardly tell
+    from the effect.
+    """
+    names = list(problem.files) or [str(i) for i in range(len(problem.trials))]
+    number = {name: place for place, name in enumerate(dict.fromkeys(names))}
+    file_of = np.array([number[name] for name in names], np.int64)
+    groups: dict[str, NDArray[np.int64]] = {"trial": file_of[pieces.trial]}
     readings = whitened.readings(fit.values)
     if readings is None:
         return groups

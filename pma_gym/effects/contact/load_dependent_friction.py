@@ -15,7 +15,8 @@ _SHARE = Quantity(
 class LoadDependentFriction(NamedTuple):
     """Parameters of `load_friction` along a line."""
 
-    share: Annotated[float, _SHARE]
+    drive_share: Annotated[float, _SHARE]
+    carried_share: Annotated[float, _SHARE]
     presliding: Annotated[
         float, Quantity("um", 0.1, 20000, "assumption: 10 um at full force", usual=10)
     ]
@@ -24,7 +25,8 @@ class LoadDependentFriction(NamedTuple):
 class JointLoadFriction(NamedTuple):
     """Parameters of `load_friction` about an axis."""
 
-    share: Annotated[float, _SHARE]
+    drive_share: Annotated[float, _SHARE]
+    carried_share: Annotated[float, _SHARE]
     presliding: Annotated[
         float, Quantity("deg", 1e-5, 10, "assumption: 0.02 at full torque", usual=0.02)
     ]
@@ -33,21 +35,23 @@ class JointLoadFriction(NamedTuple):
 def load_friction(drive_force, carried_force, memory, p):
     """Force of the bristles, in proportion to what presses the teeth on both sides of the gears.
 
-        F = -share (|F_drive| + |F_carried|) / 2 z
+        F = -(drive_share |F_drive| + carried_share |F_carried|) z
 
     Args:
         drive_force: force or torque of the drive F_drive (N, N m).
         carried_force: force or torque that the rig carries F_carried, of weight, springs and what
             is constant (N, N m).
         memory: deflection z of the bristles, between -1 and 1; see `friction_path`.
-        p: LoadDependentFriction or JointLoadFriction: share, presliding (m, rad).
+        p: LoadDependentFriction or JointLoadFriction: drive_share, carried_share, presliding
+            (m, rad).
     Returns:
         Force (N, N m), against the motion.
     Source:
-        Coulomb's law for teeth that the drive presses on each other; what rubs without a load is
-        dry friction beside it.
+        Coulomb's law for teeth that both sides press on each other, a share of each side as in the
+        friction models of Rhoban's bam; what rubs without a load is dry friction beside it.
     """
-    return -0.5 * p.share * (abs(drive_force) + abs(carried_force)) * memory
+    level = p.drive_share * abs(drive_force) + p.carried_share * abs(carried_force)
+    return -level * memory
 
 
 def load_friction_bend(memory, direction, p):
@@ -56,11 +60,13 @@ def load_friction_bend(memory, direction, p):
     Args:
         memory: z where the travel begins.
         direction: 1 where the motion is forwards, else -1.
-        p: parameters with share and presliding (m, rad).
+        p: parameters with drive_share, carried_share and presliding (m, rad).
     Returns:
         Way (m, rad), 0 where all slip or nothing rubs.
     """
-    return where(p.share > 0.0, p.presliding, 0.0) * elastic_way(memory, direction)
+    return where(p.drive_share + p.carried_share > 0.0, p.presliding, 0.0) * elastic_way(
+        memory, direction
+    )
 
 
 _SIGNATURE = "odd step of force where the motion turns, in proportion to the force of the drive"

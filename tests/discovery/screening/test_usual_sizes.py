@@ -34,5 +34,14 @@ def test_probes_grow_with_the_torque_of_the_trials(factor):
     assert drag.probes.max() == pytest.approx(3.0 * usual, rel=1e-6)
 
 
+def test_a_log_of_speed_alone_has_the_sizes_of_its_motion():
+    trial = swung(0.5, 0.3)
+    speed = np.gradient(trial.measurements["angle"], trial.time)
+    alone = sizes(joint(), [Trial(trial.time, trial.commands, {"speed": speed})])
+    whole = sizes(joint(), [trial])
+    assert alone is not None and whole is not None
+    assert (alone.speed, alone.way) == pytest.approx((whole.speed, whole.way), rel=0.02)
+
+
 def test_a_station_keeps_the_sizes_of_the_catalogue():
     assert sizes(load_model("station"), []) is None

@@ -9,9 +9,10 @@ import pytest
 from pma_gym.data.trial import Trial
 from pma_gym.discovery.fitting.fit_problem import FitProblem
 from pma_gym.discovery.fitting.free_parameters import free_parameters
+from pma_gym.discovery.fitting.held_out import HeldOutMisfit
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.selection import profile_limits
+from pma_gym.discovery.selection import nested_laws, profile_limits
 from pma_gym.discovery.selection.nested_laws import FLAT, nested
 from pma_gym.discovery.selection.profile_limits import limits
 from pma_gym.discovery.workflow import diagnose
@@ -116,3 +117,17 @@ def test_no_value_is_said_of_what_is_not_determined():
     assert set(written["not_determined"]) == {"static_n", "stribeck_speed_mm_per_s"}
     assert set(written["parameters"]) == {"dynamic_n"}
     assert "not determined" in diagnosis.model.notes[STATIC].source
+
+
+@pytest.mark.parametrize(("asking", "numbers"), [(2, 3), (1, 1)])
+def test_the_whole_law_stays_where_most_readings_left_out_ask_for_it(monkeypatch, asking, numbers):
+    """By chi-square alone it is worth its two parameters; most trials must say so when left out."""
+    bench, fit = fit_of(18.0, 12.0, 30.0, (17.0, 12.0, 20.0))
+
+    def left_out(_problem, _fit, chosen):
+        whole = len(chosen[0].fitted_paths) == 3
+        chi_square = np.where(np.arange(3) < asking, 1.0, 3.0) if whole else np.full(3, 2.0)
+        return HeldOutMisfit([], chi_square, np.empty(0))
+
+    monkeypatch.setattr(nested_laws, "held_out_misfit", left_out)
+    assert len(nested(bench, fit, (DRY,)).chosen[0].fitted_paths) == numbers

@@ -30,6 +30,13 @@ SLOWEST_HZ = 60.0
 PARABOLA = 4
 """Fewest readings that a parabola is drawn through."""
 
+SAME = 1e-3
+"""Share of the rows' distance within which two times are one."""
+
+WORTH = 0.5
+"""Most rows that a trial may keep, as a share of its own: a command that changes in every row, as a
+noisy controller's does, needs them all, and averages of readings would only hide the fastest."""
+
 CURVATURE = 1e-4
 """Largest change of a command by leaving rows out, as a share of its span."""
 
@@ -51,7 +58,10 @@ def averaged(named: Sequence[NamedTrial]) -> tuple[list[NamedTrial], list[str]]:
         rate = 1.0 / float(np.median(np.diff(each.trial.time)))
         factor = max(1, min(wanted, int(rate / SLOWEST_HZ)))
         factors.append(factor)
-        kept.append(each if factor == 1 else replace(each, trial=_fewer(each.trial, factor)))
+        fewer = each.trial if factor == 1 else _fewer(each.trial, factor)
+        if len(fewer) > WORTH * len(each.trial):
+            fewer, factors[-1] = each.trial, 1
+        kept.append(replace(each, trial=fewer))
     left = sum(len(each.trial) for each in kept)
     if max(factors) == 1:
         return list(named), []
@@ -69,7 +79,7 @@ def _fewer(trial: Trial, factor: int) -> Trial:
     """A trial with a reading for each block of rows, at the block's middle in time."""
     blocks = len(trial) // factor
     inner = np.arange(blocks * factor).reshape(blocks, factor)
-    middles = trial.time[inner].mean(axis=1)
+    middles = _middles(trial.time[inner])
     extra = _bends(trial, middles)
     time = np.unique(np.concatenate([trial.time[:1], middles, trial.time[extra]]))
     commands = {name: _interpolated(trial.time, row, time) for name, row in trial.commands.items()}
@@ -81,6 +91,15 @@ def _fewer(trial: Trial, factor: int) -> Trial:
         measurements[name][at] = row[inner] @ _weights(factor)
     kept = {"provenance": trial.provenance, "memory_at_start": trial.memory_at_start}
     return Trial(time, commands, measurements, **kept)
+
+
+def _middles(times: Array) -> Array:
+    """The middle of each block of times, shape (blocks, rows); its middle row where it has one.
+
+    A mean misses that row by what numbers round: two rows would lie next to no time apart.
+    """
+    means, inner = times.mean(axis=1), times[:, (times.shape[1] - 1) // 2]
+    return np.where(np.abs(means - inner) < SAME * np.diff(times[0]).mean(), inner, means)
 
 
 def _weights(count: int) -> Array:

@@ -188,3 +188,25 @@ def test_stamps_that_repeat_by_rounding_are_read(tmp_path):
     with pytest.warns(UserWarning, match="time_s is rounded to 10 ms by the logger"):
         (first, *_) = read_dataset(folder).trials
     assert np.diff(first.trial.time) == pytest.approx(1 / 384, rel=1e-3)
+
+
+def test_rows_of_averages_and_of_commands_are_never_next_to_no_time_apart(tmp_path, monkeypatch):
+    """The middle of an odd block is one of its rows."""
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 2000)
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.AIM_ROWS", 1000)
+    columns = log(2.0, 300.0, 1, rate=500.0, seconds=6.0)
+    (fewer,) = checked(write(tmp_path / "lab", [columns])).trials
+    assert np.diff(fewer.trial.time).min() > 0.4 / 500.0
+
+
+def test_a_log_whose_command_changes_in_every_row_keeps_its_readings(tmp_path, monkeypatch):
+    """Its rows are needed all the same, and what is fast in it would only be hidden."""
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.MOST_ROWS", 2000)
+    monkeypatch.setattr("pma_gym.discovery.preparation.data_checks.averaging.AIM_ROWS", 1000)
+    columns = log(2.0, 300.0, 1, rate=500.0, seconds=6.0)
+    noise = np.random.default_rng(1).normal(0.0, 0.02, len(columns["time_s"]))
+    columns["motor_voltage_v"] = np.clip(columns["motor_voltage_v"] + 1.0 + noise, 0.0, 10.0)
+    folder = write(tmp_path / "lab", [columns])
+    data = checked(folder)
+    assert not any("averaged" in words for words in data.checked)
+    assert len(data.trials[0].trial) == len(read_dataset(folder).trials[0].trial)

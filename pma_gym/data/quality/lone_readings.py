@@ -1,0 +1,184 @@
+"""Single readings that stand alone: a sensor's or a logger's slip, which no motion makes.
+
+Such a reading lies far from the curve through its four neighbours, and they lie on it. A step, a
+kink or an oscillation moves neighbours as well; what follows a jump of a command within a few rows
+is left alone whatever its form.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pma_gym.data.trial import Trial
+from pma_gym.data.trial_columns import BY_QUANTITY
+from pma_gym.units import SI_FACTORS
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+
+LEAST_ROWS = 100
+"""Fewest readings of a trial in which one stands alone."""
+
+ALONE = 5.0
+"""Standard deviations of the distance from the curve through its neighbours that make one stand
+alone: of Gaussian noise, one reading in two million does."""
+
+STEPS = 3.0
+"""Steps of the readings that it must be as well: a coarse sensor jumps from one to the next."""
+
+SIDE, MISS, UNEVEN = -2.0 / 3.0, 0.2, 0.4
+"""Distance of the readings before and after from their curves, which go through the lone one, over
+its own; how far their mean may be off, and how much they may differ."""
+
+BESIDE, QUIET = 4, 1.6
+"""Rows beside one that stands alone which a slip must explain, and how many standard deviations it
+may leave of them: a beat leaves more."""
+
+SPREAD = np.sqrt(1.0 + 34.0 / 36.0)
+"""Standard deviations of a reading's distance from its curve, in those of a reading."""
+
+USUAL, USUAL_SQUARE = 0.98, 0.8735
+"""Share of distances that is noise for certain, and mean square of that share of normal numbers."""
+
+JUMP, NEAR = 0.2, 3
+"""Share of a command's span that makes a change from row to row a jump, and rows beside it."""
+
+MOST = 0.03
+"""Largest share of readings that stand alone: more are no slips."""
+
+
+@dataclass(frozen=True)
+class LoneReadings:
+    """Readings of one signal that stand alone.
+
+    Attributes:
+        quantity: the signal.
+        rows: by number of the trial, which.
+        least: the smallest distance from its neighbours' curve (SI).
+    """
+
+    quantity: str
+    rows: Mapping[int, Rows]
+    least: float
+
+    def words(self, count: int) -> str:
+        """What to tell, of so many readings in all."""
+        column, number = BY_QUANTITY[self.quantity], sum(int(at.sum()) for at in self.rows.values())
+        least = self.least / SI_FACTORS[column.unit]
+        many = "readings stand" if number > 1 else "reading stands"
+        return (
+            f"{column.name}: {number} of {count} {many} alone, {least:.3g} {column.unit} or more "
+            "from the curve through the neighbours: outliers, which count as not measured"
+        )
+
+
+def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
+    """The trials less readings that stand alone, and words on each signal that has some."""
+    kept, words = list(trials), []
+    names = dict.fromkeys(name for trial in trials for name in trial.measurements)
+    for quantity in names:
+        lone = _lone(trials, quantity)
+        if lone is None:
+            continue
+        total = sum(
+            int(np.isfinite(trial.measurements[quantity]).sum())
+            for trial in trials
+            if quantity in trial.measurements
+        )
+        words.append(lone.words(total))
+        for number, at in lone.rows.items():
+            measured = kept[number].measurements
+            row = np.where(at, np.nan, measured[quantity])
+            kept[number] = replace(kept[number], measurements={**measured, quantity: row})
+    return kept, words
+
+
+def _lone(trials: Sequence[Trial], quantity: str) -> LoneReadings | None:
+    """A signal's readings that stand alone; None where none does, or too many do."""
+    apart = {
+        number: _distances(trial.measurements[quantity])
+        for number, trial in enumerate(trials)
+        if quantity in trial.measurements and len(trial) >= LEAST_ROWS
+    }
+    known = np.concatenate([each[np.isfinite(each)] for each in apart.values()] or [np.empty(0)])
+    if known.size < LEAST_ROWS:
+        return None
+    squares = np.sort(known**2)[: int(USUAL * known.size)]
+    noise = float(np.sqrt(np.mean(squares) / USUAL_SQUARE))
+    limit = max(ALONE * noise, STEPS * _step(trials, quantity))
+    rows = {
+        number: _alone(trials[number].measurements[quantity], each, limit, noise / SPREAD)
+        for number, each in apart.items()
+    }
+    rows = {number: at & ~_after_jumps(trials[number]) for number, at in rows.items()}
+    rows = {number: at for number, at in rows.items() if at.any()}
+    count = sum(int(at.sum()) for at in rows.values())
+    if not limit > 0.0 or not count or count > MOST * known.size:
+        return None
+    least = min(float(np.abs(apart[number][at]).min()) for number, at in rows.items())
+    return LoneReadings(quantity, rows, least)
+
+
+def _distances(row: Array) -> Array:
+    """Distance of each reading from the cubic through two before and two after it; NaN at ends."""
+    apart = np.full(row.size, np.nan)
+    apart[2:-2] = row[2:-2] - (4.0 * (row[1:-3] + row[3:-1]) - row[:-4] - row[4:]) / 6.0
+    return apart
+
+
+def _step(trials: Sequence[Trial], quantity: str) -> float:
+    """Smallest difference of two readings that are one after the other (SI)."""
+    moves = [np.abs(np.diff(trial.measurements.get(quantity, np.empty(0)))) for trial in trials]
+    joined = np.concatenate(moves)
+    return float(np.min(joined[joined > 0.0], initial=np.inf)) if np.any(joined > 0.0) else 0.0
+
+
+def _alone(row: Array, apart: Array, limit: float, noise: float) -> Rows:
+    """Which readings stand alone: a slip explains the rows about each, down to noise."""
+    single = _like_slips(apart, limit)
+    for at in np.flatnonzero(single):
+        about = row[max(0, at - BESIDE) : at + BESIDE + 1]
+        whole = about.size == 2 * BESIDE + 1 and bool(np.isfinite(about).all())
+        single[at] = whole and _is_slip(about, QUIET * noise)
+    return single
+
+
+def _is_slip(about: Array, most: float) -> bool:
+    """Whether a slip of the middle row leaves at most so much (rms), and less than a step does."""
+    along = np.arange(-BESIDE, BESIDE + 1.0)
+    curve = [np.ones_like(along), along, along**2]
+
+    def left(change: Array) -> float:
+        columns = np.stack([*curve, change], axis=1)
+        sizes = np.linalg.lstsq(columns, about, rcond=None)[0]
+        return float(np.sum((about - columns @ sizes) ** 2))
+
+    slip = left((along == 0.0).astype(float))
+    steps = [left((along >= edge).astype(float)) for edge in (-1.0, 0.0, 1.0, 2.0)]
+    return slip < min(steps) and slip < most**2 * (along.size - 4)
+
+
+def _like_slips(apart: Array, limit: float) -> Rows:
+    """Which readings are as far as a slip, by the readings before and after them too."""
+    here = np.nan_to_num(apart)
+    before, after = np.r_[0.0, here[:-1]], np.r_[here[1:], 0.0]
+    far = np.abs(here) > limit
+    share = np.where(far, here, 1.0)
+    even = np.abs(after - before) < UNEVEN * np.abs(share)
+    like = np.abs((after + before) / (2.0 * share) - SIDE) < MISS
+    return far & even & like
+
+
+def _after_jumps(trial: Trial) -> Rows:
+    """Rows beside a jump of a command."""
+    near = np.zeros(len(trial), bool)
+    for row in trial.commands.values():
+        known = row[np.isfinite(row)]
+        if not known.size or not np.ptp(known) > 0.0:
+            continue
+        jumps = np.flatnonzero(np.abs(np.diff(np.nan_to_num(row))) > JUMP * np.ptp(known))
+        for at in jumps:
+            near[max(0, at - NEAR) : at + NEAR + 2] = True
+    return near

@@ -1,0 +1,42 @@
+"""Whether a text names a file, and why a file that was named cannot be read."""
+
+import difflib
+import os
+from pathlib import Path
+
+
+def is_path(source: str | Path) -> bool:
+    """Whether text names a file, not something shipped: it has a separator or ends in .toml.
+
+    >>> [is_path(text) for text in ("station", "station.toml", "mine/station")]
+    [False, True, True]
+    """
+    text = str(source)
+    separators = {os.sep, os.altsep or os.sep, "/"}
+    return text.endswith(".toml") or any(each in text for each in separators)
+
+
+def missing_file(path: Path, ending: str = ".toml") -> str:
+    """Why a path cannot be read as a file of one ending, and what to do; empty if it can be.
+
+    Args:
+        path: as it was given.
+        ending: how the file's name must end.
+    """
+    if path.is_dir():
+        return f"{path} is a folder; give the path of a {ending} file in it"
+    if path.is_file():
+        return "" if path.suffix == ending else f"{path} must end in {ending}; rename it"
+    if path.exists():
+        return f"{path} is no ordinary file; give the path of a {ending} file"
+    where = "" if path.is_absolute() else f" in {Path.cwd()}"
+    if not path.parent.is_dir():
+        return f"no such file {path}{where}: there is no folder {path.parent}; check the path"
+    stems = [each.stem for each in path.parent.glob(f"*{ending}")]
+    near = difflib.get_close_matches(path.stem, stems, 1)
+    hint = (
+        f"did you mean {path.parent / near[0]}{ending}?"
+        if near
+        else "check the name and the folder"
+    )
+    return f"no such file {path}{where}; {hint}"
