@@ -95,11 +95,6 @@ def suite_names() -> list[str]:
     return [path.stem for path in sorted(SUITES.glob("*.toml"))]
 
 
-def comparison_names() -> list[str]:
-    """Names of the suites that have a leaderboard: all but the reproduction."""
-    return [n for n in suite_names() if not isinstance(frozen_suite(n), ReproductionSuite)]
-
-
 @lru_cache(maxsize=16)
 def frozen_suite(source: str) -> FrozenSuite:
     """A suite by its name, or from a file of one's own.

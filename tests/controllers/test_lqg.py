@@ -125,9 +125,9 @@ def test_a_cable_is_loose_at_the_start_and_where_it_is_slack_for_long():
     # The load cell is 7 N off throughout; the slack is 1.18 mm.
     where = station_of("rotation")
     cable, seen = Cable(where), []
-    ways = [0.0] * 3 + [1.2] * 10 + [0.5, 1.2] + [1.2] * 5 + [0.5] * 8
+    travels = [0.0] * 3 + [1.2] * 10 + [0.5, 1.2] + [1.2] * 5 + [0.5] * 8
     loads = [0.0] * 3 + [20.0] * 10 + [0.0, 20.0] + [20.0] * 5 + [0.0] * 8
-    for reading in readings(where, ways, loads):
+    for reading in readings(where, travels, loads):
         cable.update(reading)
         seen.append((cable.loose, cable.settling))
     assert seen[2] == (True, True)

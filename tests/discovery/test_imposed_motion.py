@@ -28,7 +28,7 @@ def trials(pressures=(0.0, 0.0), strokes=(0.02, 0.03), **hidden):
     return [Trial(each.time, each.commands, {"force": each.measurements["force"]}) for each in made]
 
 
-def found(diagnosis):
+def sizes_of(diagnosis):
     """Value by effect and parameter."""
     return {
         f"{effect.name}.{name}": estimate.value
@@ -49,7 +49,7 @@ def test_friction_and_backlash_are_named_with_their_sizes():
         "backlash": {"width_mm": 3.0},
     }
     diagnosis = diagnose(trials(**hidden), KNOWN, propose=False)
-    sizes = found(diagnosis)
+    sizes = sizes_of(diagnosis)
     assert {name.partition(".")[0] for name in sizes} == set(hidden), diagnosis.sentence
     assert sizes["contact_friction.force_n"] == pytest.approx(40.0, rel=0.02)
     assert sizes["backlash.width_mm"] == pytest.approx(3.0, rel=0.05)
@@ -63,7 +63,7 @@ def test_friction_that_grows_with_pressure_is_named_with_its_slope():
     }
     given = trials((100e3, 300e3, 700e3), (0.02, 0.02, 0.02), **hidden)
     diagnosis = diagnose(given, KNOWN, propose=False)
-    sizes = found(diagnosis)
+    sizes = sizes_of(diagnosis)
     assert {name.partition(".")[0] for name in sizes} == set(hidden), diagnosis.sentence
     assert sizes["contact_friction.force_n"] == pytest.approx(3.0, rel=0.05)
     assert sizes["pressure_friction.slope_n_per_kpa"] == pytest.approx(0.01, rel=0.03)

@@ -110,15 +110,6 @@ def test_a_hardening_spring_swings_faster_where_it_swings_further():
     assert periods[0] / periods[1] == pytest.approx(2.0, rel=0.02)
 
 
-def test_a_spring_holds_a_slide_where_its_force_is_the_drives():
-    sprung = slide(
-        spring={"stiffness_n_per_mm": 1.0, "rest_mm": 5.0},
-        symmetric_damping={"intercept_n_s_per_mm": 0.1, "slope_n_s_per_mm_per_kpa": 0.0},
-    )
-    _, truth = held(sprung, "load_command", 20.0, 2.0)
-    assert truth["contraction"][-1] == pytest.approx(5e-3 - 20e-3, abs=1e-6)
-
-
 def test_a_constant_torque_is_as_much_of_the_drives():
     model = joint(constant_torque={"torque_n_m": 0.1})
     _, pushed = held(model, "torque_command", 0.1)

@@ -56,7 +56,7 @@ NUMBERS = {
         "speed_slope_n_s2_per_mm2": 0.0020,
     },
 }
-"""Parameters of the MAS-20-250 at the door: what the sources of each law state."""
+"""Parameters of the MAS-20-250 as files have them: what the sources of each law state."""
 
 GEOMETRIC = (
     SCHULTE_FORCE,

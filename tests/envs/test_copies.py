@@ -19,16 +19,16 @@ from pma_gym.envs import ENVIRONMENTS, PMAEnv, PMAVectorEnv
 from pma_gym.plant.model import load_model
 from pma_gym.tasks import EVERY_TASK, TASKS, following, varied_station
 
-WAYS = {
+COPIERS = {
     "pickle": lambda env: pickle.loads(pickle.dumps(env)),
     "deepcopy": copy.deepcopy,
     "copy": copy.copy,
 }
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPIERS)
 def test_a_copy_goes_on_with_the_same_bits(way, options, single, course, same):
-    made, env = WAYS[way], single(options)
+    made, env = COPIERS[way], single(options)
     # Before the first reset.
     begun = made(env)
     assert same(begun.reset(seed=3), env.reset(seed=3))
@@ -56,7 +56,7 @@ def test_a_copy_goes_on_with_the_same_bits(way, options, single, course, same):
 def test_a_copy_of_a_batch_goes_on_with_the_same_bits(
     way, batch_options, randomisation, batch_course, same
 ):
-    made = WAYS[way]
+    made = COPIERS[way]
     envs = PMAVectorEnv(21, randomisation=randomisation, **batch_options)
     assert same(made(envs).reset(seed=3), envs.reset(seed=3))
     ends = 0
@@ -120,7 +120,7 @@ def test_wrapped_environments_are_copied(way, same):
     for _ in range(20):
         env.step(env.action_space.sample())
     env.render()
-    other = WAYS[way](env)
+    other = COPIERS[way](env)
     actions = [other.action_space.sample() for _ in range(15)]
     # Spaces go on with the same draws too, each with its own.
     assert same([env.action_space.sample() for _ in range(15)], actions)
@@ -145,7 +145,7 @@ def test_pickles_and_deep_copies_of_made_environments(same):
     """`env_faults/pickle_deepcopy.py`: "ctypes objects containing pointers cannot be pickled"."""
     env = gym.make("pma_gym/IsokineticDisplacement-v0")
     env.reset(seed=3)
-    for made in WAYS.values():
+    for made in COPIERS.values():
         assert same(made(env).step([0.5]), copy.deepcopy(env).step([0.5]))
 
 
@@ -173,7 +173,7 @@ def test_plants_and_what_controllers_get_pickle(single, same):
     env = single({"randomisation": "varied", "model": "station"})
     env.reset(seed=1)
     env.step([0.1])
-    for made in (WAYS["pickle"], copy.deepcopy, copy.copy):
+    for made in (COPIERS["pickle"], copy.deepcopy, copy.copy):
         plant = made(env.plant)
         assert plant.model == env.plant.model and plant.tolerance == env.plant.tolerance
         states, again = plant.settle(0.0, pressure=300e3), env.plant.settle(0.0, pressure=300e3)
@@ -213,22 +213,22 @@ class Heavier:
     ],
     ids=["function", "partial", "lambda", "object"],
 )
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPIERS)
 def test_own_randomisations_are_copied(way, randomisation, course, same):
     env = gym.make("pma_gym/IsokineticDisplacement-v0", randomisation=randomisation)
     env.reset(seed=2)
-    other = WAYS[way](env)
+    other = COPIERS[way](env)
     assert same(course(other, 3), course(env, 3))
     assert same(other.reset(), env.reset())
     assert other.unwrapped.plant.model == env.unwrapped.plant.model
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", COPIERS)
 def test_own_tasks_are_copied(way, course, same):
     task = following("bow", "extension", lambda time: 0.8e-3 * time * (10.0 - time))
     env = PMAEnv(task, model="serres2008", pressure_kpa=300.0)
     env.reset(seed=2)
-    other = WAYS[way](env)
+    other = COPIERS[way](env)
     assert same(course(other, 5), course(env, 5))
     assert other.reference(3.0) == env.reference(3.0) == pytest.approx(16.8e-3)
 

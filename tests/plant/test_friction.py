@@ -158,9 +158,9 @@ def test_on_the_way_back_it_follows_the_laws_path():
 
 @given(st.floats(-1, 1), st.floats(0, 30), st.floats(0, 30), st.sampled_from([-1.0, 1.0]))
 def test_a_way_in_two_parts_is_the_way_in_one(memory, first, second, direction):
-    ways = [direction * 1e-6 * way for way in (first, second)]
-    once = friction_path(memory, ways[0] + ways[1], direction, P)
-    twice = friction_path(friction_path(memory, ways[0], direction, P), ways[1], direction, P)
+    travels = [direction * 1e-6 * way for way in (first, second)]
+    once = friction_path(memory, travels[0] + travels[1], direction, P)
+    twice = friction_path(friction_path(memory, travels[0], direction, P), travels[1], direction, P)
     assert twice == pytest.approx(once, abs=1e-7)
     assert -1.0 <= once <= 1.0
 

@@ -116,8 +116,6 @@ KNOWN: dict[str, tuple[str, ...]] = {
     "slide": (
         "coulomb_friction",
         "load_dependent_friction",
-        "spring",
-        "hardening_spring",
         "quadratic_drag",
         "directional_damping",
         "directional_gain",

@@ -10,7 +10,6 @@ from pma_gym.data.readers.decoding import decode_text
 from pma_gym.data.readers.layout import COMMENTS, Row, arrange
 from pma_gym.data.readers.table import Request, Table, UnreadableError
 from pma_gym.data.readers.text_lines import check_widths, split_lines
-from pma_gym.data.trial_columns import TrialError
 from pma_gym.limits import check_limit, limit
 
 SEPARATORS = ("\t", ";", "|", ",")
@@ -125,13 +124,3 @@ def _uncommented_header(rows: list[Row], request: Request) -> list[Row]:
         rows = list(rows)
         rows[leading - 1] = (number, bare)
     return rows
-
-
-def check_format(separator: str, decimal: str | None) -> None:
-    """Refuse a decimal mark that separates the cells too.
-
-    Raises:
-        TrialError: they are the same.
-    """
-    if separator == decimal:
-        raise TrialError(f"[format] gives {separator!r} as separator and as decimal; change one")

@@ -255,7 +255,11 @@ class FitProblem:
                 break
             wider = reach | {path: 2.0 * reach.get(path, 1.0) for path in edges}
             whitened = self.whitened_residuals(_at(model, search), extra, trials, wider)
-            further = LevenbergMarquardt(whitened, False, 1.0)
+            try:
+                further = LevenbergMarquardt(whitened, False, 1.0)
+            except ValueError:
+                # At the end of what it balances: a rounded number may lie beyond.
+                break
             ended = further.run(None, ROUNDS)
             if not further.best.chi_square < search.best.chi_square - LEAST_GAIN:
                 break

@@ -30,7 +30,6 @@ from pma_gym.units import SI_FACTORS
 
 Array = NDArray[np.float64]
 
-FILE = "trials.toml"
 SEARCHED, LEAST_SPEED = 0.2, 1.0
 """How far about a starting velocity the best one is searched, as a share of it, and the least speed
 (in the unit of a model file, mm/s or deg/s) that the share is of."""

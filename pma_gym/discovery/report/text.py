@@ -6,7 +6,7 @@ import re
 import sys
 
 from pma_gym.data.signals import SIGNALS
-from pma_gym.data.trial_columns import BY_NAME, BY_QUANTITY
+from pma_gym.data.trial_columns import BY_NAME
 from pma_gym.discovery.diagnosis import Diagnosis, Estimate, Gap, Undetermined
 from pma_gym.effects import CATALOGUE
 from pma_gym.units import with_unit
@@ -108,11 +108,6 @@ def unit_cell(unit: str) -> str:
     ('N/mm', '')
     """
     return "" if unit == "1" else unit
-
-
-def door_name(quantity: str) -> str:
-    """Column name of a quantity: `contraction` is `contraction_mm`."""
-    return BY_QUANTITY[quantity].name
 
 
 def figure(value: float | None, digits: int = 3) -> str:

@@ -31,7 +31,13 @@ PORTS: dict[str, Port] = {
 }
 """Ports of the slide: how many effects each takes, and what becomes of their results."""
 
+_PLACE = (
+    "the zero of a slide's position is free in every trial, so a law of the place has none; "
+    "take plant = 'joint'"
+)
+
 REFUSED_EFFECTS: dict[str, str] = {
+    **dict.fromkeys(("spring", "hardening_spring", "cogging"), _PLACE),
     "hand_push": "nobody settles a slide that nothing holds; take plant = 'station'",
     "residual_force_of_pressure": "it has no pressure; take plant = 'station'",
 }

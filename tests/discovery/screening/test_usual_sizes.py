@@ -19,18 +19,18 @@ def swung(torque, angle, hertz=2.0):
 
 @pytest.mark.parametrize("factor", [1e-4, 1.0, 1e3])
 def test_probes_grow_with_the_torque_of_the_trials(factor):
-    found = sizes(joint(), [swung(0.5 * factor, 0.3)])
-    assert found is not None
-    assert found.force == pytest.approx(0.49 * factor, rel=0.02)
-    assert found.speed == pytest.approx(0.3 * 4.0 * np.pi, rel=0.05)
-    assert found.way == pytest.approx(0.3, rel=0.01)
+    scores = sizes(joint(), [swung(0.5 * factor, 0.3)])
+    assert scores is not None
+    assert scores.force == pytest.approx(0.49 * factor, rel=0.02)
+    assert scores.speed == pytest.approx(0.3 * 4.0 * np.pi, rel=0.05)
+    assert scores.way == pytest.approx(0.3, rel=0.01)
     (drag,) = (
         each
         for each in candidate_effects(joint(), None, [swung(0.5 * factor, 0.3)])
         if each.name == "joint_drag"
     )
     # A tenth of the torque at the speed of the trials, times the factors of the probes.
-    usual = 0.1 * found.force / found.speed**2
+    usual = 0.1 * scores.force / scores.speed**2
     assert drag.probes.max() == pytest.approx(3.0 * usual, rel=1e-6)
 
 
