@@ -130,16 +130,16 @@ def test_a_scale_must_be_positive_and_leaves_older_trainings_theirs(preset):
 def test_drawn_stations_carry_the_leg_that_controllers_are_told_of():
     drawn = Stations("robust", 0, 2)
     given = {"randomisation": drawn, "model": drawn.structure, "pressure_kpa": 400.0}
-    envs = PMAVectorEnv(6, "isokinetic_exercise", disturbances="operator", **given)
+    envs = PMAVectorEnv(6, "isokinetic_exercise", disturbances="hand_push", **given)
     envs.reset(seed=1)
     models = envs.engine.models
     assert {model.name for model in models} == {"station-0", "station-1"}
     nominal = envs.engine.nominal.parameters["leg"]
     assert nominal.inertia > 0.0 and all(model.parameters["leg"] == nominal for model in models)
-    assert "operator" in models[0].parameters
+    assert "hand_push" in models[0].parameters
     # One that is asked for neither has neither, as for the other tasks.
     plain = drawn(load_model("station"), np.random.default_rng(0))
-    assert not {"leg", "operator"} & set(plain.parameters)
+    assert not {"leg", "hand_push"} & set(plain.parameters)
     envs.close()
 
 
