@@ -2,6 +2,7 @@
 
 from typing import Annotated, NamedTuple
 
+from pma_gym.codegen.generic import floor
 from pma_gym.effects.arithmetic import cosine
 from pma_gym.effects.effect import Effect
 from pma_gym.units import Quantity
@@ -11,7 +12,7 @@ class Cogging(NamedTuple):
     """Parameters of `cogging_force`."""
 
     amplitude: Annotated[float, Quantity("N", 0, 1e6, "assumption: 1", 0.0, usual=1)]
-    periods: Annotated[float, Quantity("1/m", 1, 1e4, "assumption: 100, one in 10 mm", usual=100)]
+    periods: Annotated[float, Quantity("1/m", 1, 1e3, "assumption: 100, one in 10 mm", usual=100)]
     phase: Annotated[float, Quantity("deg", -180, 180, "where the position's zero is", usual=0)]
 
 
@@ -28,7 +29,10 @@ def cogging_force(contraction, p):
     Source:
         First harmonic of what magnets and teeth do.
     """
-    return p.amplitude * cosine(6.283185307179586 * p.periods * contraction + p.phase)
+    # The part of a period alone: `cosine` is a series that is right near zero.
+    turns = p.periods * contraction
+    part = turns - floor(turns + 0.5)
+    return p.amplitude * cosine(6.283185307179586 * part + p.phase)
 
 
 COGGING = Effect(
