@@ -1,4 +1,4 @@
-"""Active disturbance rejection: one observer state is all that the model lacks; it is cancelled."""
+"""Active disturbance rejection: estimate the total disturbance with an observer and cancel it."""
 
 from typing import NamedTuple
 

@@ -1,4 +1,4 @@
-"""Bound to aim at: a predictive controller that knows the true station and its state.
+"""Predictive controller that knows the true station and its state: a bound for the others.
 
 What it knows that no controller of a real station does: the station's own equations and numbers,
 its state, the memories of hysteresis and friction, the commands on their way to it, and the
@@ -70,7 +70,7 @@ class Oracle:
         self._environment: PMAEnv | None = None
 
     def receive(self, environment: "PMAEnv") -> None:
-        """Be shown the environment that it drives; after the environment's own reset."""
+        """Receive the environment to drive, after that environment was reset."""
         self._environment = environment
 
     def __deepcopy__(self, memo: dict[int, object]) -> "Oracle":
@@ -81,7 +81,7 @@ class Oracle:
         return copied
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
-        """Look at the true station, and compute what its inverse needs.
+        """Read the true station and prepare its inverse.
 
         Raises:
             ValueError: it was not shown the environment.

@@ -56,7 +56,7 @@ class PID:
         self._reference: Reference = lambda time: 0.0
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
-        """Take the gains of this model, task and pressure, and forget everything else.
+        """Select the gains for this model, task and pressure, and clear the controller's state.
 
         Raises:
             ValueError: nothing was tuned for this task, with how to do so.

@@ -62,7 +62,7 @@ class Policy:
 
 
 class ShippedPolicy:
-    """The shipped policy of an algorithm for the task and loop at hand, whatever they are.
+    """The policy that an algorithm trained for the station's task and loop, from the package.
 
     Args:
         algorithm: `ppo`, `sac`, `td3`, `tqc`: how the file's name ends.

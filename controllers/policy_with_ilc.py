@@ -162,7 +162,7 @@ class EarlierTrials:
         self._readings, self._moves = list[NDArray[np.float64]](), list[NDArray[np.float64]]()
 
     def add(self, readings: Sequence[Measurement], moved: NDArray[np.float64]) -> None:
-        """Remember a trial, if it was whole."""
+        """Store a trial if it is complete."""
         if not self._first and len(readings) >= self._steps:
             self._readings.append(np.array([reading[1:] for reading in readings[: self._steps]]))
             self._moves.append(moved)

@@ -65,7 +65,7 @@ def designed(
 
 
 def task_kind(station: StationInfo) -> str:
-    """What a station's task asks for, whatever its name: see `kind_of`."""
+    """Kind of a station's task, whatever its name: see `kind_of`."""
     return kind_of(station.task)
 
 

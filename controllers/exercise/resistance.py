@@ -128,7 +128,7 @@ class Arrival:
         self._believed = reached + self._kept * (self._believed - reached)
 
     def held(self, pressure: float, rise: float) -> bool:
-        """Whether a command that is changed this way would change nothing.
+        """Whether a change of the command in this direction has no effect on the pressure.
 
         Args:
             pressure: as measured (Pa).

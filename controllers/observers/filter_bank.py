@@ -89,7 +89,7 @@ class DampingBank:
         return estimates
 
     def update(self, reading: Measurement, sent: list[float]) -> None:
-        """Take in what the sensors say; a reading that came before adds nothing.
+        """Update the estimates with the sensors' readings; a repeated reading adds nothing.
 
         Args:
             reading: with the time at which it was taken.

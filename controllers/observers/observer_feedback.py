@@ -52,7 +52,7 @@ class ObserverFeedback(ABC, Generic[Settings]):
         return self._motion.command(time)
 
     def reset(self, reference: Reference, station: StationInfo) -> None:
-        """Compute what all places need, and forget everything else."""
+        """Compute the gains at all places of the stroke, and clear the controller's state."""
         self._design(nominal_motion(reference, station))
 
     def act(self, measurement: Measurement, time: float) -> float:

@@ -53,7 +53,7 @@ class ActionMapping:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "ActionMapping":
-        """A form from JSON.
+        """An action mapping from JSON.
 
         Raises:
             ValueError: a key that is unknown or missing, or a value out of range.
@@ -64,7 +64,7 @@ class ActionMapping:
         return cls(**given)
 
     def to_json(self) -> dict[str, Any]:
-        """It as JSON."""
+        """The mapping as JSON."""
         return asdict(self)
 
     def wanted(self, action: Any, before: Any, base: Any) -> Any:  # noqa: ANN401

@@ -30,7 +30,7 @@ DIVERGED = (
 
 
 class PolicyAdapter:
-    """One trial, seen and driven as a policy sees and drives it.
+    """Compute a policy's observations and voltages in one trial.
 
     `update` comes first in every control step, then `volts`.
 

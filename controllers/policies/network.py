@@ -50,7 +50,7 @@ class Scaling(NamedTuple):
 
 
 class Weights(NamedTuple):
-    """What a network is; what computes with it is a `Network`.
+    """Layers and scaling of a network; a `Network` computes its actions.
 
     Attributes:
         layers: from the observation to the action; each takes what the one before gives.

@@ -58,7 +58,7 @@ class ObservationSpec:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "ObservationSpec":
-        """A view from JSON.
+        """An observation specification from JSON.
 
         Raises:
             ValueError: a key that is unknown or missing, or a value out of range.
@@ -69,7 +69,7 @@ class ObservationSpec:
         return cls(**given)
 
     def to_json(self) -> dict[str, Any]:
-        """It as JSON."""
+        """The specification as JSON."""
         return asdict(self)
 
     def rows(self, station: StationInfo, base: str | None = None) -> list[tuple[str, str]]:

@@ -30,7 +30,7 @@ LARGEST_MIB = {".safetensors": 64, ".json": 4}
 
 @dataclass(frozen=True, eq=False)
 class PolicyFile:
-    """A trained policy: what it computes, what it sees, what its action does, whence it comes.
+    """A trained policy: its network, observations, action mapping and origin.
 
     Attributes:
         name: what results call it.

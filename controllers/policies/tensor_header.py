@@ -36,7 +36,7 @@ _TENSOR = {
 
 
 class TensorHeaderError(ValueError):
-    """A file that is no safetensors, or announces what it does not hold."""
+    """A file is no safetensors file, or its header disagrees with its contents."""
 
 
 def check_header(start: bytes, size: int) -> dict[str, Any]:

@@ -48,7 +48,7 @@ class Calibration:
 
     @property
     def resolution(self) -> float:
-        """What one step of the DAQ stands for (SI)."""
+        """Size of one step of the DAQ in the sensor's unit (SI)."""
         return DAQ_STEP / abs(self.gain)
 
 

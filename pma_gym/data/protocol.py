@@ -1,4 +1,4 @@
-"""What the ideal motion of a task is, phase by phase; the two tasks of the dissertation."""
+"""Ideal motion of a task, phase by phase; the two tasks of the dissertation."""
 
 import copy
 from collections.abc import Callable, Mapping
@@ -74,7 +74,7 @@ class Phase:
 
     @property
     def samples(self) -> int:
-        """How many samples it is scored at.
+        """Number of samples at which it is scored.
 
         >>> DISPLACEMENT.phases[0].samples
         1923
@@ -83,7 +83,7 @@ class Phase:
 
     @property
     def times(self) -> NDArray[np.float64]:
-        """When it is scored, on its own clock (s), shape (samples,)."""
+        """Times at which it is scored, on the phase's clock (s), shape (samples,)."""
         return np.arange(self.samples) / SAMPLE_RATE_HZ
 
 
@@ -164,12 +164,12 @@ class Protocol:
 
     @property
     def motion(self) -> Motion | None:
-        """What the phases are pieces of; None where they are lines."""
+        """The motion that the phases are pieces of; None where they are lines."""
         return self.phases[0].motion
 
     @property
     def duration(self) -> float:
-        """When the last phase ends (s)."""
+        """Time at which the last phase ends (s)."""
         last = self.phases[-1]
         return last.start + last.duration
 

@@ -21,7 +21,7 @@ _WIDTH_IN, _PANEL_IN, _AXIS_IN = 7.2, 1.25, 0.7
 
 
 class HasColumns(Protocol):
-    """What `series_of` reads of a trial."""
+    """The part of a trial that `series_of` reads."""
 
     @property
     def time(self) -> Array:

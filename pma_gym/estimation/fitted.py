@@ -1,4 +1,4 @@
-"""What a fit finds, and what it tells on the way."""
+"""The result of a fit, and its progress reports."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from pma_gym.plant.model import Model
 
 @dataclass(frozen=True)
 class Round:
-    """How far a fit has come.
+    """Progress of a fit.
 
     Attributes:
         number: rounds so far.

@@ -170,7 +170,7 @@ class LevenbergMarquardt:
 
     @property
     def surplus(self) -> float:
-        """What chi-square has beyond noise."""
+        """Excess of chi-square over noise."""
         return self.best.chi_square - self.residuals.count
 
     def run(self, progress: Callable[[Round], None] | None, most: int = MOST_ROUNDS) -> bool:
@@ -246,7 +246,7 @@ class LevenbergMarquardt:
         return np.where(boundless, np.abs(values), np.maximum(np.abs(values), width))
 
     def _held(self) -> NDArray[np.bool_]:
-        """Which parameters a bound keeps from falling further."""
+        """Parameters at a bound that blocks a further descent."""
         downhill = -self.best.gradient
         low = (self.values <= self.lower) & (downhill < 0.0)
         return low | (self.values >= self.upper) & (downhill > 0.0)

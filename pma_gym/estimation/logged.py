@@ -46,7 +46,7 @@ class Logged:
         """From a trial.
 
         Args:
-            model: says what commanded loads and pressures are in volts.
+            model: gives what commanded loads and pressures are in volts.
             number: which trial it is, for the message.
             trial: the trial.
         Raises:
@@ -96,5 +96,5 @@ class Logged:
 
     @property
     def count(self) -> int:
-        """How many readings there are."""
+        """Number of readings."""
         return self.measured.size - sum(rows.size for rows in self.missing)

@@ -45,7 +45,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Signals:
-    """Sensors' courses in a trial as they were measured, and as a model says for some parameters.
+    """Sensors' signals in a trial as measured, and as a model computes them for some parameters.
 
     Attributes:
         simulated: of each sensor: for the parameters, then with each of them moved, and with each
@@ -104,7 +104,7 @@ def _module() -> Module:
 
 
 def _entries(b: Builder, table: Operand, names: Sequence[str]) -> dict[str, Operand]:
-    """What a table of entries says, by name."""
+    """Contents of a table of entries, by name."""
     entries = {}
     for i, name in enumerate(names):
         entries[name] = b.load(offset(b, table, i, INTEGER), typ=INTEGER)

@@ -1,4 +1,4 @@
-"""What a model leaves unexplained of many trials, and how that changes with its parameters.
+"""Residuals of a model over many trials, and their sensitivity to its parameters.
 
 All trials, each with the parameters as they are and with every free one moved a little, are
 simulated together. Sums over residuals are made trial by trial, so that no Jacobian of a million
@@ -74,7 +74,7 @@ class Residuals(SimulatedTrials):
 
         Args:
             values: the parameters in file units, shape (p,).
-            steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square alone.
+            steps: how far each is moved, with its sign, shape (p,); or (0,) for chi-square only.
             central: move each both ways, which costs twice as much.
         """
         size = len(steps)

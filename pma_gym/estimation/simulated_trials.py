@@ -180,7 +180,7 @@ class SimulatedTrials:
         return space[:-1]
 
     def _start_shares(self, number: int, space: Array, zeros: Array, vectors: Array) -> Array:
-        """How many moves bring each simulation nearest to a trial's readings, shape (tried,)."""
+        """Multiple of the move that brings each simulation nearest to the readings, (tried,)."""
         logged = self._trials[number]
         held = self._held(space, zeros, np.concatenate([vectors, vectors[:1]]))
         left = np.stack(held, axis=1) - logged.measured
@@ -247,7 +247,7 @@ class SimulatedTrials:
         return [part.reshape(shape) for part, shape in zip(parts, shapes, strict=True)]
 
     def _held(self, states: Array, zeros: Array, vectors: Array) -> list[Array]:
-        """What the sensors hold, shape (tried, rows) each."""
+        """Sensor values, shape (tried, rows) each."""
         columns, program = self.plant.sensor_columns, self.plant.program
         count, rows, _ = states.shape
         truth = np.empty((count, rows, len(self.plant.outputs)) if min(columns) < 0 else (0, 0, 0))

@@ -1,4 +1,4 @@
-"""Solves small systems of linear equations whose structure is known, as traced arithmetic."""
+"""Elimination for small linear systems of known structure, as traced arithmetic."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 

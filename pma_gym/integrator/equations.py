@@ -41,7 +41,7 @@ class State:
 
 @dataclass(frozen=True)
 class RateIndependentState:
-    """A memory that depends on the distance travelled alone, not on time.
+    """A rate-independent state: it depends on the distance travelled, not on time.
 
     Attributes:
         name: its name.
@@ -78,7 +78,7 @@ class Event:
 
 @dataclass(frozen=True)
 class Breakpoint:
-    """A value at whose zero a law curves otherwise: a step ends about there.
+    """A value at whose zero a law changes form: a step ends near it.
 
     Attributes:
         value: the value.
@@ -181,10 +181,10 @@ class Equations:
 
 
 def check_interpolation(interpolation: str) -> None:
-    """Refuse what is no interpolation of commands.
+    """Reject an unknown interpolation of commands.
 
     Raises:
-        ValueError: says what there is.
+        ValueError: it is unknown; the message lists the choices.
     """
     if interpolation not in ("foh", "zoh"):
         raise ValueError(

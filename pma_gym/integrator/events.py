@@ -128,7 +128,7 @@ def _soonest(considered: list[tuple[Value, Value, Value]]) -> tuple[Value, Value
 
 
 def turns(event: Event, speed: Value, rate: Value) -> Value:
-    """Whether what moves has as good as turned, by its speed and the rate of that."""
+    """Test for an imminent reversal of motion, by the speed and its rate."""
     return (speed * rate < 0.0) & (speed * speed < (SPENT * event.overshoot) * abs(rate))
 
 

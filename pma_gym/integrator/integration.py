@@ -34,7 +34,7 @@ faster."""
 
 @dataclass(frozen=True)
 class Layout:
-    """What a lane works on, in order.
+    """Memory layout of a lane.
 
     Attributes:
         changing: values that an attempt changes: states and memories, size, left.

@@ -159,7 +159,7 @@ JUMP_S = 1e-3
 
 
 def step_start(eq: Equations) -> tuple[dict[int, Value], dict[int, Value]]:
-    """What is fixed for a step, and what holds at its beginning."""
+    """Values that are constant over a step, and those at its start."""
     if eq.travelled is None:
         return {}, {}
     way, speed = eq.travelled

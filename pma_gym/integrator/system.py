@@ -1,4 +1,4 @@
-"""A model's equations with the arithmetic of one step, and what they say where it begins."""
+"""A model's equations with the arithmetic of one step, and their values at its start."""
 
 from dataclasses import dataclass
 
@@ -25,7 +25,7 @@ class System:
 
 
 def step_start_values(eq: Equations) -> dict[int, Value]:
-    """What paths and their direction are where a step begins, by id."""
+    """Values of the paths and their direction at the start of a step, by id."""
     here = {memory.after.id: memory.value for memory in eq.rate_independent_states}
     if eq.travelled is not None and eq.rate_independent_states:
         here[eq["origin"].id] = eq.travelled[0]

@@ -1,4 +1,4 @@
-"""Writes the function that simulates whole trials, one after the other in every lane."""
+"""Generate the function that simulates whole trials, one after the other in every lane."""
 
 from llvmlite import ir
 

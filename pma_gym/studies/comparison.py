@@ -86,7 +86,7 @@ def verdict(printed: str, recomputed: float, reach: float = 0.0) -> Verdict:
 def rounding_reach(
     compute: Callable[[NDArray[np.float64]], ArrayLike], inputs: ArrayLike, halves: ArrayLike
 ) -> NDArray[np.float64]:
-    """How far the rounding of printed inputs can move what is computed from them.
+    """Bound the effect of the rounding of printed inputs on a computed result.
 
     Args:
         compute: from inputs, shape (n,), to figures, shape (m,).

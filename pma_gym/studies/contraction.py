@@ -117,7 +117,7 @@ def _compare_constant_stiffness() -> list[Comparison]:
 
 
 def _compare_secants(table: Table) -> list[Comparison]:
-    """How many of I2's spring constants are the secant of their own row."""
+    """Count I2's spring constants that equal the secant of their row."""
     agree = np.abs(secant_spring(table) - table["spring_n_per_mm"]) <= 3e-5
     note = "(F_ce - load) / contraction, to 0.00003 N/mm"
     name = "spring constants that are the secant of their row"

@@ -68,7 +68,7 @@ class Evaluations(list[Evaluation]):
 
     @property
     def title(self) -> str:
-        """What was judged."""
+        """Heading: the kind of trial that was scored."""
         return f"Isokinetic {self[0].protocol.name}" if self else "No phases"
 
     def documents(self) -> list[dict[str, float | int | str]]:
@@ -84,13 +84,13 @@ class Evaluations(list[Evaluation]):
         ]
 
     def notes(self) -> list[str]:
-        """What was done to the samples of which phases, if anything."""
+        """Changes to the samples, by phase; empty if there were none."""
         texts = dict.fromkeys(row.note for row in self if row.note)
         named = {text: ", ".join(r.phase.name for r in self if r.note == text) for text in texts}
         return [f"{phases}: {text}" for text, phases in named.items()]
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: the table, and what was done to the samples."""
+        """Notebook display: the table, and the changes to the samples."""
         header = ["Phase", *(row.phase.name for row in self)]
         table = TextTable(self.title, header, self.rows())
         return notebook_html([table, *map(Paragraph, self.notes())])

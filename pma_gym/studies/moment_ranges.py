@@ -18,7 +18,7 @@ _KPA = SI_FACTORS["kPa"]
 
 
 class Span(NamedTuple):
-    """What a device can hold at an angle as its pressure is chosen.
+    """Range of moments that a device can hold at an angle, over its pressures.
 
     Attributes:
         low: smallest moment (N m).

@@ -97,7 +97,7 @@ def _compare_table_19() -> list[Comparison]:
 
 
 def _compare_with_profile(pressure: str, spring: float) -> list[Comparison]:
-    """Whether table 19 is what the voltage profile was computed with."""
+    """Test whether the voltage profile was computed with table 19."""
     used = profile_model(float(pressure)).muscle_rate * DAMPING * 1e-3
     note = "table 19's against the one that reproduces the voltage profile"
     name = f"{pressure} kPa spring constant (N/mm)"

@@ -55,7 +55,7 @@ class ThreeElementErrors(NamedTuple):
 
 
 def three_element_errors() -> ThreeElementErrors:
-    """How far table 2's model is from the station's own measurements, at nominal pressures.
+    """Deviation of table 2's model from the station's measurements, at nominal pressures.
 
     Extension is load over K; contraction is (F_ce - load) / K; force is F_ce - K x contraction.
     The three repeats of a measurement scatter by 0.74 mm in extension about their mean (n - 1 in

@@ -192,7 +192,7 @@ def _slopes(table: str) -> NDArray[np.float64]:
 
 
 def _compare_text() -> list[Comparison]:
-    """What the text says about the largest deviations."""
+    """Statements of the text on the largest deviations."""
     rows: list[Comparison] = []
     claims = {
         "5.2.2": [

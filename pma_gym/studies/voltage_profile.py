@@ -46,7 +46,7 @@ _REFERENCES = {
 
 
 class ProfileModel(NamedTuple):
-    """What a profile is computed with at one pressure.
+    """The model from which a profile is computed at one pressure.
 
     Attributes:
         muscle_rate: A = K / B of the muscle (1/s).

@@ -1,4 +1,4 @@
-"""What disturbs an episode: the regulator jumps, somebody pulls or pushes at the slide."""
+"""Disturbances of an episode: jumps of the regulator, hand pushes at the slide."""
 
 import math
 from typing import NamedTuple
@@ -21,7 +21,7 @@ length would be praised for knowing the test.
 
 
 class Disturbances(NamedTuple):
-    """Sizes of what disturbs an episode.
+    """Sizes of an episode's disturbances.
 
     Attributes:
         regulator_step: by how much the regulator's pressure jumps (Pa); 0 for never.
@@ -32,17 +32,17 @@ class Disturbances(NamedTuple):
     hand_push_force: float = 0.0
 
     def regulator_steps(self, duration: float) -> int:
-        """How often the regulator jumps in an episode of a duration (s)."""
+        """Number of jumps of the regulator in an episode of a duration (s)."""
         return _count(duration) if self.regulator_step else 0
 
     def pulses(self, duration: float) -> int:
-        """How many pulses there are in an episode of a duration (s)."""
+        """Number of pulses in an episode of a duration (s)."""
         return _count(duration) if self.hand_push_force else 0
 
     def draw(
         self, duration: float, keys: NDArray[np.int64], streams: NDArray[np.int64]
     ) -> "Events":
-        """Events of episodes, by their counters alone.
+        """Draw the events of episodes, as a function of their counters.
 
         Args:
             duration: of an episode (s).
@@ -116,5 +116,5 @@ DISTURBANCES: dict[str, Disturbances] = {
     "hand_push": Disturbances(hand_push_force=_FORCE),
     "regulator_and_hand_push": Disturbances(_STEP, _FORCE),
 }
-"""What disturbs episodes, by name: jumps of the regulator by 25 kPa away from its line and back,
+"""Disturbances of episodes, by name: jumps of the regulator by 25 kPa away from its line and back,
 and pulses of 50 N at the slide of 0.2 to 0.8 s, both at random times and of random sign."""

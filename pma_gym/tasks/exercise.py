@@ -45,11 +45,11 @@ have up to 60 N m/rad; a stiffer one needs more."""
 
 @dataclass(frozen=True)
 class Exercise:
-    """What is prescribed, to whom, and what is safe.
+    """An exercise: its prescription, its operators and its safety limits.
 
     Attributes:
         prescription: moment over the angle; None where the speed is prescribed.
-        population: whom the operators are drawn from.
+        population: distribution of the operators.
         safety_filter: numbers of the safety layer.
         safe_moment: largest moment at the joint (N m).
         safe_speed: largest speed of the joint (rad/s).
@@ -73,7 +73,7 @@ class Exercise:
 
     @property
     def structure(self) -> tuple[object, ...]:
-        """What compiled environments depend on: no moment, and nobody's numbers."""
+        """The part that compiled environments depend on: no moment, no operator's parameters."""
         prescribed = "speed" if self.prescription is None else "moment"
         return (
             "exercise",

@@ -1,4 +1,4 @@
-"""Whether a station's actuator can follow a reference at all, by the nominal balance of forces."""
+"""Feasibility of a reference for a station's actuator, by the nominal balance of forces."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,7 @@ _HALVINGS = 40
 
 
 def infeasibility_reason(task: Task, model: str | Model, pressure: float) -> str | None:
-    """Why the actuator of a station cannot follow a task, in words; None if it can.
+    """Explain why a station's actuator cannot follow a task; None if it can.
 
     A jump of the reference; a voltage of less than 0 or more than 10 V; or, where the motor moves,
     a cable that would have to push, on the way back. The muscle's force and damping count; inertia,

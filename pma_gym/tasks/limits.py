@@ -1,4 +1,4 @@
-"""What breaks the rig."""
+"""Physical limits of the rig, and safety limits of an exercise."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -14,11 +14,11 @@ LIMITS: tuple[tuple[str, str, float], ...] = (
     ("load", "tension", 1.0),
     ("pressure", "pressure", 1.0),
 )
-"""What breaks the rig: output, the field of `[limits]` that bounds it, and its sign."""
+"""Physical limits of the rig: output, the field of `[limits]` that bounds it, and its sign."""
 
 
 def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
-    """Which of `LIMITS` a state breaks, counted from 1; 0.0 for none. Numbers or traced values.
+    """Index (from 1) of the first of `LIMITS` that a state exceeds, else 0.0; numbers or traced.
 
     Args:
         limits: the rig's parameters of `[limits]` (SI).
@@ -32,7 +32,7 @@ def broken(limits: Any, truth: Mapping[str, Any]) -> Any:  # noqa: ANN401
 
 
 def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
-    """What of an exercise is not safe, counted on from `LIMITS`; 0.0 for none.
+    """Code of the safety limit that an exercise exceeds, counted on from `LIMITS`; 0.0 for none.
 
     Args:
         exercise: with its safe moment and speed.
@@ -46,7 +46,7 @@ def unsafe(exercise: Exercise, moment: Any, speed: Any) -> Any:  # noqa: ANN401
 
 
 def broken_limit(model: Model, truth: Mapping[str, float]) -> str:
-    """Which physical limit of the rig a state breaks, in words; "" if none.
+    """Name the physical limit of the rig that a state exceeds; "" if none.
 
     Args:
         model: the rig's model, with its limits.
@@ -56,7 +56,7 @@ def broken_limit(model: Model, truth: Mapping[str, float]) -> str:
 
 
 def limit_in_words(model: Model, code: float, exercise: Exercise | None = None) -> str:
-    """The limit that `broken` or `unsafe` found, in words; "" for 0."""
+    """Name the limit that `broken` or `unsafe` returned; "" for 0."""
     if not code:
         return ""
     limits = model.parameters["limits"]

@@ -92,7 +92,7 @@ TYPICAL_STRENGTH = STRENGTH * BODY_MASS * GRAVITY * BODY_HEIGHT
 
 
 class Population(NamedTuple):
-    """Whom operators are drawn from: every number uniformly between two.
+    """Distribution of operators: every parameter uniform between two bounds.
 
     Attributes:
         low: the least of every number.
@@ -109,7 +109,7 @@ class Population(NamedTuple):
         return Operator(*middle)._replace(tremor_phase=0.0)
 
     def draw(self, keys: NDArray[np.int64], streams: NDArray[np.int64]) -> NDArray[np.float64]:
-        """People, by counters alone: shape (n, numbers of a `Operator`).
+        """Draw operators, as a function of counters: shape (n, numbers of a `Operator`).
 
         Args:
             keys: two words for each, shape (n, 2).
@@ -152,7 +152,7 @@ PACED = Population(
         stiffness=5.0,
     ),
 )
-"""People whom the device sets the pace.
+"""Operators whose pace the device sets.
 
 Strength: young adults scatter by about 24 % (200 +- 47 N m in men, Arthroscopy, Sports Medicine
 and Rehabilitation 2024), women have about 0.72 of it, and two weeks in bed take 15 % (U. Marusic
@@ -207,7 +207,7 @@ def moment_profile(angles: Sequence[float], moments: Sequence[float]) -> MomentP
 
 
 class OperatorState(NamedTuple):
-    """What changes in a person from step to step.
+    """State of an operator from step to step.
 
     Attributes:
         drive: moment that he means to give, as far as it has risen (N m).
@@ -231,7 +231,7 @@ def operator_step(
     period: float,
     share: Any,  # noqa: ANN401
 ) -> tuple[Any, OperatorState]:
-    """A person's moment during a control step, and how he comes out of it.
+    """Compute an operator's moment during a control step, and the state after it.
 
     Numbers or traced values; the equations are the module's, a step long.
 

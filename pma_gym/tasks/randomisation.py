@@ -1,4 +1,4 @@
-"""What of the station is drawn anew at every reset, by name."""
+"""Randomisations of the station, drawn at every reset, by name."""
 
 from collections.abc import Callable
 
@@ -128,11 +128,11 @@ def _quantity(model: Model, path: str) -> Quantity:
 
 
 Randomisation = Callable[[Model, np.random.Generator], Model]
-"""Gives the station of an episode, from the nominal model and a generator of its own."""
+"""Draws an episode's station from the nominal model with the given generator."""
 
 RANDOMISATIONS: dict[str, Randomisation] = {
     "none": nominal_station,
     "intervals": station_within_intervals,
     "varied": varied_station,
 }
-"""What of the station is drawn anew at every reset, by name."""
+"""Randomisations of the station, drawn at every reset, by name."""

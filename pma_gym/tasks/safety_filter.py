@@ -20,7 +20,7 @@ run without any resistance. Where moment and speed disagree the moment counts.
 Source:
     Our own. The form is that of a control barrier function (A. D. Ames and others 2017, "Control
     barrier function based quadratic programs for safety critical systems"); the numbers were found
-    by simulation, and `python -m benchmarks safety` says what they are worth.
+    by simulation, and `python -m benchmarks safety` measures their effect.
 """
 
 from typing import Any, NamedTuple

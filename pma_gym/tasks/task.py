@@ -1,4 +1,4 @@
-"""What a task is: a protocol, who moves, and the pressures it is done at; how it is scored."""
+"""Tasks: a protocol, the actuator that moves, the pressures, and the scores."""
 
 import math
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ class Task:
             and the quantity is `contraction`; the motor's pulls it at one pressure.
         load: load that the motor holds where the regulator moves (N); 0 where the motor moves.
         start_pressures: range of the pressures that episodes begin at (Pa); the trials' if None.
-        exercise: of an operator, whom the motor plays while the regulator resists; else None.
+        exercise: of an operator, played by the motor while the regulator resists; else None.
     """
 
     name: str
@@ -81,7 +81,7 @@ class Task:
 
     @property
     def duration(self) -> float:
-        """How long an episode lasts (s): to the last scored sample."""
+        """Duration of an episode (s), to the last scored sample."""
         return self.protocol.duration + TRIAL_TAIL_S
 
     @property
@@ -104,7 +104,7 @@ class Task:
 
     @property
     def structure(self) -> tuple[str, ...]:
-        """What compiled environments depend on: nothing of a motion, and no name.
+        """The part of the task that compiled environments depend on: no motion, no name.
 
         Two tasks of one structure share their compiled code, however their references differ.
         """

@@ -19,10 +19,10 @@ from pma_gym.tasks.task import TASKS, Task
 from pma_gym.units import SI_FACTORS
 
 DURATION_S = 10.0
-"""How long they last (s)."""
+"""Duration of the unseen references (s)."""
 
 RISE_S = 2.5
-"""How long sines are faded in (s)."""
+"""Duration of the sines' fade-in (s)."""
 
 LOW, HIGH = 0.25, 0.95
 """Shares of the range that references stay within once they have risen: at 25 mm or 90 deg there is

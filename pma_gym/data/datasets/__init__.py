@@ -1,1 +1,1 @@
-"""Data sets: a folder of trials and what `dataset.toml` says about it."""
+"""Data sets: a folder of trials and its description in `dataset.toml`."""

@@ -1,4 +1,4 @@
-"""Data sets: a folder of trials, one file each, and what a lab says about them in dataset.toml."""
+"""Data sets: a folder of trials, one file each, and the lab's description in dataset.toml."""
 
 import os
 import warnings

@@ -1,4 +1,4 @@
-"""What a trial's values tell of its columns: wrong units, sensors that say nothing, gaps."""
+"""Checks of a trial's columns by their values: wrong units, dead sensors, gaps."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -86,7 +86,7 @@ def check_signals(
 
 
 def empty_runs(path: Path, trial: Trial, table: Table | None = None) -> Iterator[str]:
-    """Words on measurements that are empty in over half of a trial's rows."""
+    """Return a message on measurements that are empty in over half of a trial's rows."""
     for quantity, values in trial.measurements.items():
         empty = np.isnan(values)
         if 2 * empty.sum() <= empty.size:

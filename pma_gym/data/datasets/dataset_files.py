@@ -1,4 +1,4 @@
-"""The files of a data set's folder: which are read, and what is said of the others."""
+"""The files of a data set's folder: those that are read, and messages on the others."""
 
 import re
 from collections import Counter

@@ -1,4 +1,4 @@
-"""What `dataset.toml` says about a data set."""
+"""Content of `dataset.toml`, the description of a data set."""
 
 import math
 import reprlib
@@ -50,7 +50,7 @@ class Description:
 
 
 def read_description(folder: Path, files: Sequence[str]) -> Description:
-    """What a folder's `dataset.toml` says; nothing if there is none.
+    """Read a folder's `dataset.toml`; an empty description if there is none.
 
     Args:
         folder: the data set.

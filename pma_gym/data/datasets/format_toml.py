@@ -1,4 +1,4 @@
-"""What `[format]` of a `dataset.toml` says about the form of its files, checked."""
+"""The table `[format]` of a `dataset.toml`, read and checked."""
 
 import codecs
 from collections.abc import Mapping

@@ -16,7 +16,7 @@ DIGITS = 9
 
 
 def copies(trials: Sequence[Trial]) -> dict[int, int]:
-    """Which trials repeat the content of an earlier one.
+    """Find trials that repeat the content of an earlier one.
 
     Args:
         trials: the trials.

@@ -1,4 +1,4 @@
-"""What a lab states of its sensors: `[sensors]` of a `dataset.toml`."""
+"""A lab's statements on its sensors: `[sensors]` of a `dataset.toml`."""
 
 import math
 from collections.abc import Callable, Mapping

@@ -1,4 +1,4 @@
-"""What a lab's columns are likely to be, by their names, units and values."""
+"""Guesses of a lab's columns from their names, units and values."""
 
 import re
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ _RAW = {column.quantity: column.name for column in RAW_COLUMNS}
 
 @dataclass(frozen=True)
 class Guess:
-    """What a column is likely to be.
+    """The likely content of a column.
 
     Attributes:
         column: ours.
@@ -47,7 +47,7 @@ class Guess:
 
 
 def guess_column(name: str, unit: str, values: Array) -> Guess | None:
-    """What a column is likely to be; None where nothing speaks for anything.
+    """Guess what a column holds; None without evidence.
 
     Args:
         name: its name in the file.

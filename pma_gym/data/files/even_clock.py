@@ -49,7 +49,7 @@ class EvenClock:
     step: float
 
     def words(self) -> str:
-        """What to say: how the stamps are rounded, and what they are taken for."""
+        """Text of the warning: how the stamps are rounded, and how they are read."""
         return (
             f"time_s is rounded to {1e3 * self.quantum:g} ms by the logger, steps of "
             f"{1e3 * self.step:.6g} ms ({1.0 / self.step:.6g} Hz) explain every stamp: the even "

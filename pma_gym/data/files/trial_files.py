@@ -179,7 +179,7 @@ def write_trial(trial: Trial, path: str | os.PathLike[str]) -> None:
 
 
 def encode_trial(trial: Trial, path: str | os.PathLike[str]) -> bytes:
-    """What `write_trial` writes to a file of this name."""
+    """Encode a trial as `write_trial` writes it to a file of this name."""
     held = {"time": trial.time, **trial.commands, **trial.measurements}
     columns = {
         column.name: column.from_si(held[column.quantity])

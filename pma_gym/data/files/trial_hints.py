@@ -56,7 +56,7 @@ def looks_like(name: str) -> tuple[Column, float] | None:
 
 
 def strange_columns(header: Sequence[str], mapping: ColumnMap, trial: Trial) -> str:
-    """What to say about the columns of a file that are nothing known; empty if all are.
+    """Return a message on a file's unknown columns; empty if all are known.
 
     Args:
         header: names of the file's columns.

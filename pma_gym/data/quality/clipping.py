@@ -1,4 +1,4 @@
-"""Sensors at an end of their range, found by what their readings do.
+"""Clipped sensors, detected from their readings.
 
 A reading at an end says only that the truth lies beyond. Ends that are known (of raw volts, or
 `range` in `[columns]` and `[sensors]`) are seen when a file is read; this module finds the others:
@@ -53,7 +53,7 @@ class End:
     rows: Mapping[int, Rows]
 
     def words(self, names: Sequence[str], trials: Sequence[Trial]) -> str:
-        """What to tell: column, value, files and rows, and what comes of it."""
+        """Text of the warning: column, value, files, rows and consequence."""
         column = BY_QUANTITY[self.quantity]
         places = []
         for number, rows in self.rows.items():
@@ -154,13 +154,13 @@ def _longest(row: Array, counted: Rows) -> int:
 
 
 def _moves(trial: Trial, start: int, stop: int) -> bool:
-    """Whether a command moves in most of the rows: what stands still at rest is no end."""
+    """Test whether a command moves in most of the rows: a sensor at rest is not clipped."""
     changes = [np.diff(np.nan_to_num(row[start:stop])) != 0.0 for row in trial.commands.values()]
     return any(2 * moved.sum() > moved.size for moved in changes)
 
 
 def _jumps(row: Array, start: int, stop: int, step: float) -> bool:
-    """Whether the readings before or after lead straight beyond the end."""
+    """Test whether the readings before or after extrapolate beyond the end."""
     for part in (row[max(0, start - BEFORE) : start], row[stop : stop + BEFORE][::-1]):
         if len(part) == BEFORE and np.isfinite(part).all():
             slope = float(np.polyfit(np.arange(BEFORE), part, 1)[0])

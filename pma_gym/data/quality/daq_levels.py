@@ -1,6 +1,6 @@
 """Readings of the station's 12-bit DAQ, known by their levels.
 
-Steps and ends of that DAQ hold for its own readings alone. A signal was read by it if its readings
+Steps and ends of that DAQ hold only for its own readings. A signal was read by it if its readings
 differ from each other by whole steps of it; those of another lab's sensor do not.
 """
 
@@ -17,7 +17,7 @@ MISS = 0.05
 
 
 def read_by_daq(signal: Signal, readings: Array) -> bool:
-    """Whether readings (SI, NaN where there are none) differ by whole steps of the DAQ."""
+    """Test whether readings (SI, NaN for none) differ by whole steps of the DAQ."""
     if signal.calibration is None:
         return False
     known = readings[np.isfinite(readings)]
@@ -28,9 +28,9 @@ def read_by_daq(signal: Signal, readings: Array) -> bool:
 
 
 def at_daq_end(signal: Signal, readings: Array) -> NDArray[np.bool_]:
-    """Which readings (SI, of any shape) stand at an end of the DAQ's range; none of other sensors.
+    """Mark readings (SI, any shape) at an end of the DAQ's range; none of other sensors.
 
-    Such a reading says only that the truth lies beyond.
+    Such a reading is only a bound on the true value.
     """
     nowhere = np.zeros(readings.shape, bool)
     # Counted from its start, a signal no longer tells at which level it began.

@@ -45,7 +45,7 @@ class Gap:
     command: str = ""
 
     def words(self) -> str:
-        """What is missing, from when to when, and how much."""
+        """Text of the warning: what is missing, from when to when, and how much."""
         span = f"from {self.since:.4g} to {self.until:.4g} s ({self.until - self.since:.3g} s"
         if self.command:
             return f"{self.command} has no value in {self.rows} rows {span})"
@@ -98,7 +98,7 @@ def _without_command(name: str, values: Array, time: Array, limit: float) -> Ite
 
 
 def pieces(trial: Trial, missing: list[Gap]) -> list[Trial]:
-    """What lies between gaps, less pieces that are too short to tell anything."""
+    """Return the pieces between gaps, without those too short to be informative."""
     starts = [0, *(gap.first for gap in missing)]
     stops = [*(gap.last + 1 for gap in missing), len(trial)]
     kept = []

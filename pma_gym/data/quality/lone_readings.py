@@ -64,7 +64,7 @@ class LoneReadings:
     least: float
 
     def words(self, count: int) -> str:
-        """What to tell, of so many readings in all."""
+        """Text of the warning, given the number of all readings."""
         column, number = BY_QUANTITY[self.quantity], sum(int(at.sum()) for at in self.rows.values())
         least = self.least / SI_FACTORS[column.unit]
         many = "readings stand" if number > 1 else "reading stands"
@@ -75,7 +75,7 @@ class LoneReadings:
 
 
 def without_lone_readings(trials: Sequence[Trial]) -> tuple[list[Trial], list[str]]:
-    """The trials less readings that stand alone, and words on each signal that has some."""
+    """Return the trials without isolated outliers, and a message for each signal with some."""
     kept, words = list(trials), []
     names = dict.fromkeys(name for trial in trials for name in trial.measurements)
     for quantity in names:

@@ -53,12 +53,12 @@ def decimal_mark(columns: Iterable[Cells]) -> str:
 
 
 def has_groups(cells: Cells, mark: str, given: bool = False) -> bool:
-    """Whether a column's numbers have grouped thousands.
+    """Test whether a column's numbers have grouped thousands.
 
     Args:
         cells: of the column.
         mark: the file's decimal mark.
-        given: whether the lab says so: then the other mark can only group.
+        given: whether the lab states it: then the other mark can only group.
     Returns:
         True where one cell shows both marks, or two groups: `3,785.9` and `1,234,567` can be read
         in one way; `3,785` alone in two.

@@ -39,7 +39,7 @@ EPOCHS = ((1e9, 5e9, 1.0, "seconds"), (1e12, 5e12, 1e-3, "milliseconds"),
 
 
 def looks_like_clock(cell: object) -> bool:
-    """Whether a cell holds a date or a time of day."""
+    """Test whether a cell holds a date or a time of day."""
     if isinstance(cell, datetime.datetime | datetime.time | datetime.timedelta):
         return True
     return isinstance(cell, str) and any(_match(form, cell) for form in _FORMS)

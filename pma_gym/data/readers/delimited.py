@@ -32,7 +32,7 @@ def read_text(content: bytes, file: str, request: Request = Request()) -> list[T
     Args:
         content: bytes of the file.
         file: its name, for messages.
-        request: known names, and what the lab says about its files.
+        request: known names, and the lab's description of its files.
     Returns:
         Tables; the one of an ordinary file.
     Raises:

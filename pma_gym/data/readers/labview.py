@@ -43,7 +43,7 @@ def read_labview(text: str, file: str, request: Request) -> list[Table]:
     Args:
         text: of the file.
         file: its name, for messages.
-        request: known names, and what the lab says about its files.
+        request: known names, and the lab's description of its files.
     Returns:
         One table, or one a segment; `X_Value` is `time_s` there.
     Raises:

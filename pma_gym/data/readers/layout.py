@@ -41,7 +41,7 @@ def arrange(
     Args:
         file: name, for messages.
         rows: numbered rows that are not entirely empty.
-        request: known names, and what the lab says about its files.
+        request: known names, and the lab's description of its files.
         provenance: metadata beside the table.
         part: name of the sheet or segment.
         padded: whether a short row lacks nothing but empty cells.

@@ -1,4 +1,4 @@
-"""A table as it stands in a file, and what a lab says about the form of its files."""
+"""A table as it stands in a file, and the lab's description of the form of its files."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -53,18 +53,18 @@ class Request:
 
     Attributes:
         columns: the lab's names of columns to ours.
-        format: what the lab says about its files.
+        format: the lab's description of its files.
     """
 
     columns: ColumnMap = field(default_factory=dict)
     format: FileFormat = field(default_factory=FileFormat)
 
     def is_known(self, name: object) -> bool:
-        """Whether a header's name is one of ours, or the lab's for one of ours."""
+        """Test whether a header's name is one of ours, or the lab's for one of ours."""
         return isinstance(name, str) and (name in BY_NAME or name in self.columns)
 
     def is_time(self, name: object) -> bool:
-        """Whether a header's name is that of the time."""
+        """Test whether a header's name is that of the time."""
         if not isinstance(name, str):
             return False
         entry = self.columns.get(name)

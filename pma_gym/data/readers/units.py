@@ -45,7 +45,7 @@ def unit_of(text: str) -> str:
 
 
 def unit_factor(text: str, column: Column) -> float | None:
-    """What values in a unit are multiplied by to be in a column's.
+    """Factor that converts values of a unit to the column's.
 
     Args:
         text: the unit.

@@ -31,7 +31,7 @@ def tables_of(variables: Mapping[str, Variable], file: str, request: Request) ->
     Returns:
         One table for the variables themselves, if they are one, and one for each structure.
     Raises:
-        UnreadableError: nothing is a table; says what there is, and what to do.
+        UnreadableError: nothing is a table; the message lists the content and a remedy.
     """
     groups = [(part, columns) for part, columns in _groups("", variables, 0, file)]
     tables = [

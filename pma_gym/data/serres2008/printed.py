@@ -1,4 +1,4 @@
-"""Which file holds which printed table, and its rows as printed."""
+"""Files of the printed tables, and their rows as printed."""
 
 import csv
 import functools
@@ -60,7 +60,7 @@ def printed_rows(name: str) -> list[Row]:
     """The rows of a table with the figures as printed.
 
     Raises:
-        KeyError: no such table; says which exist.
+        KeyError: no such table; the message lists the tables.
     """
     if name not in FILES:
         raise KeyError(f"no table {name!r} of Serres 2008; there are {', '.join(FILES)}")

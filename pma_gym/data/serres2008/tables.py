@@ -35,7 +35,7 @@ class Table:
         """A column.
 
         Raises:
-            KeyError: no such column; says which the table has.
+            KeyError: no such column; the message lists the table's columns.
         """
         if column not in self.columns:
             raise KeyError(
@@ -91,7 +91,7 @@ def load_table(name: str, corrected: bool = True) -> Table:
             False gives what is printed.
 
     Raises:
-        KeyError: no such table; says which exist.
+        KeyError: no such table; the message lists the tables.
 
     >>> load_table("I1")["load_n"][:3]
     array([184., 185., 185.])

@@ -42,7 +42,7 @@ def read_pages(content: bytes) -> Iterator[tuple[int, Page]]:
     Args:
         content: bytes of the file.
     Raises:
-        ValueError: it is no Parquet file, or its pages are not where it says.
+        ValueError: it is no Parquet file, or its pages are not at the stated place.
     """
     if len(content) < 12 or content[-4:] != _MAGIC:
         raise ValueError("it does not end as a Parquet file does")

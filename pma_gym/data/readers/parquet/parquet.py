@@ -86,7 +86,7 @@ def _table(content: bytes, file: str, request: Request) -> Table:
 
 
 def _kind(type_: Any) -> str:  # noqa: ANN401
-    """What a column holds: "number", "flag", "date", "text"; empty for anything else."""
+    """Kind of a column's content: "number", "flag", "date", "text"; empty for anything else."""
     types = needed("pyarrow.types", "")
     if types.is_dictionary(type_):
         type_ = type_.value_type

@@ -1,4 +1,4 @@
-"""What the sheets of a workbook share: their names, texts and styles."""
+"""Shared parts of a workbook: its sheets' names, texts and styles."""
 
 import datetime
 import posixpath

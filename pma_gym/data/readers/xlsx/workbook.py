@@ -34,7 +34,7 @@ def read_xlsx(content: bytes, file: str, request: Request = Request()) -> list[T
     Args:
         content: bytes of the file.
         file: its name, for messages.
-        request: known names, and what the lab says about its files.
+        request: known names, and the lab's description of its files.
     Returns:
         Tables in the order of the sheets; hidden sheets only where no other holds a table.
     Raises:
