@@ -108,9 +108,8 @@ def linear(sizes, sharpness, away):
         paths=("law.size",), fitted_paths=["law.size"], absent=none, amplitudes=one, fitted=one
     )
     fit = SimpleNamespace(model=None, paths=("law.size", "own"), values=values, steps=None)
-    return homogeneity_test(SimpleNamespace(whitened_at=lambda *_: whitened), fit, (law,), 0)[
-        "trial"
-    ]
+    problem = SimpleNamespace(whitened_at=lambda *_: whitened, files=(), trials=sizes)
+    return homogeneity_test(problem, fit, (law,), 0)["trial"]
 
 
 def test_a_trial_that_sees_an_effect_sharply_does_not_scatter_the_others():
