@@ -95,7 +95,7 @@ _PARAMETERS = (
         "right parameter named, where data can tell",
         lambda o: o.parameters if o.parameters_tellable else None,
     ),
-    Rate("named, or said not to be told", lambda o: o.parameters_reported),
+    Rate("named, or said not to be identifiable", lambda o: o.parameters_reported),
     Rate("a parameter moved that was right", lambda o: o.parameters_spurious),
 )
 

@@ -263,7 +263,7 @@ def _begun(paths: Sequence[str], starts: tuple[str, ...]) -> bool:
 
 
 def _parameters(outcome: Outcome, truth: Mapping[str, Any], answer: Mapping[str, Any]) -> None:
-    """Whether every base parameter that was off is named, or said not to be told."""
+    """Whether every base parameter that was off is named or listed as not identifiable."""
     off = _off(truth)
     if truth["block"] != "parameters" or not off:
         return

@@ -33,7 +33,8 @@ def curves_picture(
         ]
         for colour, (group, trained) in zip(COLOURS[: len(drawn)], drawn, strict=True):
             curve, unit = trained["curve"], trained["unit"]
-            label = f"{group['title']}, {len(trained['seeds'])} seeds"
+            seeds = len(trained["seeds"])
+            label = f"{group['title']}, {seeds} seed{'s' if seeds > 1 else ''}"
             axis.plot(curve["wall_s"], curve["error"], color=colour, label=label)
             axis.fill_between(
                 curve["wall_s"], curve["low"], curve["high"], color=colour, alpha=0.25, linewidth=0
