@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from benchmarks.measured.held_out import Rig
 from pma_gym.data.datasets.dataset import Dataset
 from pma_gym.discovery.experiments.detectability import experiment_to_detect
-from pma_gym.discovery.screening.score_test import Baseline, ScreeningScore, screen
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import ScreeningScore, screen
 from pma_gym.effects import CATALOGUE
 from pma_gym.plant.model import Model
 

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation, library
 from pma_gym.discovery.experiments.predicted_trials import Columns, columns, derivatives, proposal
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import unabsorbed
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.score_test import SHOWN_GAIN, ScreeningScore
 from pma_gym.effects import CATALOGUE
 

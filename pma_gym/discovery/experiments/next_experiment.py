@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation, library
 from pma_gym.discovery.experiments.predicted_trials import (
     as_measured,
@@ -25,6 +24,7 @@ from pma_gym.discovery.experiments.predicted_trials import (
 from pma_gym.discovery.fitting.candidate_effect import CandidateEffect, bounds
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.predictive_density import covariance_root, unabsorbed
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.score_test import SHOWN_GAIN
 from pma_gym.plant.model import Model
 

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.experiments.excitation import Excitation
 from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.preparation.whitened_residuals import WhitenedResiduals
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.plant.model import Model
 
 Array = NDArray[np.float64]

@@ -14,7 +14,8 @@ from pma_gym.discovery.fitting.fit_problem import FitProblem, Fitted
 from pma_gym.discovery.fitting.free_parameters import FreeParameters, prior
 from pma_gym.discovery.preparation.noise import white_noise
 from pma_gym.discovery.screening.candidates import candidate_effects
-from pma_gym.discovery.screening.score_test import SHOWN_GAIN, Baseline, screen
+from pma_gym.discovery.screening.probe_scores import Baseline
+from pma_gym.discovery.screening.score_test import SHOWN_GAIN, screen
 from pma_gym.plant import sensors
 from pma_gym.plant.model import Model, load_model
 from pma_gym.plant.plant import Plant

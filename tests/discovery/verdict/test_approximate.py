@@ -7,10 +7,11 @@ from unittest import mock
 
 import pytest
 
-from pma_gym.discovery.diagnosis import Approximate, Estimate, Gap, NamedEffect
 from pma_gym.discovery.report.approximate_text import left_text, why_approximate
 from pma_gym.discovery.report.summary import diagnosis_summary
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.result.estimates import Approximate, Estimate, NamedEffect
+from pma_gym.discovery.result.misfit import Gap
 from pma_gym.discovery.verdict import approximate
 from pma_gym.discovery.verdict.approximate import LEAST_MISFIT, MOST_LEFT, closing
 from pma_gym.discovery.verdict.unknown import Reason

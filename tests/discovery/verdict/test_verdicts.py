@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from pma_gym.data.trial import Trial
-from pma_gym.discovery.diagnosis import NextExperiment
 from pma_gym.discovery.report.verdict_text import sentence
+from pma_gym.discovery.result.next_experiment import NextExperiment
 from pma_gym.discovery.screening.autocorrelation import SURE, AutocorrelationTest
 from pma_gym.discovery.verdict import decision, unknown
 from pma_gym.discovery.verdict.adequacy import Adequacy
