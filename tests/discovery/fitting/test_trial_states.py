@@ -32,8 +32,8 @@ def back(diagnosis, trials, folder):
 
 @pytest.mark.parametrize("case", ["nothing", "parameters", "hysteresis"])
 def test_model_and_trials_read_back_give_the_misfit_that_is_printed(case, tmp_path):
-    diagnosis = diagnosed(case, 6)
-    read = back(diagnosis, laboratory(case, 6)[0], tmp_path)
+    diagnosis = diagnosed(case)
+    read = back(diagnosis, laboratory(case)[0], tmp_path)
     for signal, judged in diagnosis.adequacy.items():
         assert read[signal] == pytest.approx(diagnosis.written[signal], rel=0.01)
         assert read[signal] == pytest.approx(judged.fitted * judged.floor, rel=0.01)
