@@ -87,7 +87,7 @@ class PMAEnv(Copies, SeededByReset, Episode, gym.Env[NDArray[np.float32], NDArra
     | 2 | measured load | 1000 N |
     | 3 | measured pressure | 600 kPa |
     | 4 | reference now | range |
-    | 5 | reference now minus measured position | range |
+    | 5 | reference now less measured position | range |
     | next `preview` | reference 1, 2... control steps ahead | range |
     | next 1 or 2 | last action | 10 V, -1.0 = 0 V |
     | next `history` | measured position 1, 2... control steps before | range |
