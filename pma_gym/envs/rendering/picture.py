@@ -1,7 +1,7 @@
-"""A picture of the station at work: the rig on the left, the trial so far on the right.
+"""Picture of the station: the rig on the left, the trial so far on the right.
 
-The only importer of matplotlib in the environments; `PMAEnv.render` imports it when first needed.
-What never changes is drawn once; each picture restores it and draws what moves on top.
+Only this module of the environments imports matplotlib; `PMAEnv.render` imports it on first use.
+The static background is drawn once; each picture restores it and draws the moving parts on top.
 """
 
 import math
@@ -21,27 +21,27 @@ from pma_gym.tasks import Task
 from pma_gym.units import SI_FACTORS
 
 DPI = 100
-"""Pixels of an inch of a picture of the usual width: wider ones show the same, larger."""
+"""Pixels per inch at the usual width; wider pictures show the same, enlarged."""
 
 ACTUAL, VOLTAGE = "#1565c0", "#4a7c3a"
 MOST_RATE_HZ = 100.0
-"""Positions are drawn at most at about this rate: more than there are pixels."""
+"""Largest rate (Hz) of drawn positions, more than there are pixels."""
 
 
 _AXIS = {"excess": "moment's excess"}
-"""Labels of quantities that do not speak for themselves."""
+"""Axis labels of quantities whose name needs an explanation."""
 
 
 class Picture:
-    """Draws an environment again and again.
+    """Draw pictures of an environment, one per call.
 
     Args:
-        task: the task, which says what the plot's axes are.
+        task: the task, which defines the axes of the plot.
         width: width of the picture (pixels); it is half as high.
     """
 
     def __init__(self, task: Task, width: int = USUAL_WIDTH) -> None:
-        """Draw what never changes."""
+        """Draw the static background."""
         self._factor = SI_FACTORS[task.schedule.unit]
         self._figure = Figure(
             figsize=(USUAL_WIDTH / DPI, 0.5 * USUAL_WIDTH / DPI),
@@ -59,7 +59,7 @@ class Picture:
         self._still = self._canvas.copy_from_bbox(self._figure.bbox)
 
     def draw(self, scene: Scene, history: History) -> NDArray[np.uint8]:
-        """The picture now.
+        """Return the present picture.
 
         Args:
             scene: an environment of the task, in or after an episode.
