@@ -37,12 +37,12 @@ class Proposal:
     """An experiment.
 
     Attributes:
-        protocol: in words.
+        excitation: in words.
         shows: effects that it would show at their usual size.
         minutes: how long it takes.
     """
 
-    protocol: str
+    excitation: str
     shows: tuple[str, ...]
     minutes: float
 
@@ -60,7 +60,7 @@ def undecidable(
         model: the amended model.
         data: the trials.
         threads: how many simulate.
-        seed: of what is random in protocols.
+        seed: of what is random in excitations.
         progress: called with what is done and the total.
     """
     rig = Rig.of(data, model, threads)

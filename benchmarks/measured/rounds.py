@@ -142,7 +142,7 @@ def round_of(diagnosis: Diagnosis, trials: int) -> Round:
         next_experiment=None
         if experiment is None
         else {
-            "protocol": experiment.excitation,
+            "excitation": experiment.excitation,
             "separates": list(experiment.separates),
             "expected_odds": experiment.expected_odds,
         },

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from pma_gym.data.protocol import PROTOCOLS
+from pma_gym.data.trial_schedule import SCHEDULES
 from pma_gym.plant.model import shipped_models
 from pma_gym.tasks import EVERY_TASK
 
@@ -22,7 +22,7 @@ def task_names(incomplete: str) -> list[str]:
 
 def dissertation_tasks(incomplete: str) -> list[str]:
     """Tasks of the dissertation that begin with a text."""
-    return _starting_with(incomplete, PROTOCOLS)
+    return _starting_with(incomplete, SCHEDULES)
 
 
 def _starting_with(incomplete: str, names: Iterable[str]) -> list[str]:

@@ -69,7 +69,7 @@ class EngineMemory:
         duration = (steps + 2) * options.period
         samples = int(duration * 384.0) + 8
         self.trace = np.zeros(samples if width == 1 else 1)
-        moves = self.task.protocol.motion is not None
+        moves = self.task.schedule.motion is not None
         self._ideals = self.task.ideals(samples if moves else 1)
         self.voltages = np.zeros(steps + 2 if width == 1 else 1)
         self._indices = np.zeros(max(self.count, 1), np.int64)

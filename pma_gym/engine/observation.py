@@ -14,8 +14,8 @@ from pma_gym.units import SI_FACTORS
 BOUND = 5.0
 """Entries are clipped to +-5; all but runaway states stay within +-2."""
 
-EXTENSION_SCALE = TASKS["displacement"].protocol.span
-ROTATION_SCALE = TASKS["rotation"].protocol.span
+EXTENSION_SCALE = TASKS["displacement"].schedule.span
+ROTATION_SCALE = TASKS["rotation"].schedule.span
 LOAD_SCALE = 1000.0
 PRESSURE_SCALE = 600e3
 """Scale of each entry: the value that is 1.0 in the observation (m, rad, N, Pa)."""
@@ -52,15 +52,15 @@ class ObservationTable:
 
     def __init__(self, task: Task, options: Options) -> None:
         """List the entries, and evaluate the reference at every step once."""
-        protocol = task.protocol
+        schedule = task.schedule
         last = task.steps(options.control_rate_hz) + options.preview
-        self.references = protocol.reference(np.arange(last + 1) * options.period)
+        self.references = schedule.reference(np.arange(last + 1) * options.period)
         self.rows = _rows(task, options)
         self.space = spaces.Box(-BOUND, BOUND, (len(self.rows),), np.float32)
-        self._span = protocol.span
+        self._span = schedule.span
         self._preview = options.preview
         self._history, self.delay = options.history, options.observation_delay
-        self._quantity = protocol.quantity
+        self._quantity = schedule.quantity
 
     def describe(self) -> str:
         """The table of entries as text.
@@ -129,11 +129,11 @@ def measured_position(
 
 
 def _rows(task: Task, options: Options) -> list[tuple[str, str]]:
-    unit = task.protocol.unit
-    span = f"{task.protocol.span / SI_FACTORS[unit]:g} {unit}"
+    unit = task.schedule.unit
+    span = f"{task.schedule.span / SI_FACTORS[unit]:g} {unit}"
     volts = "10 V, -1.0 = 0 V"
     now, less, delayed = "reference now", "reference now less measured position", "position heard"
-    if task.protocol.followed.is_force:
+    if task.schedule.followed.is_force:
         now, less = "prescribed moment at the measured angle", "prescribed less measured moment"
         delayed = "excess of the moment heard"
     return [

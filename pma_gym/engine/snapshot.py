@@ -165,7 +165,7 @@ def _check_numbers(engine: EngineMemory, numbers: NDArray[np.float64]) -> None:
 
 def _squares(engine: EngineMemory) -> list[str]:
     pace = PACE.phases if engine.task.exercise else ()
-    sums = [f"sum_{phase.name}" for phase in engine.task.protocol.phases]
+    sums = [f"sum_{phase.name}" for phase in engine.task.schedule.phases]
     return [*sums, *(f"pace_{phase.name}" for phase in pace)]
 
 

@@ -87,7 +87,7 @@ class StateLayout:
     @property
     def info(self) -> list[str]:
         """Keys of a step's info that are numbers, in order."""
-        unit, quantity = self.task.protocol.suffix, self.task.protocol.quantity
+        unit, quantity = self.task.schedule.suffix, self.task.schedule.quantity
         common = [
             "time_s",
             f"{quantity}_{unit}",
@@ -176,7 +176,7 @@ class StateLayout:
             *self.operator,
             *("rest_regulator", "count", "sample", "tare_contraction", "tare_rotation"),
             *("key_0", "key_1", "episode"),
-            *(f"sum_{phase.name}" for phase in self.task.protocol.phases),
+            *(f"sum_{phase.name}" for phase in self.task.schedule.phases),
             *(f"action_{i}" for i in range(self.actions)),
             *(f"wire_{k}_{i}" for k in range(delay) for i in range(self.actions)),
             *(f"{part}_{k}" for k in range(self.readings) for part in PARTS),

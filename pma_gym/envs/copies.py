@@ -48,7 +48,7 @@ class Copies:
         """
         kept = self._kept()
         # These name what is wrong; the spec has it too, without a name.
-        for part in (kept["options"], kept["task"].protocol):
+        for part in (kept["options"], kept["task"].schedule):
             part.__getstate__()
         spec = kept.get("spec")
         return kept if spec is None else kept | {"spec": packed("spec", spec)}

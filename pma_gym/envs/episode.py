@@ -111,11 +111,11 @@ class Episode:
     def position(self) -> float:
         """True position of the task's controlled quantity (m, rad; N m for a moment's excess)."""
         truth = self.truth
-        if self.task.protocol.followed.shortens:
+        if self.task.schedule.followed.shortens:
             return truth["contraction"] - self._number(START)
-        if self.task.protocol.followed.is_force:
+        if self.task.schedule.followed.is_force:
             return self._number("excess_nm")
-        return truth[self.task.protocol.quantity]
+        return truth[self.task.schedule.quantity]
 
     @property
     def operator(self) -> Operator | None:
@@ -197,7 +197,7 @@ class Episode:
     @property
     def reference(self) -> Reference:
         """The reference, called with a time (s): extension, contraction (m) or rotation (rad)."""
-        return Reference(self._detached_task.protocol)
+        return Reference(self._detached_task.schedule)
 
     @cached_property
     def _detached_task(self) -> Task:

@@ -27,9 +27,9 @@ class FunctionRewards:
         task, options = engine.task, engine.options
         assert callable(options.reward)
         self._engine, self._reward, self._scale = engine, options.reward, options.reward_scale
-        unit, quantity = task.protocol.suffix, task.protocol.quantity
+        unit, quantity = task.schedule.suffix, task.schedule.quantity
         self._names = (f"error_{unit}", f"{quantity}_{unit}", f"reference_{unit}")
-        self._span = task.protocol.span / SI_FACTORS[task.protocol.unit]
+        self._span = task.schedule.span / SI_FACTORS[task.schedule.unit]
 
     def write(self, skipped: NDArray[np.int64] | Sequence[int] = ()) -> None:
         """Compute and write the rewards of the last step.

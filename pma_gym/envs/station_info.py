@@ -8,10 +8,10 @@ import copy
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from pma_gym.data.protocol import Protocol
+from pma_gym.data.trial_schedule import TrialSchedule
 from pma_gym.engine.nominal_rig import rest_load
 from pma_gym.plant.model import Model
-from pma_gym.renamed_names import renamed_names
+from pma_gym.renamed_names import renamed_attribute, renamed_names
 from pma_gym.tasks import Task
 
 
@@ -23,14 +23,15 @@ class Reference:
     exercise prescribes a moment, the reference is that of the moment's excess (N m), which is 0.
 
     Attributes:
-        protocol: a copy of the task's protocol.
+        schedule: a copy of the task's schedule.
     """
 
-    protocol: Protocol
+    schedule: TrialSchedule
+    protocol = renamed_attribute("protocol", "schedule")
 
     def __call__(self, time: float) -> float:
         """The reference at a time (s)."""
-        return self.protocol.at(time)
+        return self.schedule.at(time)
 
 
 def detached_task(task: Task) -> Task:
@@ -44,7 +45,7 @@ class StationInfo:
 
     Attributes:
         model: a copy of the nominal model, also if every reset draws another plant.
-        task: the task, with its protocol; a copy.
+        task: the task, with its schedule; a copy.
         pressure: gauge pressure at the trial's start (Pa).
         period: duration of a control step (s).
         action_delay: delay of a command to the station (s), whole periods.
@@ -72,7 +73,7 @@ class StationInfo:
 
     def position(self, measurement: "Measurement") -> float:
         """Measured position of the task's controlled quantity (m, rad or N m)."""
-        followed = self.task.protocol.followed
+        followed = self.task.schedule.followed
         if followed.is_angle:
             return measurement.rotation
         if followed.is_force:

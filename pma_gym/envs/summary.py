@@ -38,7 +38,7 @@ def last_infos(
     task = engine.task
     columns = engine.rows(indices).T
     numbers = {name: columns[place] for name, place in engine.state_layout.offsets.items()}
-    sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.protocol.phases}
+    sums = {phase.name: numbers[f"sum_{phase.name}"] for phase in task.schedule.phases}
     columns_by_name: dict[str, Any] = {name: numbers[name] for name in engine.state_layout.info}
     columns_by_name |= {name: columns_by_name[name] != 0.0 for name in TRUTHS}
     columns_by_name |= summaries(task, sums, numbers["sample"])
@@ -69,7 +69,7 @@ def _step_info(engine: Engine, row: list[float]) -> dict[str, Any]:
 
 def _episode_summary(engine: Engine, index: int, row: list[float]) -> dict[str, Any]:
     task, offsets = engine.task, engine.state_layout.offsets
-    sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.protocol.phases}
+    sums = {phase.name: row[offsets[f"sum_{phase.name}"]] for phase in task.schedule.phases}
     score = summary(task, sums, row[offsets["sample"]])
     code = row[offsets["ended"]]
     score["ended_by"] = limit_in_words(engine.models[index], code, task.exercise)
@@ -91,10 +91,10 @@ def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, 
         rmse_mm or rmse_deg over all phases, rmse_by_phase_mm or _deg of each phase so far,
         percent_of_range.
     """
-    protocol = task.protocol
-    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
+    schedule = task.schedule
+    unit, factor = schedule.suffix, SI_FACTORS[schedule.unit]
     counts = {
-        phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in protocol.phases
+        phase.name: min(max(samples - phase.first, 0.0), phase.samples) for phase in schedule.phases
     }
     begun = {name: count for name, count in counts.items() if count > 0.0}
     total = math.sqrt(sum(sums[name] for name in begun) / sum(begun.values()))
@@ -103,7 +103,7 @@ def summary(task: Task, sums: Mapping[str, float], samples: float) -> dict[str, 
         f"rmse_by_phase_{unit}": {
             name: math.sqrt(sums[name] / count) / factor for name, count in begun.items()
         },
-        "percent_of_range": percent_of_range(total, protocol.span),
+        "percent_of_range": percent_of_range(total, schedule.span),
     }
 
 
@@ -117,10 +117,10 @@ def summaries(
         sums: sums of squared errors (m^2 or rad^2) by phase, shape (m,) each.
         samples: number of samples so far, shape (m,).
     """
-    protocol = task.protocol
-    unit, factor = protocol.suffix, SI_FACTORS[protocol.unit]
+    schedule = task.schedule
+    unit, factor = schedule.suffix, SI_FACTORS[schedule.unit]
     total, number, by_phase = np.zeros(len(samples)), np.zeros(len(samples)), {}
-    for phase in protocol.phases:
+    for phase in schedule.phases:
         count = np.clip(samples - phase.first, 0.0, phase.samples)
         begun = count > 0.0
         # A phase that has not begun adds nothing: its sum is 0.
@@ -131,7 +131,7 @@ def summaries(
     return {
         f"rmse_{unit}": whole / factor,
         f"rmse_by_phase_{unit}": by_phase,
-        "percent_of_range": 100.0 * whole / protocol.span,
+        "percent_of_range": 100.0 * whole / schedule.span,
     }
 
 

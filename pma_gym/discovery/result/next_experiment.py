@@ -1,5 +1,6 @@
 """The experiment that a diagnosis proposes."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,9 +31,14 @@ class NextExperiment:
     def document(self) -> dict[str, Any]:
         """The experiment in `diagnosis.json`; its commands are a file beside it."""
         return {
-            "protocol": self.excitation,
+            "excitation": self.excitation,
             "separates": list(self.separates),
             "expected_odds": self.expected_odds,
             "minutes": self.minutes,
             "file": "next.csv",
         }
+
+
+def proposed_excitation(experiment: Mapping[str, Any]) -> str:
+    """The excitation of `next_experiment` in a `diagnosis.json`; older files call it `protocol`."""
+    return experiment["excitation" if "excitation" in experiment else "protocol"]

@@ -161,14 +161,14 @@ class DeviceEngine:
             np.pad(self.table.references, (0, 2), mode="edge").astype(kernel.element)
         )
         steps = self.task.steps(self.options.control_rate_hz)
-        moves = self.task.protocol.motion is not None
+        moves = self.task.schedule.motion is not None
         samples = int((steps + 2) * self.options.period * 384.0) + 8 if moves else 1
         self._ideals = made.put(self.task.ideals(samples).astype(kernel.element))
         self.observations = zeros((n, entries), np.float32)
         self.final_observations = zeros((n, entries), np.float32)
         self.rewards = zeros((n,), kernel.element)
         self.terminated, self.truncated = (zeros((n,), np.bool_) for _ in range(2))
-        phases = self.task.protocol.phases
+        phases = self.task.schedule.phases
         self.scores = zeros((2 + len(phases), n), kernel.element)
         self._scored = ["sample", "ended", *(f"sum_{phase.name}" for phase in phases)]
         self._faults = zeros((1,), np.int32)

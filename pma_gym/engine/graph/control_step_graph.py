@@ -166,7 +166,7 @@ class ControlStepGraph(StepInputs):
 
     def _info(self, sensed: Mapping[str, Value], count: Value) -> dict[str, Value]:
         state_layout, task = self.state_layout, self.state_layout.task
-        unit, quantity = task.protocol.unit, task.protocol.quantity
+        unit, quantity = task.schedule.unit, task.schedule.quantity
         factor, position = 1.0 / SI_FACTORS[unit], self.position(sensed)
         valid = self.equations.parameters["validity"]
         low = where(valid.lowest < task.lowest_pressure, task.lowest_pressure, valid.lowest)
@@ -201,7 +201,7 @@ class ControlStepGraph(StepInputs):
 
     def first_score(self, sensed: Mapping[str, Value]) -> dict[str, Value]:
         """The score's numbers once the first sample, that of the beginning, is taken."""
-        phase = self.state_layout.task.protocol.phases[0]
+        phase = self.state_layout.task.schedule.phases[0]
         error = self.position(sensed) - float(phase.reference(0.0))
         return {"sample": self.graph.constant(1.0), f"sum_{phase.name}": error * error}
 

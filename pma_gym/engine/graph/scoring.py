@@ -57,11 +57,11 @@ def position_of(eq: Equations, task: Task, outputs: Mapping[str, Value]) -> Valu
 
     Of an exercise that prescribes a moment it is the moment's excess (N m).
     """
-    if task.protocol.followed.lengthens:
+    if task.schedule.followed.lengthens:
         return eq["zero_contraction"] - outputs["contraction"]
-    if task.protocol.followed.shortens:
+    if task.schedule.followed.shortens:
         return outputs["contraction"] - eq.graph.input(START, HELD)
-    if task.protocol.followed.is_force:
+    if task.schedule.followed.is_force:
         radius = eq.parameters["rotor"].radius
         return Prescribed(radius, held_plan(eq, task)).excess(outputs["load"], outputs["rotation"])
     return outputs["rotation"]
@@ -128,8 +128,8 @@ def sampling(eq: Equations, attempt: StepAttempt, task: Task, period: float) -> 
     e, f = 4.0 * rest - slope, slope - 3.0 * rest
     position = c.start + share * (b + share * (d + share * (e + share * f)))
     sums = []
-    moved = None if task.protocol.motion is None else graph.input("ideal", CHANGING)
-    for phase in task.protocol.phases:
+    moved = None if task.schedule.motion is None else graph.input("ideal", CHANGING)
+    for phase in task.schedule.phases:
         before = graph.input(f"record.sum_{phase.name}", CHANGING)
         first = float(phase.first)
         line = phase.initial + phase.slope * ((sample - first) * SAMPLE_PERIOD)

@@ -35,8 +35,8 @@ class RecordingEngine(Engine):
     def __init__(self, *arguments: Any) -> None:
         """Compile, and allocate arrays for whole episodes."""
         super().__init__(*arguments)
-        protocol = self.task.protocol
-        self._shown = f"{protocol.quantity}_{protocol.suffix}", SI_FACTORS[protocol.unit]
+        schedule = self.task.schedule
+        self._shown = f"{schedule.quantity}_{schedule.suffix}", SI_FACTORS[schedule.unit]
         # A batch may step an episode that has ended once more.
         steps = self.task.steps(self.options.control_rate_hz) + 2
         self._every = np.arange(self.count)

@@ -42,7 +42,7 @@ class Picture:
 
     def __init__(self, task: Task, width: int = USUAL_WIDTH) -> None:
         """Draw the static background."""
-        self._factor = SI_FACTORS[task.protocol.unit]
+        self._factor = SI_FACTORS[task.schedule.unit]
         self._figure = Figure(
             figsize=(USUAL_WIDTH / DPI, 0.5 * USUAL_WIDTH / DPI),
             dpi=DPI * width / USUAL_WIDTH,
@@ -79,24 +79,24 @@ class Picture:
         return np.asarray(self._canvas.buffer_rgba())[..., :3].copy()
 
     def _add_position_plot(self, task: Task) -> None:
-        protocol = task.protocol
+        schedule = task.schedule
         axes = self._plot((0.545, 0.46, 0.435, 0.44), task)
-        time = np.linspace(0.0, protocol.duration, 301)
+        time = np.linspace(0.0, schedule.duration, 301)
         axes.plot(
             time,
-            protocol.reference(time) / self._factor,
+            schedule.reference(time) / self._factor,
             "--",
             color=REFERENCE,
             lw=1.4,
-            label="prescribed" if protocol.followed.is_force else "reference",
+            label="prescribed" if schedule.followed.is_force else "reference",
         )
-        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {protocol.quantity}")
+        (self._actual,) = axes.plot([], [], color=ACTUAL, lw=1.8, label=f"true {schedule.quantity}")
         (self._now,) = axes.plot([], [], "o", color=ACTUAL, ms=5)
         # An excess lies on either side of what is prescribed.
-        lowest, highest = (-1.2, 2.4) if protocol.followed.is_force else (-0.12, 1.2)
-        span = protocol.span / self._factor
+        lowest, highest = (-1.2, 2.4) if schedule.followed.is_force else (-0.12, 1.2)
+        span = schedule.span / self._factor
         axes.set_ylim(lowest * span, highest * span)
-        axes.set_ylabel(f"{_AXIS.get(protocol.quantity, protocol.quantity)} ({protocol.unit})")
+        axes.set_ylabel(f"{_AXIS.get(schedule.quantity, schedule.quantity)} ({schedule.unit})")
         axes.tick_params(labelbottom=False)
         axes.legend(
             loc="lower right",
@@ -120,7 +120,7 @@ class Picture:
 
     def _plot(self, place: tuple[float, float, float, float], task: Task) -> Axes:
         axes = self._figure.add_axes(place)
-        axes.set_xlim(0.0, 1.01 * task.protocol.duration)
+        axes.set_xlim(0.0, 1.01 * task.schedule.duration)
         axes.spines[["top", "right"]].set_visible(False)
         axes.spines[["left", "bottom"]].set_color(FAINT)
         axes.tick_params(labelsize=8, color=FAINT, labelcolor=INK)

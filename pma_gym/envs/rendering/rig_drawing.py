@@ -153,12 +153,12 @@ class RigDrawing:
         self._leg.set_data(x, y)
 
     def _move_mark(self, scene: Scene, end: float) -> None:
-        if self._task.protocol.followed.is_travel:
-            outwards = -1.0 if self._task.protocol.followed.shortens else 1.0
+        if self._task.schedule.followed.is_travel:
+            outwards = -1.0 if self._task.schedule.followed.shortens else 1.0
             x = end - 1e3 * outwards * scene.error + 0.5 * SLIDE_WIDTH
             self._mark.set_data([x, x], [-64.0, -45.0])
         else:
-            excess = self._task.protocol.followed.is_force
+            excess = self._task.schedule.followed.is_force
             reference = PACE.at(scene.time) if excess else scene.truth["rotation"] - scene.error
             radii = np.array([1.08, 1.38]) * np.exp(1j * (math.pi / 2 - reference))
             self._mark.set_data(*_on_pulley(radii, 1.0))
