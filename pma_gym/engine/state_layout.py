@@ -1,4 +1,4 @@
-"""The state of an environment between two steps: a row of numbers, at named offsets."""
+"""Layout of an environment's state between two steps: a row of numbers at named offsets."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ PARTS: tuple[str, ...] = tuple(signal.reading or signal.name for signal in STATI
 """What a reading consists of, in order: extension, rotation, load, pressure."""
 
 START = "start_contraction"
-"""Place of the contraction that an episode began at (m), from which a regulator's task counts."""
+"""Name of the initial contraction of an episode (m), the zero of a regulator's task."""
 
 HAND_PUSH = "memory_hand_push"
 """Place of the force with which a hand pushes the slide (N)."""
@@ -62,7 +62,7 @@ def profile_at_offsets(number: Callable[[str], Value], exercise: Exercise) -> Mo
 
 @dataclass(frozen=True)
 class StateLayout:
-    """Places of an environment's numbers.
+    """Offsets of an environment's numbers.
 
     Attributes:
         states: names of the plant's states and memories.
@@ -166,7 +166,7 @@ class StateLayout:
 
     @cached_property
     def offsets(self) -> dict[str, int]:
-        """Place of every number by name."""
+        """Offset of every number by name."""
         delay = self.options.action_delay
         names = [
             *self.states,
@@ -193,5 +193,5 @@ class StateLayout:
 
     @property
     def size(self) -> int:
-        """How many numbers there are."""
+        """Number of numbers in the row."""
         return len(self.offsets)

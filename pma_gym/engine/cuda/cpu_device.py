@@ -1,4 +1,4 @@
-"""A stand-in for a GPU: the code of its threads, compiled for the processor."""
+"""Emulation of a GPU: the code of its threads, compiled for the processor, for tests."""
 
 import ctypes
 from collections.abc import Mapping

@@ -1,8 +1,8 @@
-"""Environments whose numbers lie on a device, as arrays of it: a GPU, or a stand-in for one.
+"""Environments in the memory of a device: a GPU, or its emulation.
 
-The device computes everything, new episodes included, and nothing is copied from it or to it while
-it does. Where a station is drawn anew at every reset, is disturbed, or does not hang slack at rest,
-the processor makes the beginnings; then a step waits for the flags of those that ended.
+The device computes everything, including resets, without copies to or from the host. If stations
+are randomised or disturbed, or their cable is taut at rest, the processor computes the resets; a
+step then waits for the flags of ended episodes.
 """
 
 from collections.abc import Mapping, Sequence
@@ -65,7 +65,7 @@ class Device(Protocol):
 
 
 class DeviceEngine:
-    """State of n environments on a device, and what moves it.
+    """Hold the state of n environments on a device and step them.
 
     An episode that ends is followed by the next one at once: its last observation stands in
     `final_observations`, its reward and flags where they always do, and `observations` has the

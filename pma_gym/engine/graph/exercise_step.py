@@ -1,4 +1,4 @@
-"""What an exercise adds to a control step, as traced arithmetic: operator, safety, score."""
+"""An exercise's part of a control step, as traced arithmetic: operator, safety filter, score."""
 
 import math
 from collections.abc import Mapping
@@ -16,7 +16,7 @@ from pma_gym.units import SI_FACTORS
 
 
 def held_volts(volts: Value) -> Value:
-    """Volts as a drive or a regulator takes them: 0 to 10 V."""
+    """Limit a voltage to the range of drive and regulator, 0 to 10 V."""
     return where(volts < 0.0, 0.0, where(volts > HIGHEST_VOLTAGE, HIGHEST_VOLTAGE, volts))
 
 
@@ -56,7 +56,7 @@ class ExerciseStep:
     # -- operator ----------------------------------------------------------------------------------
 
     def operate(self) -> dict[str, Value]:
-        """What the operator does in the step that begins: motor voltage, and how he comes out."""
+        """Compute the operator's motor voltage in the step, and the operator's new state."""
         slot, operator = self.inputs.slot, self.operator
         count = slot("count")
         time = to_real(count) * self.period
@@ -94,7 +94,7 @@ class ExerciseStep:
     # -- safety ------------------------------------------------------------------------------------
 
     def keep_safe(self, volts: Value) -> tuple[Value, dict[str, Value]]:
-        """Regulator voltage that the safety layer passes on, and the layer's new state."""
+        """Compute the regulator voltage after the safety filter, and the filter's new state."""
         if not self.state_layout.options.safety:
             return volts, {}
         # It stands at the rig: delays lie between the agent and it.
@@ -130,7 +130,7 @@ class ExerciseStep:
     # -- score -------------------------------------------------------------------------------------
 
     def score(self, sensed: Mapping[str, Value], first: bool) -> dict[str, Value]:
-        """What a step came to: new numbers by name.
+        """Compute the score after a step: new numbers by name.
 
         Args:
             sensed: the step's truth, and whether it broke a limit of the rig.

@@ -1,4 +1,4 @@
-"""Scores an episode while it runs: the position at 384 Hz, between the plant's internal steps."""
+"""Score of a running episode: the position at 384 Hz, interpolated between internal steps."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from pma_gym.metrics import SAMPLE_RATE_HZ
 from pma_gym.tasks import MomentProfile, Task
 
 SAMPLE_PERIOD = 1.0 / SAMPLE_RATE_HZ
-"""Time between two samples (s), whatever the control rate."""
+"""Time between two samples (s), at every control rate."""
 
 
 @dataclass(frozen=True)
 class Course:
-    """How the position moves during an attempt, as traced values.
+    """Course of the position during a step attempt, as traced values.
 
     Attributes:
         start: position at its beginning (m or rad).
