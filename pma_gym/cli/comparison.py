@@ -1,4 +1,4 @@
-"""`pma-gym compare`: how far a model is from a lab's logs, without fitting anything."""
+"""`pma-gym compare`: misfit of a model to a lab's logs, without a fit."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""What the agent sees: one table of entries, which packs, describes and bounds the observation."""
+"""The observation: a table of entries that computes, describes and bounds it."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -18,22 +18,22 @@ EXTENSION_SCALE = TASKS["displacement"].schedule.span
 ROTATION_SCALE = TASKS["rotation"].schedule.span
 LOAD_SCALE = 1000.0
 PRESSURE_SCALE = 600e3
-"""What 1.0 stands for (m, rad, N, Pa)."""
+"""Scale of each entry: the value that is 1.0 in the observation (m, rad, N, Pa)."""
 
 
 class Prescribed(NamedTuple):
-    """What the moment at a joint is compared with; numbers or traced values.
+    """Prescribed moment at a joint, in numbers or traced values.
 
     Attributes:
-        radius: of the pulley (m).
-        plan: moment over the angle that is prescribed.
+        radius: radius of the pulley (m).
+        plan: prescribed moment as a function of the angle.
     """
 
     radius: Any
     plan: MomentProfile
 
     def excess(self, load: Any, angle: Any) -> Any:  # noqa: ANN401
-        """Moment that a load (N) makes, less the one that is prescribed at an angle (rad): N m."""
+        """Moment of a load (N) minus the moment prescribed at an angle (rad), in N m."""
         return self.radius * load - self.plan.at(angle)
 
 
@@ -45,7 +45,7 @@ class ObservationTable:
         options: the environment's options.
 
     Attributes:
-        rows: (entry, what 1.0 stands for) in order.
+        rows: (entry, scale of 1.0) in order.
         space: the observation space.
         references: reference (m or rad) at every control step, and `preview` steps past the end.
     """
@@ -88,14 +88,13 @@ class ObservationTable:
         action: Sequence[Any],
         prescribed: Prescribed | None = None,
     ) -> list[Any]:
-        """The entries before they are clipped, of numbers or traced values.
+        """Compute the entries before clipping, from numbers or traced values.
 
         Args:
-            reading: part of a reading (SI) by its name, and how many control steps ago it was
-                taken.
-            reference: reference (m or rad) so many control steps ahead.
+            reading: function of a measured signal's name and its age in control steps (SI).
+            reference: function of the control steps ahead that returns the reference (m or rad).
             action: the last action, -1 to 1.
-            prescribed: of an exercise that prescribes a moment.
+            prescribed: the prescribed moment, in an exercise that has one.
         """
         delay = self.delay
 
@@ -123,7 +122,7 @@ class ObservationTable:
 def measured_position(
     quantity: str, reading: Callable[[str], Any], prescribed: Prescribed | None = None
 ) -> Any:  # noqa: ANN401
-    """The position that a task asks for (m, rad or N m), from parts of a reading by their names."""
+    """Measured position of the task's controlled quantity (m, rad or N m), from signals by name."""
     if prescribed is not None:
         return prescribed.excess(reading("load"), reading("rotation"))
     return -reading("extension") if SIGNALS[quantity].shortens else reading(quantity)
